@@ -1,4 +1,4 @@
-"""Explorers score the actions of a state: curiosity, the thesis' rivals, and anchors from the literature."""
+"""Explorers score the actions of a state: curiosity, the baselines of the thesis, and baselines from the literature."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mobee.learning.value_iteration import OutcomeModel
 
 
 class Explorable(Protocol):
-    """An agent, as its explorer sees it."""
+    """The attributes of an agent that an explorer may read."""
 
     model: TransitionModel
     beliefs: OutcomeModel
@@ -29,18 +29,18 @@ class Explorable(Protocol):
     transitions: int
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """State and action values, (S,) and (S, A), under a reward (S, A) and beliefs, else the agent's own.
+        """Compute state and action values, (S,) and (S, A), for a reward (S, A) and beliefs; None: the agent's own.
 
-        Plans of one key start from the values of the one before.
+        Each plan starts from the values of the previous plan of the same key.
         """
 
 
 Explorer = Callable[[Explorable, int, np.random.Generator], Array]
 
 
-"""Gives the score of each action of a state, shape (actions,).  The highest is chosen, ties at random.
+"""Returns the score of each action of a state, shape (actions,).  The highest is chosen, ties at random.
 
-The scores follow from the agent's settings and its transitions so far alone; the generator is the transition's own.
+The scores must follow from the agent's settings and its transitions alone; each transition has its own generator.
 """
 
 
@@ -53,9 +53,9 @@ class SampledBeliefs:
 
 
 def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer what promises the largest discounted information gain in a world drawn from the posterior (Strens 2000).
+    """Score actions by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
 
-    The world is held for an episode of 1 / (1 - discount) transitions: its random numbers are, while the counts go on.
+    Its random numbers stay the same for an episode of 1 / (1 - discount) transitions, while the counts grow.
     """
     model = agent.model
     episode = agent.transitions // round(1.0 / (1.0 - agent.discount))
@@ -65,10 +65,10 @@ def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) 
 
 
 def dirichlet(counts: Array, normal: Array) -> Array:
-    """One draw of the probabilities (..., B) with these counts (..., B) from standard normal numbers of the same shape.
+    """Draw probabilities (..., B) from the Dirichlet distribution of counts (..., B) by standard normal numbers of the same shape.
 
-    Gamma variates by Wilson and Hilferty's cube root (1931), near enough for counts from 1: the same numbers give
-    probabilities that move little when the counts do.  Where there is no count the probability is 0.
+    Gamma variates by Wilson and Hilferty's cube root (1931), accurate enough for counts from 1: with the same numbers, small changes of
+    the counts change the probabilities little.  Where the count is 0 the probability is 0.
     """
     known = np.maximum(counts, 1.0)
     gamma = np.maximum(1.0 - 1.0 / (9.0 * known) + normal / (3.0 * np.sqrt(known)), 1e-3)
@@ -79,25 +79,24 @@ def dirichlet(counts: Array, normal: Array) -> Array:
 
 @lru_cache(maxsize=4)
 def _normal(seed: int, part: int, episode: int, shape: tuple[int, ...]) -> Array:
-    """The random numbers of an episode: those of the bins that were there stay when another is added."""
+    """Return the random numbers of an episode; those of the existing bins stay when a bin is added."""
     drawn = np.random.default_rng([seed, part, episode]).standard_normal((shape[2], *shape[:2]))
     return np.ascontiguousarray(np.moveaxis(drawn, 0, -1))
 
 
-EQUAL = 0.01  # of the largest gain: action values that differ by less are taken for equal, as the plan's tolerance is of that size
+EQUAL_SHARE = 0.01  # of the largest gain: action values that differ by less count as equal, since the plan has that tolerance
 
 
-HORIZONS = 2.0  # how far the plan is followed, in units of 1 / (1 - discount)
+HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer the largest discounted gain to expect next; among equals, what leaves most to be learnt when the plan is done.
+    """Score actions by the discounted gain expected next; among equals, by the gain that remains after the plan.
 
-    'Curious' is paid the last gain of a state-action, this one what its next observation will be worth on average under
-    debiased counts, which tells sooner that an action is certain; what was never tried pays what it was imagined to.
-    Then the best plan is followed through its most likely outcomes, the gains met fall as they would, and a second plan
-    values what is left: a state with one untried action is worth less than one with sixteen.  Both plans are made with
-    the agent's beliefs.
+    The reward of 'curious' is the last gain of a state-action.  Here it is the expected gain of the next observation under debiased
+    counts, which falls sooner once an action is certain; an action that was never tried has its imagined gain.
+    Then the best plan is simulated through its most probable outcomes, the gains on it decrease accordingly, and a second plan values
+    the remaining gains: a state with one untried action is worth less than one with sixteen.  Both plans use the agent's beliefs.
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -107,7 +106,7 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     _core().expected_gains(beliefs.table, counts, totals, model.tries, gains)
     _, action_values = agent.plan(gains, key="depleting")
     scores = action_values[state, :actions]
-    equal = scores >= scores.max() - EQUAL * gains.max()
+    equal = scores >= scores.max() - EQUAL_SHARE * gains.max()
     if np.count_nonzero(equal) == 1:
         return scores
     left, steps = gains.copy(), round(HORIZONS / (1.0 - agent.discount))
@@ -118,7 +117,7 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
 
 
 def _next_counts(model: TransitionModel) -> tuple[Array, Array]:
-    """The counts (S, A, B) and their totals (S, A) over which the next observation's gain will be taken."""
+    """Return the counts (S, A, B), and their totals (S, A), from which the gain of the next observation is computed."""
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0) * model.forgetting
     floor = model.imagined if model.divergence == "kail" else np.ones_like(model.imagined)
     forgotten = 0.0 if model.forgetting == 1.0 else (1.0 / model.forgetting - 1.0) * real.sum(axis=-1)
@@ -127,32 +126,32 @@ def _next_counts(model: TransitionModel) -> tuple[Array, Array]:
 
 @cache
 def _core() -> ModuleType:
-    """Loaded when it is first needed."""
+    """Import the native functions when they are first needed."""
     from mobee._core import learning
 
     return learning
 
 
-TIE = 1e-12
+TIE_MARGIN = 1e-12  # scores that differ by less are a tie
 
 
 def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer what promises the largest discounted information gain."""
+    """Score actions by their discounted information gain."""
     return agent.plan()[1][state, : len(agent.model.space.actions(state))]
 
 
 def random(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer nothing."""
+    """Score all actions equally."""
     return np.zeros(len(agent.model.space.actions(state)))
 
 
 def least_tried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer what was tried least often from here."""
+    """Score actions by how rarely they were tried in this state."""
     return -agent.model.tries[state, : len(agent.model.space.actions(state))].astype(np.float64)
 
 
 def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer what leads soonest to a state-action that nobody has tried; when there is none, to the least tried of all."""
+    """Score actions by how soon they lead to an untried state-action, or to the least-tried one if all were tried."""
     tries = agent.model.tries
     exists = agent.model.reward != -np.inf
     reward = np.where(exists, tries == tries[exists].min(), -np.inf)
@@ -160,7 +159,7 @@ def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> 
 
 
 def count_bonus(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Prefer what promises the largest discounted sum of 1 / sqrt(1 + tries) (Strehl and Littman 2008)."""
+    """Score actions by their discounted sum of 1 / sqrt(1 + tries) (Strehl and Littman 2008)."""
     reward = np.where(agent.model.reward != -np.inf, 1.0 / np.sqrt(1.0 + agent.model.tries), -np.inf)
     return agent.plan(reward, key="count_bonus")[1][state, : len(agent.model.space.actions(state))]
 
@@ -177,44 +176,44 @@ EXPLORERS: dict[str, Explorer] = {
 
 
 def choose(scores: Array, rng: np.random.Generator) -> int:
-    """The action with the highest score, uniformly at random among those within 1e-12 of it."""
+    """Return the action with the highest score, drawn uniformly among those within 1e-12 of it."""
     listed = scores.tolist()  # NumPy takes longer for so few numbers
-    least = max(listed) - TIE
+    least = max(listed) - TIE_MARGIN
     ties = [action for action, score in enumerate(listed) if score >= least]
     return ties[0] if len(ties) == 1 else ties[int(rng.random() * len(ties))]
 
 
 class Draws:
-    """One generator that is set anew for every count, which takes a tenth of the time of making one.
+    """Random numbers determined by a seed, a name and a count: one generator whose state is set again for each count.
 
-    `name`: tells apart who draws under the same seed.
+    Setting the state takes a tenth of the time of making a generator.  `name`: distinguishes users of the same seed.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._generator = _Late(np.random.PCG64(0))
+        self._generator = _LazyGenerator(np.random.PCG64(0))
 
     def __reduce__(self) -> tuple[type[Draws], tuple[str]]:
         return Draws, (self._name,)
 
     def at(self, seed: int, count: int) -> np.random.Generator:
-        """The generator at the beginning of the draws of a count; valid until the next call."""
-        self._generator.waiting = f"{self._name} {seed} {count}"
+        """Return the generator for a count, at its first draw; valid until the next call."""
+        self._generator.pending = f"{self._name} {seed} {count}"
         return self._generator
 
 
-class _Late(np.random.Generator):
-    """A generator that is set when it is first asked for anything: most who get one draw nothing, and setting takes microseconds."""
+class _LazyGenerator(np.random.Generator):
+    """A generator whose state is set at the first use: most are never used, and setting the state takes microseconds."""
 
-    waiting: str | None = None
-    """What its next state follows from; None: it is set."""
+    pending: str | None = None
+    """Text from which its state is derived at the next use; None: the state is set."""
 
     def __getattribute__(self, name: str) -> Any:
         own = super().__getattribute__
-        waiting = own("waiting")
-        if waiting is not None:
-            self.waiting = None
-            own("bit_generator").state = _state(waiting)
+        pending = own("pending")
+        if pending is not None:
+            self.pending = None
+            own("bit_generator").state = _state(pending)
         return own(name)
 
 

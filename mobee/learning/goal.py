@@ -1,4 +1,4 @@
-"""Rewards from outside that an agent pursues instead of, or in addition to, information gain (thesis 6.5)."""
+"""External rewards that an agent plans for instead of, or in addition to, information gain (thesis 6.5)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
 
 Goal = Array | Sequence[int] | Callable[[int, int, int], float]
-PURSUING = ("curious",)  # explorers that plan for an external reward
+PURSUING = ("curious",)  # explorers that use an external reward
 
 
 class External:
@@ -22,12 +22,12 @@ class External:
 
     Args:
         space: the states and actions.
-        goal: target states (every action taken in one of them pays 1), or rewards of shape (S, A), or a function that
-            gives the reward of a state, an action and the action's goal state.
-        weight: the external reward times this is added to the intrinsic one; None: it replaces it.
+        goal: target states, whose actions all have reward 1; or rewards of shape (S, A); or a function of a state, an action and the
+            action's goal state that returns the reward.
+        weight: the external reward times this factor is added to the intrinsic one; None: it replaces the intrinsic one.
 
     Raises:
-        InvalidValue: no such state, a reward that is no finite number, or a wrong shape.
+        InvalidValue: no such state, a reward that is not finite, or a wrong shape.
     """
 
     def __init__(self, space: Space, goal: Goal, weight: float | None = None) -> None:
@@ -46,7 +46,7 @@ class External:
         self.reward.flags.writeable = False
 
     def combined(self, intrinsic: Array) -> Array:
-        """The reward to plan with, shape (S, A), -inf where there is no action."""
+        """Return the reward to plan with, shape (S, A), -inf where there is no action."""
         if self.weight is None:
             return self.reward
         return np.where(intrinsic == -np.inf, -np.inf, intrinsic + self.weight * self.reward)
@@ -58,18 +58,18 @@ class External:
 
 
 def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
-    """The external reward of an agent, None without a goal; raises InvalidValue where its explorer would ignore it."""
+    """Return the external reward of an agent, None without a goal; raises InvalidValue if its explorer would ignore it."""
     if goal is None:
         if weight is not None:
             raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
         return None
     if explorer not in PURSUING:
-        raise InvalidValue(f"the explorer {explorer!r} pursues no goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
+        raise InvalidValue(f"the explorer {explorer!r} ignores a goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
     return External(space, goal, weight)
 
 
 def target_states(space: Space, given: Any) -> Ints:
-    """The states given as one number or several, ascending; raises InvalidValue where the space has no such state."""
+    """Return the states given as one number or several, ascending; raises InvalidValue if the space has no such state."""
     states = np.unique(np.asarray(given))
     if states.dtype.kind not in "iu" or not len(states) or states[0] < 0 or states[-1] >= len(space):
         raise InvalidValue(f"{given!r}: {space.part} has no such state. Valid are 0 to {len(space) - 1}.")

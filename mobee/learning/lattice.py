@@ -25,14 +25,14 @@ class Lattice(Space):
     fastest; an action is the index of its goal among the state's goals in ascending order.
 
     Args:
-        robot: whose motor limits the levels are fractions of.
+        robot: the robot; levels are fractions between its motor limits.
         joints: motor names, all of one part.
-        levels: fractions of each joint's range, ascending in [0, 1]: one sequence for all joints, one a joint in their
-            order, or one by each joint's name.
-        neighbours: how many nearest samples (in fractions of the range) each state has actions to, or "equidistant":
-            the samples one step away along one joint.  When left out: 16, or all others where there are fewer.
+        levels: fractions of each joint's range, ascending in [0, 1]: one sequence for all joints, one for each joint in their
+            order, or a mapping from each joint's name.
+        neighbours: number of nearest samples (in fractions of the range) that each state has actions to, or "equidistant":
+            the samples one step away along one joint.  None: 16, or all others if there are fewer.
         tie_seed: seed of the draw among equally near samples at the last rank.
-        rest: fraction of its range at which every other motor of the part is kept.
+        rest: fraction of its range at which each other motor of the part stays.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -71,7 +71,7 @@ class Lattice(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
+        """The constructor's arguments and a digest of the resulting space, for the record of a run (plain JSON values)."""
         first = self.levels[0]
         levels = list(first) if set(self.levels) == {first} else [list(one) for one in self.levels]
         return self._made | {"levels": levels, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
@@ -84,19 +84,19 @@ class Lattice(Space):
 
 
 def _borders(levels: Sequence[float], low: float, high: float) -> list[float]:
-    """Half way between the levels of a joint, in [rad]."""
+    """Return the midpoints between the levels of a joint, in [rad]."""
     return [float(low + (one + next_) / 2 * (high - low)) for one, next_ in pairwise(levels)]
 
 
 def _checked_levels(levels: Levels, joints: Sequence[str]) -> tuple[tuple[float, ...], ...]:
-    """The levels of each joint, in the order of the joints."""
+    """Return the levels of each joint, in the order of the joints; raises InvalidValue, UnknownName."""
     if isinstance(levels, Mapping):
         for name in levels:
             if name not in joints:
                 raise UnknownName("joint of the levels", name, joints)
-        missing = [name for name in joints if name not in levels]
-        if missing:
-            raise InvalidValue(f"levels of {', '.join(missing)} are missing: give those too, or one sequence for all joints.")
+        absent = [name for name in joints if name not in levels]
+        if absent:
+            raise InvalidValue(f"levels of {', '.join(absent)} are missing: give those too, or one sequence for all joints.")
         each: Sequence[object] = [levels[name] for name in joints]
     elif any(np.ndim(one) for one in levels):
         each = list(levels)
@@ -122,14 +122,14 @@ def _checked_fractions(levels: object) -> tuple[float, ...]:
     return tuple(given.tolist())
 
 
-GAP = 0.8  # between the blocks of a lattice, in steps of its first joints
+BLOCK_GAP = 0.8  # between the blocks of a drawn lattice, in steps of its first joints
 
 
 def plane_layout(space: Space) -> Array:
-    """Where to draw each state, shape (S, 2).
+    """Compute positions at which to draw the states, shape (S, 2).
 
-    A lattice becomes a grid of grids, as in the paper's figure 7: the first joint goes right and the second up within a block, the
-    third and fourth say which block, and so on.  Of other spaces the two directions are shown in which the samples differ most.
+    A lattice becomes a grid of grids, as in the paper's figure 7: within a block the first joint goes right and the second up, the
+    third and fourth choose the block, and so on.  Other spaces are projected to the two directions in which the samples differ most.
     """
     if isinstance(space, Lattice):
         return _nested([len(levels) for levels in space.levels])
@@ -146,5 +146,5 @@ def _nested(sizes: list[int]) -> Array:
     for joint, size in enumerate(sizes):
         axis = joint % 2
         drawn[:, axis] += steps[axis] * digits[:, joint]
-        steps[axis] *= size if len(sizes) <= joint + 2 else size + GAP
+        steps[axis] *= size if len(sizes) <= joint + 2 else size + BLOCK_GAP
     return drawn

@@ -1,4 +1,4 @@
-"""Neighbour graphs over samples: which states the actions of a state aim at, as tables and as edges."""
+"""Neighbour graphs over samples: the states that the actions of each state aim at, as tables and as edges."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from mobee.arrays import Array, Ints
 
 NO_ACTION = -1
 DISTANCE_DECIMALS = 9  # squared distances that agree to here are a tie, whatever the rounding of the fractions
-ROWS = 1000  # states whose candidates are in memory at a time
-FEW = 2000  # points up to which comparing all takes less time than importing SciPy's k-d tree, and 22 MB less memory
+CHUNK = 1000  # states whose candidates are in memory at a time
+MAX_COMPARED = 2000  # points up to which comparing all pairs is cheaper than importing SciPy's k-d tree (22 MB)
 
 
 def lattice_strides(sizes: Sequence[int]) -> Ints:
-    """By how much the state's number grows with each joint's level, shape (joints,): the first joint is the fastest."""
+    """Return the step of the state's number for one level of each joint, shape (joints,): the first joint is the fastest."""
     return np.cumprod([1, *sizes[:-1]]).astype(np.intp)
 
 
 def lattice_digits(sizes: Sequence[int]) -> Ints:
-    """The level of each joint in each state, shape (S, joints), from the number of levels of each joint."""
+    """Return the level of each joint in each state, shape (S, joints), from the number of levels of each joint."""
     digits: Ints = np.arange(np.prod(sizes))[:, None] // lattice_strides(sizes) % np.array(sizes)
     return digits
 
 
 def equidistant_goals(digits: Ints, sizes: Sequence[int]) -> Ints:
-    """The states one lattice step away along one joint, ascending: shape (S, A), padded with NO_ACTION (thesis 7.2)."""
+    """Return the states one lattice step away along one joint, ascending: shape (S, A), padded with NO_ACTION (thesis 7.2)."""
     states = np.arange(len(digits))
     strides = lattice_strides(sizes)
     down = np.where(digits > 0, states[:, None] - strides, NO_ACTION)[:, ::-1]
     up = np.where(digits < np.array(sizes) - 1, states[:, None] + strides, NO_ACTION)
     goals = np.concatenate([down, up], axis=1)
-    missing = goals == NO_ACTION
-    to_the_left = np.argsort(missing, axis=1, kind="stable")
-    return np.take_along_axis(goals, to_the_left, axis=1)[:, : (~missing).sum(axis=1).max()]
+    absent = goals == NO_ACTION
+    present_first = np.argsort(absent, axis=1, kind="stable")
+    return np.take_along_axis(goals, present_first, axis=1)[:, : (~absent).sum(axis=1).max()]
 
 
 def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
-    """The nearest other points of each point, ties drawn at random, ascending: shape (S, count).
+    """Return the nearest other points of each point, ties drawn at random, ascending: shape (S, count).
 
-    Memory grows with S times count; so does time, where few points are equally far.
+    Memory grows with S times count, and so does time unless many points are equally far.
     """
     rng = np.random.default_rng(tie_seed)
     goals = np.empty((len(points), count), dtype=np.intp)
@@ -52,21 +52,21 @@ def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
 
 
 def _candidates(points: Array, count: int) -> Iterator[Ints]:
-    """For each point, ascending: at least those that are no farther than its nearest `count` others."""
-    if len(points) <= FEW:
+    """Yield for each point, ascending, at least the points that are no farther than its nearest `count` others."""
+    if len(points) <= MAX_COMPARED:
         for _ in points:
             yield np.arange(len(points))
         return
     search = _tree(points)
-    for first in range(0, len(points), ROWS):
-        some = points[first : first + ROWS]
+    for first in range(0, len(points), CHUNK):
+        some = points[first : first + CHUNK]
         reach = np.sqrt(search.query(some, count + 1)[0][:, -1] ** 2 + 10.0 ** (1 - DISTANCE_DECIMALS))
         for candidates in search.query_ball_point(some, reach, return_sorted=True):
             yield np.array(candidates)
 
 
 def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.random.Generator) -> Ints:
-    """The `count` nearest of the candidates, the state itself left out, ties at the last rank drawn, ascending."""
+    """Return the `count` nearest candidates without the state itself, ties at the last rank drawn, ascending."""
     others = candidates[candidates != state]
     distance = np.round(((points[others] - points[state]) ** 2).sum(axis=1), DISTANCE_DECIMALS)
     last = np.partition(distance, count - 1)[count - 1]
@@ -76,8 +76,8 @@ def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.rand
 
 
 def nearest_finder(points: Array) -> Callable[[Array], int]:
-    """A function that takes a point, shape (d,), and returns the index of the nearest of `points`, shape (S, d)."""
-    return partial(_nearest_of_few, points) if len(points) <= FEW else partial(_nearest_in_tree, _tree(points))
+    """Return a function from a point, shape (d,), to the index of the nearest of `points`, shape (S, d)."""
+    return partial(_nearest_of_few, points) if len(points) <= MAX_COMPARED else partial(_nearest_in_tree, _tree(points))
 
 
 def _nearest_of_few(points: Array, point: Array) -> int:
@@ -99,18 +99,18 @@ Edges = list[tuple[int, int]]  # state, goal
 
 
 def edges_of(goals: Ints) -> Edges:
-    """All edges of a table of goals (S, A), state by state."""
+    """Return all edges of a table of goals (S, A), state by state."""
     states, actions = np.nonzero(goals != NO_ACTION)
     return list(zip(states.tolist(), goals[states, actions].tolist(), strict=True))
 
 
 def joined(edges: Edges) -> Edges:
-    """Each edge once, ascending by state and goal."""
+    """Return each edge once, ascending by state and goal."""
     return sorted(set(edges))
 
 
 def table_of(edges: Edges, states: int) -> Ints:
-    """The table of goals (S, A) of ascending edges, padded with NO_ACTION."""
+    """Return the table of goals (S, A) of ascending edges, padded with NO_ACTION."""
     counts = np.bincount([state for state, _ in edges], minlength=states)
     goals: Ints = np.full((states, max(1, int(counts.max(initial=0)))), NO_ACTION, dtype=np.intp)
     for (state, goal), action in zip(edges, _ranks(counts), strict=True):
@@ -119,5 +119,5 @@ def table_of(edges: Edges, states: int) -> Ints:
 
 
 def _ranks(counts: Ints) -> list[int]:
-    """The number of each edge among those of its state."""
+    """Return the rank of each edge among those of its state."""
     return [rank for count in counts.tolist() for rank in range(count)]

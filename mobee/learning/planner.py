@@ -1,4 +1,4 @@
-"""Plans from any state to targets by what was learned, and by the graph of intended outcomes."""
+"""Plans from any state to targets with a learned model, compared with shortest paths over intended outcomes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from mobee.learning.value_iteration import OutcomeModel, value_iteration
 
 
 def steps_between(space: Space, start: int, targets: Ints) -> int:
-    """Actions of a shortest path from a state to the nearest target if every action reaches its goal; -1 if there is none."""
+    """Return the length of a shortest path to the nearest target if every action reaches its goal; -1 if there is none."""
     fewest = _steps(_graph(space), np.array([start]))[targets].min()
     return int(fewest) if np.isfinite(fewest) else -1
 
 
 def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[tuple[int, int], float]:
-    """The actions on the shortest intended paths, as (state, goal), with the believed probability that each ends at its goal."""
+    """Return the actions on the shortest intended paths, as (state, goal), with the probability that each ends at its goal."""
     graph = _graph(space)
     there, on = _steps(graph, np.array([start])), _steps(graph.T.tocsr(), targets)
     if not np.isfinite(on[start]):
@@ -35,7 +35,7 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """The states between such actions, with the probability of the best way in and out of each."""
+    """Return the states between such actions, with the probability of the best action into and out of each."""
     entry: dict[int, float] = {}
     leaving: dict[int, float] = {}
     for (state, goal), chance in actions.items():
@@ -45,7 +45,7 @@ def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
 
 
 def _graph(space: Space) -> Any:
-    """A sparse matrix (S, S) with an entry where an action leads from a state to another one."""
+    """Return a sparse matrix (S, S) with an entry for each action from a state to its goal."""
     from scipy.sparse import csr_array
 
     states, actions = np.nonzero(space.goals != NO_ACTION)
@@ -54,27 +54,27 @@ def _graph(space: Space) -> Any:
 
 
 def _steps(graph: Any, sources: Ints) -> Array:
-    """Edges from the nearest of the sources to each state, shape (S,), infinite where there is no way."""
+    """Return the number of edges from the nearest source to each state, shape (S,), infinite if there is no path."""
     from scipy.sparse.csgraph import dijkstra
 
     found: Array = dijkstra(graph, indices=sources, unweighted=True, min_only=True)
     return found
 
 
-DISCOUNT = 0.99  # near 1, the largest value has who needs the fewest actions on average
+DISCOUNT = 0.99  # near 1, the state with the fewest actions on average to a target has the largest value
 TOLERANCE = 1e-12  # of values in [0, 1]
-RELIABLE = 0.5  # what works less often than this is held for unreliable
+RELIABLE = 0.5  # success probability below which states and actions count as unreliable
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A way to a target, and how far it can be trusted.
+    """A path to a target, and its probability of success.
 
-    `path`: states from start to target.  `actions`: what to do in each but the last.  `probabilities`: that each action
-    ends where the path says.  `success`: that all of them do.  `steps`: actions until a target on average, when the planner
-    is asked again wherever one ends.  `shortest`: actions of a shortest path if every action reached its goal.
-    `avoided`: the states on such shortest paths, not on this one, with the probability of getting through each;
-    `distrusted`: the actions on them, as (state, goal), with that of ending at the goal: both where it is below one half.
+    `path`: states from start to target.  `actions`: the action in each but the last.  `probabilities`: that each action ends in the next
+    state of the path.  `success`: that all of them do.  `steps`: mean number of actions to a target, if the plan is made again
+    after each action.  `shortest`: number of actions of a shortest path if every action reached its goal.
+    `avoided`: states on such shortest paths that are not on this one, with the probability of passing each;
+    `distrusted`: actions on them, as (state, goal), with the probability of reaching the goal; both only if it is below one half.
     """
 
     path: tuple[int, ...]
@@ -88,13 +88,13 @@ class Plan:
 
 
 class Planner:
-    """The shortest reliable ways to target states: every action costs the same, and one that fails has to be done again.
+    """Finds the shortest reliable paths to target states: all actions cost the same, and a failed action must be repeated.
 
     Args:
         space: states and actions.
-        beliefs: where actions lead, e.g. `model.debiased()`: with the imagined outcomes even sound actions look unreliable.
+        beliefs: outcomes of the actions, e.g. `model.debiased()`: the imagined outcomes would make reliable actions seem unreliable.
         targets: one or more states.
-        discount: in [0, 1), a factor a step; the smaller it is, the more a short path is preferred over a reliable one.
+        discount: factor a step, in [0, 1); the smaller it is, the more a short path is preferred over a reliable one.
 
     Raises:
         InvalidValue: no such state.
@@ -105,14 +105,14 @@ class Planner:
         self.targets: Ints = target_states(space, targets)
         """The states to reach, ascending."""
         reward, values = np.zeros(space.goals.shape), np.zeros(len(space))
-        reward[self.targets], values[self.targets] = -np.inf, 1.0  # nothing is done there: they keep their value
+        reward[self.targets], values[self.targets] = -np.inf, 1.0  # no actions in targets: they keep their value
         self.values, action_values = value_iteration(beliefs, reward, discount, TOLERANCE, values)
         """The discounted value of being in each state, shape (S,): 1 in a target, 0 where no action leads to one."""
         self.policy: Ints = action_values.argmax(axis=1)
         """The action to take in each state, shape (S,); meaningless in a target and where the value is 0."""
 
     def plan(self, start: int) -> Plan:
-        """The way from a state; raises InvalidValue for no such state, MobeeError if no way is known."""
+        """Return the plan from a state; raises InvalidValue if there is no such state, MobeeError if no path is known."""
         path = [int(target_states(self.space, start)[0])]
         probabilities: list[float] = []
         while path[-1] not in self.targets:
@@ -132,11 +132,11 @@ class Planner:
         )
 
     def _next(self, state: int) -> tuple[int, float]:
-        """The likeliest outcome that is nearer to a target, and its probability."""
+        """Return the most probable outcome that is nearer to a target, and its probability."""
         outcomes, probabilities = self._outcomes(state)
         nearer = np.where(self.values[outcomes] > self.values[state], probabilities, 0.0)
         if self.values[state] <= 0.0 or not nearer.any():
-            raise MobeeError(f"no way is known from state {state} of {self.space.part} to {self.targets.tolist()}: try other states.")
+            raise MobeeError(f"no path is known from state {state} of {self.space.part} to {self.targets.tolist()}: try other states.")
         best = int(nearer.argmax())
         return int(outcomes[best]), float(probabilities[best])
 
@@ -145,8 +145,8 @@ class Planner:
         return self.beliefs.outcomes[state, action], self.beliefs.probabilities[state, action]
 
     def _mean_steps(self, start: int) -> float:
-        """Actions until a target on average, from the states to which the policy can come (a linear system)."""
-        from scipy.sparse import csr_array, identity  # 0.4 s, which only who plans has to wait for
+        """Return the mean number of actions to a target: a linear system over the states that the policy can reach."""
+        from scipy.sparse import csr_array, identity  # 0.4 s, imported only for plans
         from scipy.sparse.csgraph import breadth_first_order
         from scipy.sparse.linalg import spsolve
 

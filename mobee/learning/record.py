@@ -20,17 +20,17 @@ _OF_A_RECORD = {"robot", "digest", "kind"}
 
 
 def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
-    """The space that has these `Space.settings`, on the robot of that name.
+    """Make the space that has these `Space.settings`, on the robot of that name.
 
-    Raises InvalidValue if the record is none of a space or of another robot, MobeeError if the space that is made
-    now is not the one on record (the robot's limits, or this program, are others).
+    Raises InvalidValue if it is not the record of a space, or is of another robot; MobeeError if the space that is made differs from the
+    recorded one, because the robot's limits or this program have changed.
     """
     kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space}
     if not isinstance(settings, Mapping):
-        raise InvalidValue(f"{settings!r} is no record of a space: give Space.settings.")
+        raise InvalidValue(f"{settings!r} is not the record of a space: give Space.settings.")
     kind = settings.get("kind", "lattice")
     if kind not in kinds or not {"robot", "digest", "joints"} <= settings.keys():
-        raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is none of a space: give Space.settings.")
+        raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is not of a space: give Space.settings.")
     if settings["robot"] != robot.name:
         raise InvalidValue(f"the space on record is of robot {settings['robot']!r}, given {robot.name!r}: load that robot.")
     arguments = {name: value for name, value in settings.items() if name not in _OF_A_RECORD}
@@ -54,23 +54,23 @@ class Learned:
     model: TransitionModel
     transitions: int
     state: int
-    """Where it was last."""
+    """Its last state."""
 
 
 def load_learned(file: str | Path, part: str | None = None, robot: Robot | None = None) -> Learned:
-    """Rebuild what the agent of a part learned from its transitions on disk.
+    """Rebuild the space and model of an agent from its transitions on disk.
 
     Args:
         file: of a TransitionStore.
-        part: whose; needed where the file holds several.
-        robot: whose space it is; needed where it is none that comes with mobee.
+        part: of the agent; may be None if the file holds one agent.
+        robot: of the space; may be None if it is a shipped robot.
 
     Raises:
-        MobeeError, UnknownName: no such file or agent, nothing to learn from, or a robot that is not the one on record.
+        MobeeError, UnknownName: no such file or agent, no transitions, or a robot that is not the recorded one.
     """
     if not Path(file).is_file():
         raise MobeeError(
-            f"{file}: there is no such file; runs of `mobee launch` keep their transitions so. Experiments keep cells, without a model to "
+            f"{file}: there is no such file; runs of `mobee launch` write such files. Experiments write cells, without a model to "
             "plan with; `mobee export` reads both."
         )
     with TransitionStore(file, part or "", read_only=True) as store:
@@ -84,7 +84,7 @@ def load_learned(file: str | Path, part: str | None = None, robot: Robot | None 
             raise UnknownName("agent", name, agents)
         settings, made = store.settings(name), store.load(name)
     if "space" not in settings:
-        raise MobeeError(f"{file}: {name} has no space on record; it was not a curious agent that wrote this.")
+        raise MobeeError(f"{file}: {name} has no space on record: the file was not written by a curious agent.")
     space = space_from(settings["space"], robot if robot is not None else load_robot(settings["space"]["robot"]))
     known = {key: settings[key] for key in ("initial", "divergence", "forgetting") if key in settings}
     model = TransitionModel(space, **known)

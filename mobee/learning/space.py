@@ -16,8 +16,8 @@ from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION, nearest_finder
 from mobee.robot.robot import Part, Robot
 
-MAX_STATES = 100_000  # beyond this the space is no learning problem on a robot any more (thesis 7.4)
-NEIGHBOURS = 16  # of the thesis' arms
+MAX_STATES = 100_000  # a larger space takes too long to explore on a robot (thesis 7.4)
+NEIGHBOURS = 16  # of each state, as in the thesis' arms
 
 
 class Space:
@@ -27,11 +27,11 @@ class Space:
     action is the index of the state it aims at among the state's goals.
 
     Args:
-        robot: whose motors they are.
+        robot: the robot.
         joints: motor names, all of one part.
-        samples: (S, d) rad, one pose of the joints a state.
-        goals: (S, A) the state that each action aims at; -1, after the last action of a row, where a state has fewer.
-        rest: fraction of its range at which every other motor of the part is kept; or one for each motor of the part.
+        samples: (S, d) rad, a pose of the joints for each state.
+        goals: (S, A) the state that each action aims at; rows of states with fewer actions end in -1.
+        rest: fraction of its range at which each other motor of the part stays; or one for each motor of the part.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -50,7 +50,7 @@ class Space:
         self.robot, self.part, self.joints = robot, part.name, tuple(joints)
         self.rest: float | list[float] = rests.tolist()
         self.columns: Ints = indices - part.start
-        """Where the joints stand among the motors of the part, shape (d,)."""
+        """Indices of the joints among the motors of the part, shape (d,)."""
         self._columns: list[int] = self.columns.tolist()
         self.samples: Array = _checked_samples(samples, len(joints))
         """The centre of each state, shape (S, d), in [rad]."""
@@ -73,16 +73,16 @@ class Space:
 
     @property
     def state_actions(self) -> int:
-        """How many pairs of a state and an action there are."""
+        """Number of pairs of a state and an action."""
         return sum(self._counts)
 
     def actions(self, state: int) -> Ints:
-        """Goal states in ascending order: action a of the state aims at the a-th of them."""
+        """Return the goal states in ascending order: action a of the state aims at the a-th of them."""
         row: Ints = self.goals[self._checked_state(state), : self._counts[state]]
         return row
 
     def goal(self, state: int, action: int) -> int:
-        """The state at whose sample the action sets the attractor."""
+        """Return the goal state of an action: the action sets the attractor to its sample."""
         if not 0 <= action < self._counts[self._checked_state(state)]:
             raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {self._counts[state] - 1}.")
         return self.goals.item(state, action)
@@ -111,29 +111,29 @@ class Space:
         return self._state_of(given.tolist())
 
     def target(self, state: int) -> Array:
-        """The state's sample as a pose of the whole part, its other motors at rest: shape (n_part,), in [rad]."""
+        """Return the state's sample as a pose of the whole part, shape (n_part,), in [rad]; other motors stay at `rest`."""
         pose: Array = self._targets[self._checked_state(state)].copy()
         return pose
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the space was made from and a digest of what came out, as plain JSON values: `space_from` makes it again."""
+        """The constructor's arguments and a digest of the resulting space, as plain JSON values: `space_from` makes it again."""
         return self._made | {"kind": "space", "samples": self.samples.tolist(), "goals": self.goals.tolist()}
 
     @cached_property
     def _made(self) -> dict[str, Any]:
-        """The settings of every kind of space."""
+        """The settings that all kinds of spaces have."""
         content = np.round(self.samples, 6).tobytes() + self.goals.astype("<i8").tobytes()
         digest = hashlib.sha256(content).hexdigest()[:16]
         return {"robot": self.robot.name, "joints": list(self.joints), "rest": self.rest, "digest": digest}
 
     def _state_of(self, q: list[float]) -> int:
-        if not isfinite(sum(q)):  # lists: NumPy takes longer for so few numbers
+        if not isfinite(sum(q)):  # a list: NumPy is slower for so few numbers
             raise InvalidValue(f"q of {self.part} is not finite: {q}.")
         return self._cell(q)
 
     def _cell(self, q: list[float]) -> int:
-        """The state of a pose of the joints, one number each, in [rad]."""
+        """Return the state of a pose of the joints, one number each, in [rad]."""
         return self._nearest((np.array(q) - self._low) / self._spans)
 
     @cached_property
@@ -147,7 +147,7 @@ class Space:
 
 
 def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
-    """The part that the joints belong to and their indices among the robot's motors; refuses what makes no space."""
+    """Return the part of the joints and their indices among the robot's motors; raises InvalidValue, UnknownName."""
     if isinstance(joints, str) or len(joints) == 0:
         raise InvalidValue(f"joints={joints!r}: give a list of motor names of one part, e.g. {list(robot.motors[:2])}.")
     if len(set(joints)) < len(joints):
@@ -163,7 +163,7 @@ def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
 
 
 def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
-    """How many nearest samples; 16, or all others where there are fewer, if None.  `also`: what else the message calls valid."""
+    """Return the number of neighbours; None: 16, or all others if there are fewer.  `also`: end of the message about valid values."""
     if neighbours is None:
         return min(NEIGHBOURS, states - 1)
     if isinstance(neighbours, bool) or not isinstance(neighbours, int) or not 1 <= neighbours < states:

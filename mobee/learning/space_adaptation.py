@@ -1,4 +1,4 @@
-"""State spaces adapted to what was learned: without unreachable states, with shortcuts (thesis 9.4.5)."""
+"""State spaces adapted to observed transitions: without unreachable states, with shortcuts (thesis 9.4.5)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from mobee.learning.neighbours import edges_of, joined, table_of
 from mobee.learning.space import Space
 from mobee.store import Transition
 
-SEEN = 5  # so often a state must have been aimed at, and never been come to, to be held for unreachable
-SPAN = 4  # transitions, within which two states are on one way
+MIN_ATTEMPTS = 5  # actions towards a state that was never reached, after which it counts as unreachable
+SHORTCUT_SPAN = 4  # transitions on a path between the two states of a shortcut, at most
 
 
-def pruned(space: Space, transitions: Sequence[Transition], seen: int = SEEN) -> tuple[Space, Ints]:
-    """The space without states that were aimed at `seen` times and never come to, and the new number of every state, -1 if it is gone.
+def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTEMPTS) -> tuple[Space, Ints]:
+    """Return the space without the states that were aimed at `seen` times and never reached, and each state's new number, -1 if removed.
 
-    Raises InvalidValue if less than two states would be left.
+    Raises InvalidValue if fewer than two states would remain.
     """
     aimed, reached = np.zeros(len(space), dtype=int), np.zeros(len(space), dtype=bool)
     for made in transitions:
@@ -29,7 +29,7 @@ def pruned(space: Space, transitions: Sequence[Transition], seen: int = SEEN) ->
         reached[[made.s, made.s_next]] = True
     kept = reached | (aimed < seen)
     edges = edges_of(space.goals)
-    while True:  # who has lost all that it leads to, goes too
+    while True:  # a state without actions is removed, too
         left = [(s, g) for s, g in edges if kept[s] and kept[g]]
         out = np.zeros(len(space), dtype=bool)
         out[[s for s, _ in left]] = True
@@ -43,30 +43,30 @@ def pruned(space: Space, transitions: Sequence[Transition], seen: int = SEEN) ->
     return Space(space.robot, space.joints, space.samples[kept], table, space.rest), number
 
 
-def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, span: int = SPAN) -> Space:
-    """The space with actions between the pairs of states, not neighbours yet, that were most often passed one soon after the other.
+def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, span: int = SHORTCUT_SPAN) -> Space:
+    """Add actions between the pairs of states that most often followed each other on a path, and are no neighbours yet.
 
-    `count`: how many pairs, joined both ways; `span`: transitions from the one to the other, at most.
+    `count`: number of pairs, joined in both directions; `span`: transitions between the two, at most.
     """
     known = set(edges_of(space.goals))
-    way: list[int] = []
+    path: list[int] = []
     passed: Counter[tuple[int, int]] = Counter()
     for made in transitions:
-        if not way or way[-1] != made.s:
-            way = [made.s]
-        if made.s_next in way:
-            way = way[: way.index(made.s_next)]  # a loop leads nowhere
-        way = [*way[-span:], made.s_next]
-        passed.update((min(one, way[-1]), max(one, way[-1])) for one in way[:-2] if (one, way[-1]) not in known)
+        if not path or path[-1] != made.s:
+            path = [made.s]
+        if made.s_next in path:
+            path = path[: path.index(made.s_next)]  # without the loop
+        path = [*path[-span:], made.s_next]
+        passed.update((min(one, path[-1]), max(one, path[-1])) for one in path[:-2] if (one, path[-1]) not in known)
     best = sorted(passed, key=lambda pair: (-passed[pair], pair))[:count]
     edges = joined([*known, *best, *((goal, state) for state, goal in best)])
     return Space(space.robot, space.joints, space.samples, table_of(edges, len(space)), space.rest)
 
 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
-    """Transitions of one space as those of another over the same joints, where it has their states and action; numbered anew.
+    """Return the transitions of one space that exist in another space over the same joints, numbered again from 1.
 
-    States are found by their samples; where a transition ended, by where the part came to rest.
+    Start and goal states are matched by their samples; the outcome is the new space's state of the recorded pose.
     """
     same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}

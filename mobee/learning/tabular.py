@@ -1,4 +1,4 @@
-"""A tabular plant: every action draws its outcome from given probabilities. For fast tests and known truths."""
+"""A tabular plant: every action draws its outcome from given probabilities, for fast tests and known ground truth."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ NEGLIGIBLE = 1e-4  # a probability
 class TabularPlant:
     """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
 
-    It is an OutcomeModel too: the truth that an agent on it can learn.  What action number n of the plant draws
-    follows from the seed and n alone, so setting `state` and `actions` continues a run elsewhere.
+    It is an OutcomeModel too: the ground truth of the model that an agent learns on it.  The draw of action number n depends on the
+    seed and n alone, so setting `state` and `actions` continues a run elsewhere.
 
     Args:
         space: the states and actions.
         outcomes: states reached, shape (S, A, B).
-        probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state
-            that have the same goal cannot be told apart and must have the same outcomes.
+        probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state with the same goal
+            cannot be distinguished, and must have the same outcomes.
         seed: of the draws.
-        start: the state in which the part is at first.
+        start: the first state.
 
     Raises:
         InvalidValue: the tables do not fit the space, or are no probabilities.
@@ -50,9 +50,9 @@ class TabularPlant:
             {int(goal): a for a, goal in reversed(list(enumerate(space.actions(s))))} for s in range(len(space))
         ]
         self.state = start
-        """Where the part is."""
+        """The state of the part."""
         self.actions = 0
-        """How many actions have ended."""
+        """Number of actions that have ended."""
         self._under_way: Array | None = None
         self._block, self._uniform = -1, np.empty(0)
 
@@ -80,12 +80,12 @@ class TabularPlant:
         return q
 
     def measure(self, part: str) -> Array:
-        """The sample of the state the part is in, shape (n_part,), in [rad]."""
+        """Return the sample of the part's state, shape (n_part,), in [rad]."""
         self._checked_part(part)
         return self.space.target(self.state)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Draw where the action ends that aims at `target` (n_part,) rad from the state the part is in; each takes 1 s."""
+        """Draw the outcome of the action from the part's state towards `target` (n_part,) rad; each takes 1 s."""
         self._checked_part(part)
         goal = self.space.state_of(target)
         action = self._action[self.state].get(goal)
@@ -124,7 +124,7 @@ class TabularPlant:
 
 
 def ideal(space: Space) -> tuple[Ints, Array]:
-    """Outcomes and probabilities, shape (S, A, 1), of a world in which every action succeeds."""
+    """Return outcomes and probabilities, shape (S, A, 1), of a world in which every action succeeds."""
     exists = space.goals != NO_ACTION
     outcomes: Ints = np.where(exists, space.goals, 0)[:, :, None]
     return outcomes, exists[:, :, None].astype(np.float64)
@@ -137,17 +137,17 @@ def half_space(
     memory: float = 0.15,
     noise: tuple[float, float] = (0.01, 0.06),
 ) -> tuple[Ints, Array]:
-    """Outcomes and probabilities, shape (S, A, B), of a world in which a plane cuts off the extreme states, as cables do.
+    """Return outcomes and probabilities, shape (S, A, B), of a world in which a plane cuts off the extreme states, as cables do.
 
-    An action settles at the projection of its goal onto the free side, plus some memory of where it came from, plus
-    normal noise.  With the arm's four joints in the published order the plane cuts off the states with low pitch, high
+    An action settles at the projection of its goal onto the free side, shifted towards its start, plus normal
+    noise.  With the arm's four joints in the published order the plane cuts off the states with low pitch, high
     roll and high yaw: 24, 51 and 78 of rank 3.
 
     Args:
         space: a lattice.
-        normal: of the plane, pointing at what is forbidden, one component a joint, in fractions of the ranges.
+        normal: of the plane, towards the forbidden side, one component a joint, in fractions of the ranges.
         depth: where the plane lies: 0 at the extreme states' samples, 1 at the next ones'.
-        memory: share of the way from where the action ends to where it began.
+        memory: share of the distance from the goal to the start by which the outcome is shifted.
         noise: standard deviation a joint, in fractions of the range, of actions with a free goal and of the others.
     """
     if len(normal) != len(space.joints) or not any(normal):
@@ -172,7 +172,7 @@ def half_space(
 
 
 def _cells(space: Lattice, mean: Array, deviation: float) -> list[tuple[int, float]]:
-    """The states in which a normally distributed pose lies, with their probabilities: cells of a lattice are boxes."""
+    """Return the states of a normally distributed pose, with their probabilities: cells of a lattice are boxes."""
     each = []
     strides = lattice_strides([len(levels) for levels in space.levels])
     for stride, levels, x in zip(strides.tolist(), space.levels, mean.tolist(), strict=True):

@@ -137,7 +137,7 @@ DIVERGENCES: dict[str, Divergence] = {"kail": kl_divergence, "kl": kl_divergence
 class TransitionModel(Tabled):
     """Outcome counts of every state-action in bins of variable number, and the last information gain as reward (thesis 6.4.3).
 
-    An observation takes the same few microseconds however large the space, and memory grows with what was observed.
+    An observation takes a few microseconds for any size of the space; memory grows with the number of different outcomes.
 
     Args:
         space: the states and actions.
@@ -189,7 +189,7 @@ class TransitionModel(Tabled):
 
     @property
     def tries(self) -> Ints:
-        """How often each state-action was really observed, shape (S, A) (read only)."""
+        """Number of real observations of each state-action, shape (S, A) (read only)."""
         return read_only(self._tries)
 
     @property
@@ -209,24 +209,24 @@ class TransitionModel(Tabled):
 
     @property
     def totals(self) -> Array:
-        """N of the reward's closed form: the sum of the counts it is taken over, shape (S, A), 0 where there is no action (read only)."""
+        """N of the reward's closed form: the sum of its counts, shape (S, A), 0 where there is no action (read only)."""
         return read_only(self._totals)
 
     @property
     def imagined(self) -> Array:
-        """How much of each bin's count is imagined, shape (B,): the first two are stay and goal (read only)."""
+        """Imagined part of each bin's count, shape (B,): the first two bins are staying and the goal (read only)."""
         return read_only(self._imagined)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
-        """States observed and their counts T(s, a), imagined ones included, in order of first observation."""
+        """Return the states observed and their counts T(s, a), imagined ones included, in order of first observation."""
         self.space.goal(state, action)
         used = self._bins[state, action]
         return self._outcomes[state, action, :used].copy(), self._counts[state, action, :used].copy()
 
     def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
-        """What to plan with: the real counts alone over a weak prior, kept up to date with this model.
+        """Return beliefs for plans from the real counts and a weak prior; they follow later observations of this model.
 
-        `goal`, `stay`: counts imagined instead of Algorithm 8's, the first above 0.  The same numbers give the same object.
+        `goal`, `stay`: prior counts instead of Algorithm 8's imagined ones, the first above 0.  The same numbers return the same object.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from mobee._core.learning import TransitionTable
 
 METHODS = ("jacobi", "modified")
-BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to take an action out of the plan."
+BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to exclude an action."
 
 
 class OutcomeModel(Protocol):
-    """Where actions lead: what a plan needs of a transition model."""
+    """The outcomes of actions and their probabilities: all that a plan needs of a transition model."""
 
     @property
     def outcomes(self) -> Ints:
@@ -34,22 +34,22 @@ class OutcomeModel(Protocol):
 
 
 class Tabled:
-    """An `OutcomeModel` that knows when its tables move, so that plans need not look at them again.
+    """An `OutcomeModel` that caches its tables as the core reads them, and makes them again when its arrays are replaced.
 
-    What the core knows of them stays with the object: copies make their own.
+    The cache belongs to one object: a copy makes its own.
     """
 
     _table: TransitionTable | None = None
 
     @property
     def table(self) -> TransitionTable:
-        """Outcomes and probabilities, where they are now."""
+        """Outcomes and probabilities as the core reads them."""
         if self._table is None:
             self._table = self._tabled()
         return self._table
 
     def _tabled(self) -> TransitionTable:
-        """Each kind of table makes its own."""
+        """Make the table; each subclass does so from its own arrays."""
         raise NotImplementedError
 
 
@@ -62,21 +62,21 @@ def value_iteration(
     relative: bool = False,
     method: Literal["jacobi", "modified"] = "jacobi",
 ) -> tuple[Array, Array]:
-    """Values V (S,) and Q (S, A) of the greedy policy (thesis Algorithm 7).
+    """Compute the values V (S,) and Q (S, A) of the greedy policy (thesis Algorithm 7).
 
-    The sweeps stop when no value changed by the tolerance or more.  The thesis prints the change without its absolute
-    value, which stops at once when values have to fall (negative rewards, a warm start after a reward decayed).
+    The sweeps stop when no value changes by the tolerance or more.  The thesis prints the change without its absolute
+    value, which would stop at once when values must fall (negative rewards, or a warm start after a reward decreased).
 
     Args:
         model: the outcomes of the actions; a state without actions keeps its starting value.
-        reward: (S, A); -inf takes an action out of the plan, entries without an action are ignored.
+        reward: (S, A); -inf excludes an action; entries without an action are ignored.
         discount: in [0, 1).
         tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the limit.
         start: (S,) values to start from, zero if None.
-        relative: the tolerance is in units of the largest |reward| of an action (of 1, if all are 0), else in the reward's own.
-        method: "jacobi": Algorithm 7, every sweep looks at all actions, and the values of none may change; "modified": modified
-            policy iteration, faster: each such sweep is followed by sweeps over the best action of each state alone, and the
-            values of the states may not change.
+        relative: the tolerance is in units of the largest |reward| of an action (of 1, if all are 0), else in units of the reward.
+        method: "jacobi": Algorithm 7: every sweep updates all actions, until no action value changes; "modified": modified policy
+            iteration, faster: each such sweep is followed by sweeps over the best action of each state alone, until no state value
+            changes.
 
     Returns:
         V and Q, with Q = -inf where there is no action.
@@ -113,7 +113,7 @@ def value_iteration(
 
 
 def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, Ints, Array]:
-    """Probabilities (S, A, B), outcomes (S, A, B) and reward (S, A) as the solvers take them, copied only where they are not so yet.
+    """Return probabilities (S, A, B), outcomes (S, A, B) and reward (S, A) in the types of the solvers, copied only if necessary.
 
     Raises InvalidValue if the shapes do not fit or the discount is out of range.
     """
@@ -135,20 +135,20 @@ def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Ar
 
 @cache
 def _core() -> tuple[ModuleType, Callable[[NDArray[Any]], int]]:
-    """Loaded when it is first needed, with where arrays are."""
+    """Import the native functions when they are first needed, with the function that returns the address of an array."""
     from mobee._core import address, learning
 
     return learning, address
 
 
-_EQUAL = 1e-13  # of the largest value: a better action is better by more
+_MARGIN = 1e-13  # of the largest value, by which a better action must be better
 
 
 def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) -> tuple[Array, Array]:
-    """Values V (S,) and Q (S, A) of the greedy policy, each policy evaluated by a sparse linear solve (Howard 1960).
+    """Compute the values V (S,) and Q (S, A) of the optimal policy; each policy is evaluated by a sparse linear solve (Howard 1960).
 
-    Exact but for rounding.  Arguments and what comes back are as of `value_iteration`; a state without actions is worth 0.
-    Raises InvalidValue with what is valid.
+    Exact but for rounding.  Arguments and results as of `value_iteration`; a state without actions has value 0.
+    Raises InvalidValue.
     """
     probabilities, outcomes, reward = tables(model, reward, discount)
     exists = probabilities.any(axis=-1) & (reward != -np.inf)
@@ -160,7 +160,7 @@ def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) 
     while True:
         values = _evaluate(probabilities, outcomes, rewards, discount, acting, policy)
         action_values = rewards + discount * (probabilities * values[outcomes]).sum(axis=-1)
-        margin = _EQUAL * np.abs(values).max(initial=0.0)
+        margin = _MARGIN * np.abs(values).max(initial=0.0)
         best, current = action_values[acting].max(axis=1, initial=-np.inf), action_values[acting, policy[acting]]
         better = acting[best > current + margin]
         if not len(better):
@@ -169,7 +169,7 @@ def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) 
 
 
 def _evaluate(probabilities: Array, outcomes: Ints, rewards: Array, discount: float, acting: Ints, policy: Ints) -> Array:
-    """The values of following a policy indefinitely: V = R + discount P V in the states that act, 0 elsewhere."""
+    """Compute the values of a policy: V = R + discount P V in the states with actions, 0 elsewhere."""
     from scipy.sparse import csc_array, eye_array
     from scipy.sparse.linalg import spsolve
 

@@ -18,16 +18,16 @@ from mobee.robot.robot import Robot
 class Voronoi(Space):
     """States are the Voronoi cells of samples drawn at random, or given; actions go to the nearest samples.
 
-    Near means in fractions of the joint ranges.  Thousands of states take seconds and memory in proportion.
+    Distances are in fractions of the joint ranges.  Thousands of states take seconds, and memory in proportion.
 
     Args:
-        robot: whose motor limits the samples are drawn within.
+        robot: the robot; samples are drawn within its motor limits.
         joints: motor names, all of one part.
-        samples: how many to draw uniformly in the joint ranges, or the samples themselves, shape (S, d), in [rad].
-        seed: of the draw; of no effect where the samples are given.
-        neighbours: how many nearest samples each state has actions to.  When left out: 16, or all others where there are fewer.
+        samples: number of samples to draw uniformly in the joint ranges, or the samples themselves, shape (S, d), in [rad].
+        seed: of the draw; ignored if the samples are given.
+        neighbours: number of nearest samples that each state has actions to.  None: 16, or all others if there are fewer.
         tie_seed: seed of the draw among equally near samples at the last rank (given samples may have ties).
-        rest: fraction of its range at which every other motor of the part is kept.
+        rest: fraction of its range at which each other motor of the part stays.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -54,7 +54,7 @@ class Voronoi(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the space was made from and a digest of what came out, for the record of a run (plain JSON values)."""
+        """The constructor's arguments and a digest of the resulting space, for the record of a run (plain JSON values)."""
         samples = len(self) if self.seed is not None else self.samples.tolist()
         made = {"samples": samples, "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
         return self._made | made | {"kind": "voronoi"}

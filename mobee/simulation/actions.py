@@ -1,4 +1,4 @@
-"""Actions in progress on an offline plant: which motors are active, what is touched, how each action ended."""
+"""Actions and reaches in progress on an offline plant, and how they ended."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SETTLED = VERDICTS.index("settled")
 
 
 class Actions:
-    """`parts`: a row for each part, see `mobee._core.plant.PART`, which a plant's ticks read and change."""
+    """The state of each part's action; `parts`: a row for each part, see `mobee._core.plant.PART`, which the plant's ticks change."""
 
     __slots__ = ("_alive", "_begun", "_limits", "_next_look", "_parts", "_row", "_under_way", "_verdict", "parts")
 
@@ -41,11 +41,11 @@ class Actions:
 
     @property
     def under_way(self) -> tuple[str, ...]:
-        """The parts that act, in their order."""
+        """The parts that are acting, in their order."""
         return tuple(compress(self._parts, self._under_way.tolist()))
 
     def require_possible(self, part: str, target: Array) -> None:
-        """Raise InvalidValue if no motor of a part lives, or if a target with a number for each of its motors is outside their limits."""
+        """Raise InvalidValue if no motor of a part is active, or if a target with a number for each motor is outside their limits."""
         if not self._alive[part]:
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
         values = target if type(target) is np.ndarray and target.dtype is _FLOAT else real_array(f"target for {part}", target)
@@ -56,17 +56,17 @@ class Actions:
             if not low <= at <= high:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
-    def begin(self, part: str, asked: float, first_look: float) -> None:
-        """Start a part's settle test, asked for at a time [s]; it is looked at `first_look` s later first."""
+    def begin(self, part: str, start: float, first_look: float) -> None:
+        """Start a part's settle test at a time [s]; the first check is `first_look` s later."""
         row = self._row[part]
-        self._begun[row], self._next_look[row], self._under_way[row] = asked, asked + first_look, 1
+        self._begun[row], self._next_look[row], self._under_way[row] = start, start + first_look, 1
 
     def end_all(self) -> None:
-        """Forget what is under way."""
+        """End all actions without an outcome."""
         self._under_way[:] = 0
 
     def outcome(self, part: str, q: Array, sampled: float, touched: tuple[str, ...]) -> Outcome:
-        """How a part's last action ended, by the encoders q (n,) rad read at time `sampled` [s], in contact with these objects."""
+        """Return the outcome of a part's last action: encoders q (n,) rad, read at time `sampled` [s], and the objects in contact."""
         row = self._row[part]
         settled = bool(self._verdict[row] == _SETTLED)
         return Outcome(q[self._parts[part].slice].copy(), settled, sampled - float(self._begun[row]), touched)
@@ -80,7 +80,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False)
 class Reach:
-    """One reach.  `end` and `marker`: how the part was when the force ended, and where its marker, (3,) m; None as long as it acts."""
+    """One reach.  `end` and `marker`: outcome and position of the marker, (3,) m, at the end of the force; None while the force acts."""
 
     name: str
     stay: bool
@@ -90,33 +90,33 @@ class Reach:
 
 
 class ReachesUnderWay:
-    """Which parts reach, for what is presented."""
+    """The reaches of all parts for the presented target."""
 
     def __init__(self, model: Model, controller: Controller) -> None:
         self._model, self._controller = model, controller
         self._target: ReachTarget | None = None
         self._under_way: dict[str, Reach] = {}
         self._ended: dict[str, ReachOutcome] = {}
-        self._told: dict[str, Outcome] = {}  # how parts came to rest, until somebody asks
+        self._settled: dict[str, Outcome] = {}  # outcomes of ended reaches, until they are read
         self.exempt: str | None = None
         """A marker whose hand ignores the targets although it is not drawn to one."""
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The markers whose hands ignore the targets now."""
+        """The markers whose hands the targets do not repel now."""
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
 
     @property
     def running(self) -> tuple[str, ...]:
-        """The parts that reach or are drawn back."""
+        """The parts that are reaching or being drawn back."""
         return tuple(self._under_way)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world, or move it there; None takes it away."""
+        """Put the target into the world, or move it there; None removes it."""
         pulled = [part for part, reach in self._under_way.items() if reach.end is None]
         if target is None and pulled:
-            raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not taken away")
+            raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not removed")
         world, self._target = self._model.world, target
         there = world.objects.get(TARGET)
         if target and there and (there.kind, there.size, there.role) == ("sphere", (target.radius,), "target"):
@@ -131,7 +131,7 @@ class ReachesUnderWay:
                 self._controller.reach_toward(part, self._under_way[part].name, target)
 
     def begin(self, part: str, marker: str, stay: bool) -> None:
-        """Begin to draw the marker."""
+        """Start the force on the marker; raises InvalidValue if no target is presented."""
         if self._target is None:
             raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
         target = self._target
@@ -140,7 +140,7 @@ class ReachesUnderWay:
         self._under_way[part] = Reach(marker, stay)
 
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
-        """Note that a part has settled or timed out in a pose; whether it is to be drawn back now."""
+        """Record that a part has settled or timed out in a pose; returns whether its attractor must draw it back now."""
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:
             reach.end, reach.marker = end, pose.position(reach.name)
@@ -150,23 +150,23 @@ class ReachesUnderWay:
                 return True
             self._controller.set_attractor(part, end.q)
         self._ended[part] = _outcome(reach, end)
-        self._told[part] = end
+        self._settled[part] = end
         del self._under_way[part]
         return False
 
     def outcome(self, part: str) -> ReachOutcome:
-        """How the part's last reach ended."""
+        """Return the outcome of the part's last reach."""
         if part not in self._ended:
             raise InvalidValue(f"{part} has not ended a reach on this plant")
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """How a part came to rest after a reach that nobody has asked about yet."""
-        return self._told.pop(part, None)
+        """Return the outcome of a part's last reach once; None if it was read already."""
+        return self._settled.pop(part, None)
 
     def drop(self, part: str) -> None:
-        """Forget a part's reach, if there is one, and end its force."""
-        self._told.pop(part, None)
+        """End a part's reach and its force, if there is one."""
+        self._settled.pop(part, None)
         if part in self._under_way:
             del self._under_way[part]
             self._controller.end_reach(part)
@@ -175,6 +175,6 @@ class ReachesUnderWay:
 def _outcome(reach: Reach, after: Outcome) -> ReachOutcome:
     end = reach.end
     if end is None or reach.marker is None:
-        raise InvalidValue("a reach that is not over has no outcome")
+        raise InvalidValue("a reach that has not ended has no outcome")
     duration = end.duration + (0.0 if reach.stay else after.duration)
     return ReachOutcome(reach.marker, end.q, reach.missing, end.settled, duration, end.touched, after)

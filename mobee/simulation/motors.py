@@ -25,11 +25,11 @@ PerMotor = float | Sequence[float]  # one number for all, or one for each motor 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorParameters:
-    """The defaults are those that bring out the published findings.
+    """Parameters of the motors; with the defaults the published findings appear.
 
     `lag`, `delay`, `backlash` and `friction`: one number, or one for each motor in the order of `robot.motors`.  `friction` is
-    Coulomb's, as the velocity that it costs: a motor sticks while it is told less, and turns slower by it when it is told more.
-    One number for all is that of motors that turn, and follows the range of those that slide (`mobee.robot.motor_units`); numbers for
+    Coulomb friction, given as a velocity: a motor sticks at smaller commanded velocities, and turns slower by it at larger ones.
+    One number for all is for rotary motors, and is scaled by the range of sliding ones (`mobee.robot.motor_units`); numbers for
     each motor are in its own unit, rad or m.
     """
 
@@ -51,36 +51,36 @@ class MotorParameters:
 
     @classmethod
     def ideal(cls) -> MotorParameters:
-        """Motors that do at once and exactly what they are told, read without noise."""
+        """Return motors that follow commands at once and exactly, read without noise."""
         return cls(lag=0.0, delay=0.0, backlash=0.0, encoder_noise=0.0)
 
     @classmethod
     def identified(cls, robot_name: str) -> MotorParameters:
-        """Numbers fitted to the responses of the simulated robot of that name (docs/plant.md); raises UnknownName with the nearest."""
+        """Return parameters fitted to the responses of the simulated robot of that name (docs/plant.md); raises UnknownName."""
         return cls(**load_identified(robot_name))
 
     def substeps(self, dt: float) -> int:
-        """Into how many substeps a tick of dt [s] is cut."""
+        """Return the number of substeps in a tick of dt [s]."""
         return max(1, int(np.ceil(dt / self.substep - 1e-9)))
 
     def of_motors(self, name: str, count: int) -> Array:
-        """One of the four for each of that many motors, (n,); raises InvalidValue if it is given for another number of them."""
+        """Return a parameter for each of `count` motors, (n,); raises InvalidValue if it is given for another number of motors."""
         value: Array = np.asarray(getattr(self, name), dtype=np.float64)
         if value.ndim == 1 and len(value) != count:
             raise InvalidValue(f"motor {name} of {len(value)} motors: the robot has {count}; give one number, or one for each motor.")
         return np.array(np.broadcast_to(value, (count,)))
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """One of the four for each motor of a robot, in the unit of the motor, (n,); raises InvalidValue as `of_motors` does."""
+        """Return a parameter for each motor of a robot, in the unit of the motor, (n,); raises InvalidValue as `of_motors` does."""
         values = self.of_motors(name, len(robot.motors))
         common = name in ("backlash", "friction") and np.ndim(getattr(self, name)) == 0
         return values * fine_units(robot) if common else values
 
 
 class Braking:
-    """What is asked of motors, tick by tick; all arrays (n,).
+    """Limits commands of motors to velocities from which they can brake, tick by tick; all arrays (n,).
 
-    `velocity` rad/s and `position` rad are what is asked for now; both are changed in place.
+    `velocity` rad/s and `position` rad are the current commands; both are changed in place.
     """
 
     def __init__(self, lower: Array, upper: Array, fastest: Array, change: Array, dt: float) -> None:
@@ -93,33 +93,33 @@ class Braking:
         self._core = core.calls()
 
     def to_velocity(self, wanted: Array, q: Array) -> None:
-        """Approach the wanted velocities from q; before a position limit no more than can still be braked."""
+        """Approach the wanted velocities from q, no faster than the motors can brake before their position limits."""
         self._core.to_velocity(self._here, numbers(wanted, self._count), numbers(q, self._count))
 
     def to_position(self, wanted: Array) -> None:
-        """Advance the positions on the way to the wanted ones, to arrive there at rest."""
+        """Advance the positions towards the wanted ones, to arrive there at zero velocity."""
         self._core.to_position(self._here, numbers(wanted, self._count), self._at)
 
     def runs_out(self, q: Array, moving: Array) -> bool:
-        """Whether some motor that moves so, rad/s, is a tick of braking too fast to stop before its position limit."""
+        """Whether a motor with these velocities, rad/s, can no longer stop before its position limit, by one tick of braking."""
         return bool(self._core.runs_out(self._here, numbers(q, self._count), numbers(moving, self._count)))
 
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 
 NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given
-SERVO_GAIN = 8.0  # 1/s, position mode and a hold that has come to rest; as in core/motors.cpp
+SERVO_GAIN = 8.0  # 1/s, in position mode and in a hold at rest; as in core/motors.cpp
 _HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 
 
 class Motors:
     """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
 
-    Either `move`, or each substep `drive` and `adopt`: the joint side is then what a physics engine says it has become.
+    Either `move`, or in each substep `drive` and `adopt`: a physics engine then computes the joint side.
     """
 
     def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
-        """Start at rest at q (n,) rad, every motor in hold; motors that are not `alive` (n,) never move and are read without noise."""
+        """Start at rest at q (n,) rad, every motor in hold; motors that are not `alive` (n,) never move, and are read without noise."""
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
@@ -129,14 +129,14 @@ class Motors:
         self.parameters = parameters
         self.seed = int(seed) % 2**64
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
-        """Indices of the motors that live, ascending."""
+        """Indices of the active motors, ascending."""
         self.state: Table = np.zeros(n, dtype=core.STATE)
-        """A row for each motor, see `mobee._core.plant.STATE`: always the same array, which a plant advances."""
+        """A row for each motor, see `mobee._core.plant.STATE`: always the same array, changed by the ticks of a plant."""
         for name in ("q", "motor_q", "dragged", "rest"):
             self.state[name] = q
         self.state["mode"], self.state["resting"] = _HOLD, 1
         self.numbers = _numbers(robot, parameters)
-        """What does not change while the substep is the same, see `mobee._core.plant.NUMBERS`."""
+        """Constants of each motor for the current substep, see `mobee._core.plant.NUMBERS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
         self._drawn = np.empty((len(self.living), 4))
@@ -187,7 +187,7 @@ class Motors:
 
     @property
     def load(self) -> Array:
-        """What pulls from outside against the motors in torque mode, gravity for one [N m]: for them a torque to overcome."""
+        """Torques from outside on the motors in torque mode, such as gravity [N m], which the motors must overcome."""
         return self.state["load"].copy()
 
     @load.setter
@@ -195,10 +195,10 @@ class Motors:
         self.state["load"] = torque
 
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
-        """Set what is in force for the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
+        """Set mode and reference of the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
 
-        A hold decelerates at once, without the delay of the line, and then keeps the position reached.  Motors that enter torque mode
-        carry their weight until the first torque arrives.
+        A hold decelerates at once, without the delay of other commands, and then keeps the position reached.  Motors that enter torque
+        mode compensate gravity until the first torque arrives.
         """
         if reference is not None:
             self.state["reference"][where] = reference
@@ -210,9 +210,9 @@ class Motors:
                 self._core.enter(self.address, motor, code)
 
     def drive(self, dt: float) -> Array:
-        """Advance the motor side by one substep of dt [s]; the joint-side velocity [rad/s] it asks for, (n,).
+        """Advance the motor side by one substep of dt [s]; returns the joint-side velocity [rad/s] that it commands, (n,).
 
-        That is zero while the play is not taken up.
+        It is zero while the motor moves within the backlash.
         """
         self.begin_substeps(dt)
         self._core.drive(self.address, dt)
@@ -220,34 +220,34 @@ class Motors:
         return velocity
 
     def move(self, substeps: int, dt: float) -> None:
-        """Advance by so many substeps of dt [s] under the same load; nothing blocks the joint sides but the hard stops."""
+        """Advance by so many substeps of dt [s] under the same load; only the hard stops block the joint sides."""
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)
 
     def adopt(self, q: Array) -> None:
-        """Take the joint side (n,) rad at the end of the substep, as a physics engine says.
+        """Set the joint side (n,) rad at the end of the substep, computed by a physics engine.
 
-        The motor side follows into the play: nothing winds up while a joint is blocked.  In torque mode it goes with the joint.
+        The motor side stays within the backlash, so it does not run ahead of a blocked joint.  In torque mode it follows the joint.
         """
         self._core.adopt(self.address, numbers(q, len(self.state)), self._dt)
 
     def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
-        """The joint positions [rad] at tick k with white noise whose strength does not depend on the tick's length dt [s].
+        """Return the joint positions [rad] at tick k with white noise whose density does not depend on the tick's length dt [s].
 
-        The noise is a pure function of seed, tick and motor: asked twice, it is the same.
+        The noise is a function of seed, tick and motor alone.
         """
         noisy = self.q
         self._core.read(self.address, k, self.noise(dt).tobytes(), address(noisy))
         return noisy[where]
 
     def noise(self, dt: float) -> Array:
-        """The standard deviations of the encoders at ticks of dt [s], (n,) [rad], or [m] of motors that slide."""
+        """Return the standard deviations of the encoders at ticks of dt [s], (n,) [rad], or [m] of sliding motors."""
         if self._noise[0] != dt:
             self._noise = dt, float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt)) * fine_units(self._robot)
         return self._noise[1]
 
     def begin_substeps(self, dt: float) -> None:
-        """Let substeps last dt [s] from now on; what is on its way to the motors stays in order, the newest last."""
+        """Set the length of substeps to dt [s]; delayed commands keep their order, the newest last."""
         if dt == self._dt:
             return
         self._dt = dt
@@ -267,7 +267,7 @@ class Motors:
 
 
 def _numbers(robot: Robot, parameters: MotorParameters) -> Table:
-    """A row for each motor."""
+    """Return the constants of each motor, one row a motor."""
     table: Table = np.zeros(len(robot.motor_table), dtype=core.NUMBERS)
     table["low"], table["high"] = robot.limits.T
     for name in ("max_velocity", "max_acceleration", "max_torque"):

@@ -21,8 +21,8 @@ from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.settings import Settings, accepts
 from mobee.simulation.actions import Actions, ReachesUnderWay
-from mobee.simulation.described import described
 from mobee.simulation.motors import MotorParameters, Motors
+from mobee.simulation.record import described
 from mobee.simulation.rigid import living, without_pairs
 from mobee.simulation.runner import Runner, Trace, Work, finished
 
@@ -132,17 +132,17 @@ class OfflinePlant:
 
     @property
     def controller(self) -> Controller:
-        """Takes attractors and forces between two ticks."""
+        """The controller; attractors and forces may be set between two ticks."""
         return self._controller
 
     @property
     def time(self) -> float:
-        """Plant time in s."""
+        """Plant time, s."""
         return self._ticks * self.dt
 
     @property
     def pose(self) -> Pose | None:
-        """The model at the last tick, in the world of now; None before the first."""
+        """The model's pose at the last tick, in the current world; None before the first tick."""
         if self._pose is None and self._ticks:
             self._pose = self.model.evaluate(self._q, reaching=self.reaching)
         return self._pose
@@ -154,7 +154,7 @@ class OfflinePlant:
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """The parts whose actions are under way, in their order."""
+        """The parts that are acting, in their order."""
         return self._actions.under_way
 
     @property
@@ -164,7 +164,7 @@ class OfflinePlant:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that decides how actions end, but for the seed, as plain JSON values; of the world as it is now."""
+        """The record of robot, current world and settings, without the seed, as plain JSON values."""
         active = [name for name, alive in zip(self.robot.motors, self._alive, strict=True) if alive]
         return described(self.robot, self.model.world, active=active, **self._options)
 
@@ -185,7 +185,7 @@ class OfflinePlant:
         return self._q[self.robot.part(part).slice].copy()
 
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
-        """Go towards `target` (n_part,) rad and run until this part has settled or timed out.
+        """Set the part's attractor to `target` (n_part,) rad, and run until this part has settled or timed out.
 
         `reaching`: a marker whose hand the targets do not push meanwhile, as in a reach.
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
@@ -199,7 +199,7 @@ class OfflinePlant:
             self._reaches.exempt = None
 
     def begin(self, part: str, target: Array) -> None:
-        """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; a reach of the part is over."""
+        """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; ends a reach of the part."""
         self.robot.part(part)
         self._actions.require_possible(part, target)
         self._controller.set_attractor(part, target)
@@ -207,11 +207,11 @@ class OfflinePlant:
         self._test(part)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world as `TARGET`, role "target", or move it there, also while a reach is on; None takes it away."""
+        """Put the target into the world as `TARGET`, role "target", or move it there, also during a reach; None removes it."""
         self._reaches.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Draw the marker to the presented target until the part has settled or timed out, then let it go: see `ReachPlant`.
+        """Draw the marker to the presented target until the part has settled or timed out, then end the force: see `ReachPlant`.
 
         Raises InvalidValue as `act` does too.
         """
@@ -221,12 +221,12 @@ class OfflinePlant:
         return self.reached(part)
 
     def begin_reach(self, part: str, marker: str, stay: bool = False) -> None:
-        """Begin to draw the marker to the presented target; `advance` goes on until the part has come to rest for the second time."""
+        """Start to draw the marker to the presented target; `advance` runs until the part has been drawn back and has settled again."""
         self._reaches.begin(part, marker, stay)
         self._test(part)
 
     def reached(self, part: str) -> ReachOutcome:
-        """How the part's last reach ended; raises InvalidValue before that."""
+        """Return the outcome of the part's last reach; raises InvalidValue if none has ended."""
         return self._reaches.outcome(part)
 
     def follow(self) -> None:
@@ -234,20 +234,20 @@ class OfflinePlant:
         self.model.world.follow(self.model.evaluate(self._q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
-        """Call that function with the plant's time [s] after each so many ticks: it may edit the world.  None: no more."""
+        """Call a function with the plant's time [s] every so many ticks; it may edit the world.  None: stop calling."""
         if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
             raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
         self._period, self._callback = ticks, callback
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until one or more of the acting parts are done; their names and outcomes, in the order of the parts.
+        """Run until one or more of the acting parts have ended; returns their names and outcomes, in the order of the parts.
 
-        Of a reach: how the part came to rest again (`reached` tells the rest).
+        The outcome of a reach is that of the part's return; `reached` returns all of it.
         """
         return finished(self.advancing())
 
     def advancing(self) -> Work[list[tuple[str, Outcome]]]:
-        """`advance` for whoever runs several plants at once."""
+        """Do `advance` in steps, for a caller that runs several plants at once."""
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")
@@ -259,18 +259,18 @@ class OfflinePlant:
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
 
     def tick(self) -> None:
-        """One control tick: encoders, model, controller; then the motors run under the command that is old enough.
+        """Run one control tick: encoders, model, controller; then the motors move by the command of the right age.
 
-        Actions under way are judged, and those that end here are returned by no `advance`.
+        Actions that end in this tick are not returned by a later `advance`.
         """
         finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
-        """That many ticks, whatever the actions under way are at, and what happened in each."""
+        """Run so many ticks, whether actions end or not; returns the trace."""
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:
-        """`run` for whoever runs several plants at once."""
+        """Do `run` in steps, for a caller that runs several plants at once."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
             rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))
@@ -278,7 +278,7 @@ class OfflinePlant:
         return Trace.of(np.concatenate(rows))
 
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
-        """Up to that many ticks, fewer if an action ends; the record (ticks, 3 n + 2), empty if none is asked for."""
+        """Run up to so many ticks, fewer if an action ends; returns the record (ticks, 3 n + 2), empty unless `traced` or hashed."""
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
         address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced, self.reaching)
@@ -289,7 +289,7 @@ class OfflinePlant:
         return rows
 
     def _conclude(self) -> Array:
-        """Take in what the ticks left; the record (ticks, 3 n + 2), empty if none was asked for."""
+        """Update the plant after ticks of the core; returns their record (ticks, 3 n + 2), empty if none was made."""
         rows, done, lost = self._runner.results()
         if done:
             self._pose = None
@@ -309,14 +309,14 @@ class OfflinePlant:
         return rows
 
     def _let_go(self) -> None:
-        """Let the parts whose reach has settled or timed out be drawn back by their attractors."""
+        """End the force on parts whose reach has settled or timed out, so that their attractors draw them back."""
         for part in self._reaches.running:
             if part not in self._actions.under_way:
                 if self._reaches.ended(part, self._outcome(part), self.model.evaluate(self._q)):
                     self._test(part)
 
     def _test(self, part: str) -> None:
-        """Start the part's settle test: in the tick just over, as live, so that the next one is the first to see it."""
+        """Start the part's settle test at the tick that has ended, as live, so that the next tick is the first one tested."""
         self._actions.begin(part, self.time - self.dt, self.controller.gains.settle.first_look)
 
     def _require_alone(self, part: str, doing: str) -> None:
@@ -328,7 +328,7 @@ class OfflinePlant:
         return self._actions.outcome(part, self._q, self.time - self.dt, self._touched(part))
 
     def _touched(self, part: str) -> tuple[str, ...]:
-        """What `touched_by` says of the model's pose, without a look at what the body does to itself."""
+        """Return the world objects in contact with the part, as `touched_by` of the pose, without computing self-contacts."""
         snapshot = self.model.world.snapshot
         if not snapshot.names:
             return ()

@@ -1,7 +1,4 @@
-"""Which motors of a plant live, and a robot reduced to what the forces on some of its motors depend on.
-
-Joints that none of them drives are gone, and their links one with what carries them.
-"""
+"""The active motors of a plant, and a robot reduced to the joints, links and shapes that the forces on them depend on."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from mobee.robot.robot import Joint, Motor, Robot, per_robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Which motors (n,) are meant by names and patterns of parts and motors; all by None."""
+    """Return a mask (n,) of the motors that match names or patterns of parts and motors; None: all."""
     if active is None:
         return np.ones(len(robot.motors), dtype=bool)
     alive = np.zeros(len(robot.motors), dtype=bool)
@@ -30,17 +27,18 @@ def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
             raise UnknownName("part or motor", pattern, (*robot.parts, *robot.motors))
         alive |= np.array(found)
     if not alive.any():
-        raise InvalidValue(f"active={active!r}: at least one part or motor must live; None means all.")
+        raise InvalidValue(f"active={active!r}: at least one part or motor must be active; None means all.")
     return alive
 
 
 def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True, apart: Sequence[int] = ()) -> Robot:
-    """The robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
+    """Return the robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
 
-    Contacts that no motor alive can change are left out; what the others do to motors alive is the same up to rounding, and to the
-    last bit if all are alive.  `keep_parts`: links of different parts stay apart, so that forces can be cut between them.  `apart`:
-    links that stay apart from what carries them.  `solids` False: fields alone, for solids exert no forces.  Markers, masses and what
-    is carried are left out.  It is the same object as long as somebody keeps it, so that plants share what the core knows of it.
+    Links whose joints no active motor drives are merged into their parents.  Contacts that no active motor can change are left out; the
+    forces on active motors stay equal up to rounding, and exactly equal if all are active.  `keep_parts`: links of different parts
+    are not merged, so that forces can be cut between them.  `apart`: links that are not merged either.  `solids` False: fields only,
+    since solids exert no forces.  Markers, masses and attached objects are left out.  The result is cached while it is in use, so that
+    plants share the core's data of it.
     """
     known, key = _known(robot), (alive.tobytes(), keep_parts, solids, tuple(apart))
     found = known.get(key)
@@ -51,13 +49,13 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
 
 @per_robot
 def without_pairs(robot: Robot) -> Robot:
-    """The robot without contacts of its shapes with each other."""
+    """Return the robot without contacts of its shapes with each other."""
     return replace(robot, solid_pairs=robot.solid_pairs[:0], field_pairs=robot.field_pairs[:0])
 
 
 @per_robot
 def _known(robot: Robot) -> WeakValueDictionary[Hashable, Robot]:
-    """What `stiffened` has made of a robot."""
+    """Return the cache of `stiffened` for a robot."""
     return WeakValueDictionary()
 
 
@@ -67,8 +65,8 @@ def _stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool, solids:
         kept |= _borders(robot)
     kept[[link - 1 for link in apart if link > 0]] = True
     brought = _brought(robot, kept)
-    link = np.zeros(len(robot.links), dtype=np.intp)  # what each link has become
-    joint = np.cumsum(kept) - 1  # and each joint
+    link = np.zeros(len(robot.links), dtype=np.intp)  # new number of each link
+    joint = np.cumsum(kept) - 1  # and of each joint
     for j, one in enumerate(robot.joints):
         link[j + 1] = joint[j] + 1 if kept[j] else link[one.parent]
     shape, solid_pairs, field_pairs = _shapes(robot, link, solids)
@@ -97,13 +95,13 @@ def _stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool, solids:
 
 
 def _brought(robot: Robot, kept: NDArray[np.bool_]) -> Array:
-    """Where the links (L, 4, 4) are when the joints that are kept are at zero and the others at home."""
+    """Return the link poses (L, 4, 4) with the kept joints at zero and the others at home."""
     still = tuple(_driving(motor, ~kept, np.arange(len(kept))) for motor in robot.motor_table)
     return link_transforms(replace(robot, motor_table=still), robot.home)
 
 
 def _driving(motor: Motor, kept: NDArray[np.bool_], joint: Ints) -> Motor:
-    """A motor that drives only the joints kept, by their new numbers."""
+    """Return the motor with only the kept joints, by their new numbers."""
     return replace(motor, joints=tuple((int(joint[j]), scale, offset) for j, scale, offset in motor.joints if kept[j]))
 
 
@@ -113,7 +111,7 @@ def _moved_joint(joint: Joint, brought: Array, link: Ints) -> Joint:
 
 
 def _shapes(robot: Robot, link: Ints, solids: bool) -> tuple[Ints, Ints, Ints]:
-    """Which shapes remain, and their pairs by the new numbers: those that can move apart."""
+    """Return the remaining shapes, and the pairs of them that can move relative to each other, by their new numbers."""
     of_shape = np.array([link[shape.link] for shape in robot.shapes], dtype=np.intp)
     solid, fields = (pairs[of_shape[pairs[:, 0]] != of_shape[pairs[:, 1]]] for pairs in (robot.solid_pairs, robot.field_pairs))
     needed = of_shape != 0
@@ -126,7 +124,7 @@ def _shapes(robot: Robot, link: Ints, solids: bool) -> tuple[Ints, Ints, Ints]:
 
 
 def _borders(robot: Robot) -> NDArray[np.bool_]:
-    """For each joint whether the link it moves belongs to another part than the link it is mounted on."""
+    """Return for each joint whether it connects links of different parts."""
     part: list[str | None] = [None]
     for joint, row in zip(robot.joints, robot.coupling[0], strict=True):
         driven = np.flatnonzero(row)

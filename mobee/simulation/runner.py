@@ -23,15 +23,15 @@ from mobee.model.track import Neighbours
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 
-SKIN = 0.06  # m
+SKIN = 0.06  # m, distance within which pairs of shapes are candidates for contacts
 
 T = TypeVar("T")
 Work = Generator[int, None, T]
-"""What a plant does, in pieces: the address of what the core is to run next, again and again; it goes on when that was run."""
+"""The work of a plant in steps: yields the address of the structure that the core runs next, and continues after it has run."""
 
 
 def finished(work: Work[T]) -> T:
-    """What a plant's work comes to, without others."""
+    """Do a plant's work alone, and return its result."""
     run = core.calls().run
     try:
         while True:
@@ -40,12 +40,12 @@ def finished(work: Work[T]) -> T:
         found: T = end.value
         return found
     finally:
-        work.close()  # a Ctrl-C comes between two pieces: the plant takes in what was run
+        work.close()  # after a Ctrl-C between two steps, the plant takes over the ticks that were run
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """A row a tick: what was measured and commanded in it, where the joints were at its end, and how deep contacts were."""
+    """One row a tick: encoders, positions of the joints, velocities, and depths of contacts."""
 
     encoders: Array  # (ticks, n) rad
     q: Array  # (ticks, n) rad, joint sides
@@ -55,7 +55,7 @@ class Trace:
 
     @classmethod
     def of(cls, record: Array) -> Trace:
-        """From the loop's record, (ticks, 3 n + 2)."""
+        """Make a trace of the record of the core, (ticks, 3 n + 2)."""
         n = (record.shape[1] - 2) // 3
         return cls(record[:, :n], record[:, n : 2 * n], record[:, 2 * n : 3 * n], record[:, 3 * n], record[:, 3 * n + 1])
 
@@ -64,7 +64,7 @@ class Trace:
 
 
 class Runner:
-    """The ticks of one plant: its memory, the commands on their way, the encoders and forces of the last tick."""
+    """Runs the ticks of one plant; holds its delayed commands, and the encoders and forces of the last tick."""
 
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
         """`parts`: the actions, see `mobee._core.plant.PART`."""
@@ -95,14 +95,14 @@ class Runner:
         self._address = ctypes.addressof(self._struct)
 
     def prepare(self, ticks: int, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
-        """Make ready up to that many ticks after those there have been; gives the address of what the core is to run.
+        """Prepare up to `most` ticks after `ticks` ticks; returns the address of the structure that the core runs.
 
-        `kept`: what happens is recorded; `solids`: contacts of solids are found too, for the sake of the record;
+        `kept`: the ticks are recorded; `solids`: contacts of solids are computed too, for the record;
         `reaching`: the markers whose hands ignore the targets.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         motors.begin_substeps(self._substep)
-        if controller.modality == "torque" or controller.pushed or controller.terms:  # forces beyond what the core knows, of this pose
+        if controller.modality == "torque" or controller.pushed or controller.terms:  # forces that Python computes for each pose
             most, self._clients_act = 1, True
             self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt), reaching)
         elif controller.forced or self._clients_act:
@@ -121,14 +121,14 @@ class Runner:
         return self._address
 
     def results(self) -> tuple[Array, int, bool]:
-        """The record (ticks, 3 n + 2), how many ticks were run, whether the motors' state is not finite any more."""
+        """Return the record (ticks, 3 n + 2), the number of ticks run, and whether the motors' state is no longer finite."""
         done, end = self._struct.done, self._struct.end
         if done:
             self._controller.note_forces(self._forces)
         return self._record[:done], done, end == core.STATE_LOST
 
     def _near(self, solids: bool, reaching: tuple[str, ...]) -> int:
-        """Where the core finds the contacts of the robot in the world of now; with all its links where a link is meant by its name."""
+        """Return the address of the contact search in the current world; of the whole robot if objects are attached to links."""
         model = self._controller.model
         snapshot = model.world.snapshot
         key = bool(snapshot.attached), model.hands(reaching), solids
@@ -138,7 +138,7 @@ class Runner:
         return near.enter(snapshot, hands)
 
     def _new_neighbours(self, whole: bool, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
-        """Those of the whole robot, or of one whose hands are apart from what carries them; and its hands."""
+        """Make the contact search of the whole robot, or of a reduced one with separate hand links; returns it and the hands."""
         robot = stiff = self._controller.robot
         if not whole:
             apart = [link for hand in reaching for link in (hand.link, hand.fields)]
@@ -148,7 +148,7 @@ class Runner:
         return Neighbours(engine_of(stiff), SKIN, self._cut), reaching
 
     def _pose_forces(self, q: Array, reaching: tuple[str, ...]) -> Array:
-        """What clients push with at q (n,), after the forces of the controller's own terms and what carries the robot's weight are set."""
+        """Set the forces of Python terms and gravity compensation at q (n,), and return the forces of clients."""
         controller, motors = self._controller, self._motors
         if controller.terms and np.isfinite(q).all():
             self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt, reaching=reaching).values())

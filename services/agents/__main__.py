@@ -12,7 +12,7 @@ from services.common.service import Service
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run an agent until it is told to end, or has made its transitions."""
+    """Run an agent until it is stopped, or has made its transitions or problem-tries."""
     config = load_config(Config, argv, "services.agents")
     with explained("services.agents"):
         robot = robot_of(config)

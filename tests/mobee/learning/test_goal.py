@@ -76,7 +76,7 @@ def test_a_goal_is_among_the_settings_on_record(tmp_path):
         ({"goal": np.full((81, 8), np.nan)}, "not finite"),
         ({"goal": [3], "goal_weight": np.inf}, "goal_weight=inf"),
         ({"goal_weight": 1.0}, "without a goal"),
-        ({"goal": [3], "explorer": "random"}, "'random' pursues no goal: take 'curious'"),
+        ({"goal": [3], "explorer": "random"}, "'random' ignores a goal: take 'curious'"),
     ],
 )
 def test_a_goal_that_cannot_be_pursued_is_refused(options, message):

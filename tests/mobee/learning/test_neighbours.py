@@ -16,7 +16,7 @@ def test_a_tree_finds_what_comparing_all_points_finds(on_a_lattice: bool, monkey
     asked = rng.random((200, 3))
     found = []
     for few in (len(points), 0):
-        monkeypatch.setattr(neighbours, "FEW", few)
+        monkeypatch.setattr(neighbours, "MAX_COMPARED", few)
         nearest = neighbours.nearest_finder(points)
         found.append((neighbours.nearest_goals(points, 8, tie_seed=1), [nearest(point) for point in asked]))
     assert np.array_equal(found[0][0], found[1][0])

@@ -55,8 +55,8 @@ def test_a_record_that_gives_another_space_now_is_refused():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({}, "none of a space"),
-        ([], "no record of a space"),
+        ({}, "not of a space"),
+        ([], "not the record of a space"),
         (torso().settings | {"kind": "circle"}, "kind 'circle'"),
         (torso().settings | {"robot": "katana"}, "of robot 'katana'"),
     ],

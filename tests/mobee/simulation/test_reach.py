@@ -250,5 +250,5 @@ def test_a_target_is_not_taken_away_from_who_reaches_for_it() -> None:
     plant = bent()
     plant.present(NEAR)
     plant.begin_reach("arm", "tip")
-    with pytest.raises(InvalidValue, match="can be moved but not taken away"):
+    with pytest.raises(InvalidValue, match="can be moved but not removed"):
         plant.present(None)

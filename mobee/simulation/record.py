@@ -1,4 +1,4 @@
-"""What an offline plant is, as plain values: kept with what was learned on it."""
+"""The record of an offline plant as plain JSON values, stored with what was learned on it."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ import numpy as np
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 
-_UNFELT = ("where", "untested")  # of a robot: where it was read from, and why
-_SHOWN = ("name", "color")  # of a world object: the name is its key
-_LATER = ("zone_ends_at_home",)  # of a motor: left out where False, so that robots keep the digest they had before there was such a field
-DIGITS = 9  # of lengths and angles: a file that is read on another machine is the same robot
+_WITHOUT_EFFECT = ("where", "untested")  # fields of a robot that say where it was read from, and why
+_APPEARANCE = ("name", "color")  # fields of a world object; the name is its key
+_ADDED_LATER = ("zone_ends_at_home",)  # fields of a motor that are left out if False, so that robots keep their earlier digests
+DIGITS = 9  # decimals of lengths and angles: the same file read on another machine gives the same digest
 
 
 def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
-    """The robot by name and digest, the world's objects of now, and `more`: options, and dataclasses of numbers."""
-    content = {entry.name: _plain(getattr(robot, entry.name)) for entry in fields(robot) if entry.name not in _UNFELT}
+    """Return the robot's name and digest, the world's objects as they are now, and `more`: options, and dataclasses of numbers."""
+    content = {entry.name: _plain(getattr(robot, entry.name)) for entry in fields(robot) if entry.name not in _WITHOUT_EFFECT}
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
     objects = {
-        name: {entry.name: _plain(getattr(thing, entry.name)) for entry in fields(thing) if entry.name not in _SHOWN}
-        for name, thing in world.objects.items()
+        name: {entry.name: _plain(getattr(item, entry.name)) for entry in fields(item) if entry.name not in _APPEARANCE}
+        for name, item in world.objects.items()
     }
     options = {key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value for key, value in more.items()}
     found: dict[str, Any] = json.loads(json.dumps({"robot": robot.name, "digest": digest, "world": objects, **options}))
@@ -32,12 +32,12 @@ def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Arrays, dataclasses, tuples and sets as lists, numbers rounded."""
+    """Return arrays, dataclasses, tuples and sets as lists, with rounded numbers."""
     if isinstance(value, np.ndarray):
         return (np.round(value, DIGITS) + 0.0).tolist()  # no -0.0
     if is_dataclass(value):
         held = {entry.name: getattr(value, entry.name) for entry in fields(value)}
-        return [_plain(one) for name, one in held.items() if name not in _LATER or one]
+        return [_plain(one) for name, one in held.items() if name not in _ADDED_LATER or one]
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
