@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mobee.check.finding import SEVERITIES, Finding
-from mobee.check.hulls import hulls
 from mobee.check.robot import check_robot
+from mobee.check.shapes import hulls
 from mobee.check.world import check_world
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.model.world import World

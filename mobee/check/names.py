@@ -1,34 +1,14 @@
-"""Checks names and duplicates: identical shapes, names that differ in case only, names that other programs cannot use."""
+"""Checks names: those that differ in case only, and those that other programs cannot use."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from itertools import combinations
 
-import numpy as np
-
-from mobee.check.fields import vertices
 from mobee.check.finding import Finding
 from mobee.check.subject import Subject
-from mobee.robot.robot import Shape
 
-SAME_WITHIN = 1e-6  # m
 KEY = re.compile(r"[a-z0-9_]+")
-
-
-def identical_shapes(subject: Subject) -> Iterator[Finding]:
-    """Find shapes of the same role, kind, size and position on the same link."""
-    for one, other in combinations(subject.robot.shapes, 2):
-        if _same(one, other):
-            yield Finding(
-                "warning",
-                "duplicate",
-                subject.where("shape", other.name),
-                f"{other.role} {other.name!r} is a duplicate of {one.name!r}: same kind, size and position",
-                "each contact is counted twice, and so is its force",
-                "remove one of the two",
-            )
 
 
 def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
@@ -79,19 +59,3 @@ def unusable_names(subject: Subject) -> Iterator[Finding]:
                 "lists of motors are separated by these, so that no constraint can name it",
                 "rename it, with _ instead",
             )
-
-
-def _same(one: Shape, other: Shape) -> bool:
-    if (one.link, one.role, one.kind) != (other.link, other.role, other.kind) or not np.allclose(
-        one.size, other.size, rtol=0, atol=SAME_WITHIN
-    ):
-        return False
-    if not np.allclose(one.position, other.position, rtol=0, atol=SAME_WITHIN):
-        return False
-    if one.kind == "convex":
-        return np.array_equal(vertices(one), vertices(other))
-    if one.kind == "sphere":
-        return True
-    if one.kind == "box":
-        return np.allclose(one.rotation, other.rotation, atol=SAME_WITHIN)
-    return bool(abs(one.rotation[:, 2] @ other.rotation[:, 2]) > 1 - SAME_WITHIN)  # an axis has no sign

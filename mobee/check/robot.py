@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from mobee.check.constraints import constraints
-from mobee.check.fields import fields
 from mobee.check.finding import SEVERITIES, Finding
 from mobee.check.masses import masses
 from mobee.check.motors import coupling, home_limits, home_zones, idle_motors, idle_parts, joint_limits, unreachable_markers
-from mobee.check.names import identical_shapes, names_differing_in_case, unusable_names
+from mobee.check.names import names_differing_in_case, unusable_names
+from mobee.check.shapes import fields, identical_shapes
 from mobee.check.subject import Subject
 from mobee.check.touching import always_touching, foreign_solids, home_contacts, world_contacts
 from mobee.check.units import radians, size

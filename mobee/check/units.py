@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.check.fields import vertices
 from mobee.check.finding import Finding, interval, length, some
+from mobee.check.shapes import vertices
 from mobee.check.subject import Subject
 from mobee.robot.robot import Motor, Shape
 

@@ -1,4 +1,4 @@
-"""A URDF's tree laid out at zero pose: links, joints and markers in the root frame."""
+"""A URDF's tree laid out at zero pose: links, joints, markers and masses in the root frame."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import Literal
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.robot.robot import Joint, Marker
-from mobee.robot.urdf.frames import IDENTITY, Frame, child, triple
+from mobee.robot.bodies import from_six, one_a_link
+from mobee.robot.robot import Body, Joint, Marker
+from mobee.robot.urdf.frames import IDENTITY, Frame, bounded, child, read_origin, triple
 from mobee.robot.urdf.motors import stated_limits
 from mobee.robot.urdf.tree import Tree, UrdfJoint
-from mobee.robot.xml.node import Node
+from mobee.robot.xml.node import SMALLEST, Node
 from mobee.robot.xml.volume import Z, turn_about
 
 
 @dataclass(slots=True, eq=False)
 class Skeleton:
-    """The tree laid out at zero pose; the links of fixed joints have become part of what carries them."""
+    """The tree laid out at zero pose; the links of fixed joints are merged into the links that carry them."""
 
     links: list[str]
     index: dict[str, int]  # URDF link -> link of the robot
@@ -90,3 +91,34 @@ def _normal(note: Node) -> Array:
     if length < 1e-9:
         note.fail("normal", "has no length", "Write a direction in the link's frame, such as 0 0 1")
     return normal / length
+
+
+SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of a symmetric matrix
+
+
+def read_bodies(tree: Tree, skeleton: Skeleton) -> tuple[Body, ...]:
+    """Return the masses of all links, those of fixed joints merged with the links that carry them; raises RobotFileError."""
+    return one_a_link(_bodies(tree, skeleton))
+
+
+def _bodies(tree: Tree, skeleton: Skeleton) -> Iterator[Body]:
+    for name, link in skeleton.index.items():
+        inertial = child(tree.links[name], "inertial")
+        mass = None if inertial is None else child(inertial, "mass")
+        if inertial is None or mass is None:
+            continue
+        value = bounded(mass, "value")
+        if value < 0:
+            mass.fail("value", f"{value:g} is negative", "Write the mass in kilograms, or leave <inertial> out")
+        if value >= SMALLEST:  # exporters write 0 for frames
+            place = skeleton.frames[name] @ read_origin(inertial)
+            yield Body(link, value, place.position, _inertia(inertial, place))
+
+
+def _inertia(inertial: Node, place: Frame) -> Array | None:
+    """Return the inertia (3, 3) about the centre of mass, along the root frame's axes; None where the file has none."""
+    node, note = child(inertial, "inertia"), child(inertial, "mobee")
+    if node is None or (note is not None and note.flag("assumed")):
+        return None
+    inertia = place.rotation @ from_six([bounded(node, name, 0.0) for name in SIX]) @ place.rotation.T
+    return inertia if inertia.any() else None

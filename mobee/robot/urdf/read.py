@@ -12,8 +12,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 from mobee.robot.urdf.hull import CORNERS, FEWEST, Corners
-from mobee.robot.urdf.inertial import read_bodies
-from mobee.robot.urdf.layout import Skeleton, lay_out, read_markers
+from mobee.robot.urdf.layout import Skeleton, lay_out, read_bodies, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
 from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
 from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown

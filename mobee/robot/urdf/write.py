@@ -11,10 +11,11 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Marker, Motor, Robot, Shape
+from mobee.robot.bodies import ball_of_water, to_six
+from mobee.robot.robot import Body, Marker, Motor, Robot, Shape
 from mobee.robot.urdf.frames import rpy_of
 from mobee.robot.urdf.hull import facets
-from mobee.robot.urdf.inertial import inertial_element
+from mobee.robot.urdf.layout import SIX
 from mobee.robot.urdf.write_srdf import write_srdf
 from mobee.robot.writing import drives_of, number, numbers
 from mobee.robot.xml.pairs import role_elements
@@ -213,3 +214,18 @@ def _write_pairs(robot: Robot, root: ET.Element) -> None:
     ]
     if rest or own:
         ET.SubElement(root, "mobee", {"ownFields": "true"} if own else {}).extend(rest)
+
+
+def inertial_element(body: Body, point: Array) -> ET.Element:
+    """Return the <inertial> of a link whose frame is at `point` (3,) m, without rotation.
+
+    URDF requires moments of inertia: a body without them gets those of a ball of water of its mass, marked as assumed.
+    """
+    element = ET.Element("inertial")
+    ET.SubElement(element, "origin", xyz=numbers(body.centre - point), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=number(body.mass))
+    inertia = ball_of_water(body.mass) if body.inertia is None else np.asarray(body.inertia)
+    ET.SubElement(element, "inertia", dict(zip(SIX, map(number, to_six(inertia)), strict=True)))
+    if body.inertia is None:
+        ET.SubElement(element, "mobee", assumed="true")
+    return element

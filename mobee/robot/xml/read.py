@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
@@ -17,15 +18,20 @@ from mobee.robot.join import Placed, join_placed
 from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
 from mobee.robot.pairs_2014 import Rule, published_pairs, published_untested
 from mobee.robot.robot import Joint, LinkPair, Part, Robot
+from mobee.robot.urdf.read import read_urdf
 from mobee.robot.xml.body import CONVEX_ATTRIBUTES, MASS_ATTRIBUTES, MOST_SHAPES, read_marker, read_mass, read_shape, read_skeleton
 from mobee.robot.xml.draft import Draft, Place, enter
-from mobee.robot.xml.include import INCLUDE_ATTRIBUTES, Trail, read_include
+from mobee.robot.xml.file import is_file
 from mobee.robot.xml.motors import finish_joints, order_motors, read_clauses, read_motor
-from mobee.robot.xml.node import Node, nearest, read_xml
+from mobee.robot.xml.node import Node, listed, nearest, read_xml, shown
 from mobee.robot.xml.pairs import IGNORE_ATTRIBUTES, without_ignored
 from mobee.robot.xml.versions import report, upgrade_robot
-from mobee.robot.xml.volume import PLACE, STEP, VOLUME_TAGS, direction, link_step
+from mobee.robot.xml.volume import AXIS, PLACE, STEP, VOLUME_TAGS, Z, align, direction, link_step, turn_about
 
+ROBOTS = Path(__file__).parents[1] / "robots"
+INCLUDE_ATTRIBUTES = frozenset({"name", "file", "angle", *PLACE, *AXIS})
+DEEPEST_INCLUDE = 8  # files that include each other
+MOST_FILES = 32  # in one robot: files that include several could grow without end
 MOST_JOINTS = 500  # pairs of links grow with the square
 MOST_ELEMENTS_2014 = 500  # and the descents of pairs_2014.py faster
 
@@ -283,6 +289,53 @@ def _read_constraints(node: Node, draft: Draft, place: Place) -> None:
 
 def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
     draft.ignores.append(node)
+
+
+@dataclass(slots=True)
+class Trail:
+    """The files that led to the one that is being read, and how many have been read in all."""
+
+    files: tuple[Path, ...] = ()
+    counted: list[Path] = field(default_factory=list)
+
+    def into(self, path: Path) -> Trail:
+        """The trail inside a file."""
+        self.counted.append(path)
+        return Trail((*self.files, path.resolve()), self.counted)
+
+
+def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot]) -> Placed:
+    """The robot of a <robot>, read by `read`, at (px, py, pz), z turned the shortest way to (hx, hy, hz), then by `angle` about it.
+
+    Raises RobotFileError when the file cannot be found, includes itself, or too many are read; errors in it carry its own lines.
+    """
+    prefix = node.optional("name")
+    if prefix and not re.fullmatch("[a-z0-9_]+", prefix):
+        node.fail("name", f"{shown(prefix)!r} cannot begin the name of a part", "Use a-z, 0-9 and _ only, or leave it out")
+    path = _find(node)
+    if path.resolve() in trail.files:
+        chain = " -> ".join(file.name for file in (*trail.files, path))
+        node.fail("file", f"the file includes itself ({chain})", "Remove one of the <robot> tags")
+    if len(trail.files) >= DEEPEST_INCLUDE or len(trail.counted) >= MOST_FILES:
+        node.fail("file", f"more than {DEEPEST_INCLUDE} files inside each other, or {MOST_FILES} in all", "Include fewer robots")
+    axis = direction(node, AXIS, (0.0, 0.0, 1.0))
+    rotation = turn_about(axis, np.deg2rad(node.number("angle", 0.0))) @ align(Z, axis)
+    if path.suffix.lower() == ".urdf":
+        trail.into(path)
+        robot = read_urdf(path)
+    else:
+        robot = read(path, trail)
+    return Placed(prefix, robot, node.vector(PLACE), rotation)
+
+
+def _find(node: Node) -> Path:
+    """A shipped robot by its name, or a file by its path relative to the one that names it."""
+    given = node.text("file")
+    shipped = [path.stem for path in ROBOTS.glob("*.xml")]
+    path = ROBOTS / f"{given}.xml" if given in shipped else node.file.parent / given
+    if not is_file(path):
+        node.fail("file", f"{shown(given)!r} is no file", f"Give a path relative to this file, or a shipped robot: {listed(shipped)}")
+    return path
 
 
 # What reads a tag, and the place for what stands inside; None where nothing does, or where it has been read already.

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from mobee.arrays import Array
 from mobee.check import check_file
-from mobee.check.hulls import excess
+from mobee.check.shapes import excess
 from mobee.robot.load import load_robot
 from mobee.robot.urdf.hull import convex_hull
 from tests.mobee.robot.urdf_files import arm_with, foreign, tetrahedron, write_stl

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mobee.check.names import identical_shapes
+from mobee.check.shapes import identical_shapes
 from mobee.check.subject import Subject
 from tests.mobee.check.arm import arm, named
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.check.fields import outside, surface
+from mobee.check.shapes import outside, surface
 from mobee.robot.robot import Shape
 
 TURN = np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]])
