@@ -1,15 +1,15 @@
-"""Clauses: a search for the command that violates the cable rows or the forearm clauses most.
+"""Constraint violations: a search for the command that violates the cable rows or the forearm clauses most.
 
 Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than
-2 degrees beyond a constraint (-s/|a|, along the normal).  How fast a motor meets its hard stop, if one does, is reported beside it.
+2 degrees beyond a constraint (-s/|a|, along the normal).  The fastest impact of a motor at a hard stop is reported too.
 Source: this project's goal; the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints
 that their forces may grow without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets
 and 2000 with forces of a client, a few minutes.
 
 A try is one arm's command: a start, three attractors, how long each is in force, and, in the part called "forced", a force in
-configuration space and one at the palm with each.  Both arms try at once, the torso is sent somewhere, a table stands in front,
-the motors are those of the published findings.  The first part of the tries is random; the rest varies and crosses the worst so
-far of every clause.  The forced tries are no part of the claim: there the client pushes with all that it may.
+configuration space and one at the palm with each.  Both arms try at once while the torso moves to a random posture, with a table in
+front; the motors are those of the published findings.  The first part of the tries is random; the others vary and cross the worst
+commands so far for every clause.  The forced tries are not part of the claim: there the client pushes with the largest force.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ ALLOWED = 2.0  # degrees along the normal, default gains, without forces of a cl
 KINDS = ("attractors", "forced")
 QUICK_TRIES = 300
 
-RANDOM = 0.3  # of the tries
+RANDOM_SHARE = 0.3  # of the tries
 GENERATION = 100  # tries with one random generator
-BEST = 8  # commands kept of each clause
+KEPT = 8  # worst commands kept for each clause
 CLAUSES = 7  # of an arm
 
-TERMS = re.compile(r"(?<!or)(?<!>) (?=or |[+-][\d.]+ [a-z])")  # where a line of a clause ends
+TERMS = re.compile(r"(?<!or)(?<!>) (?=or |[+-][\d.]+ [a-z])")  # line breaks in the text of a clause
 DASHES = {False: "-", True: ":"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Gains and numbers of tries."""
+    """Add gains and numbers of tries."""
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
-    parser.add_argument("--tries", type=positive_whole, default=10_000, metavar="N", help="a gain set (default: 10000)")
+    parser.add_argument("--tries", type=positive_whole, default=10_000, metavar="N", help="tries per gain set (default: 10000)")
     parser.add_argument("--forced-tries", type=positive_whole, default=2_000, metavar="N", help="with forces of a client (default: 2000)")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Each gain set without and with forces of a client."""
+    """Return each gain set without and with forces of a client."""
     found = []
     for gains in arguments.gains:
         for kind, given in zip(KINDS, (arguments.tries, arguments.forced_tries), strict=True):
@@ -70,46 +70,46 @@ class Search:
     seed: int
     tries: int = 0
     worst: float = -360.0
-    stop: float = 0.0  # deg/s, the fastest arrival at a hard stop
+    stop: float = 0.0  # deg/s, the fastest impact at a hard stop
     by_clause: list[float] = field(default_factory=lambda: [-360.0] * CLAUSES)
-    course: list[tuple[int, float]] = field(default_factory=list)  # tries, worst until then
-    inside: list[float] = field(default_factory=lambda: [-360.0])  # the worst of each generation, attractors inside the joint box
-    random: list[float] = field(default_factory=lambda: [-360.0])  # the worst of each generation that was random
+    course: list[tuple[int, float]] = field(default_factory=list)  # tries, largest violation so far
+    inside: list[float] = field(default_factory=lambda: [-360.0])  # of each generation, attractors inside the joint box
+    random: list[float] = field(default_factory=lambda: [-360.0])  # of each random generation
     elite: list[list[tuple[float, list[float]]]] = field(default_factory=lambda: [[] for _ in range(CLAUSES)])
     worst_try: dict[str, list[float] | list[list[float]] | int] = field(default_factory=dict)  # commands, torso, seed, arm, clause
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """One search."""
+    """Run one search."""
     return asdict(search(settings["gains"], settings["forced"], settings["tries"], seed))
 
 
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
-    """Random tries first, then variations of the worst commands of each clause."""
+    """Search with random tries first, then with variations of the worst commands of each clause."""
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
         rng = np.random.default_rng([seed, forced, state.tries])
-        is_random = state.tries < RANDOM * tries
+        is_random = state.tries < RANDOM_SHARE * tries
         state.inside.append(-360.0)
         if is_random:
             state.random.append(-360.0)
         for _ in range(min(GENERATION, tries - state.tries + 1) // len(ARMS)):
             commands = [random_command(rng, forced) if is_random else _next(rng, state) for _ in ARMS]
             torso, noise = rng.uniform(-1.0, 1.0, 3), int(rng.integers(2**31))
-            _learn(state, try_commands(numbers, commands, torso, noise), commands, torso.tolist(), noise, is_random)
+            _record(state, try_commands(numbers, commands, torso, noise), commands, torso.tolist(), noise, is_random)
         state.course.append((state.tries, state.worst))
     return state
 
 
 def _next(rng: np.random.Generator, state: Search) -> Command:
-    """A variation of a command that was bad for a clause: with probability 1/2 the clause that is violated most, else any."""
+    """Return a variation of a bad command for a clause: with probability 1/2 the most violated clause, else any."""
     clause = int(np.argmax(state.by_clause)) if rng.random() < 0.5 else int(rng.integers(CLAUSES))
     known = state.elite[clause]
     one, other = (known[int(rng.integers(len(known)))][1] for _ in range(2))
     return vary(rng, from_numbers(one), from_numbers(other))
 
 
-def _learn(state: Search, tried: Tried, commands: list[Command], torso: list[float], seed: int, is_random: bool) -> None:
+def _record(state: Search, tried: Tried, commands: list[Command], torso: list[float], seed: int, is_random: bool) -> None:
     violations = np.rad2deg(tried.violations)
     for arm, command in enumerate(commands):
         state.tries += 1
@@ -117,10 +117,10 @@ def _learn(state: Search, tried: Tried, commands: list[Command], torso: list[flo
         for clause, value in enumerate(violations[arm].tolist()):
             state.by_clause[clause] = max(state.by_clause[clause], value)
             known = state.elite[clause]
-            if len(known) < BEST or value > known[-1][0]:
+            if len(known) < KEPT or value > known[-1][0]:
                 known.append((value, numbers))
                 known.sort(key=lambda entry: -entry[0])
-                del known[BEST:]
+                del known[KEPT:]
         worst = float(violations[arm].max())
         if worst > state.worst:
             state.worst = worst
@@ -134,7 +134,7 @@ def _learn(state: Search, tried: Tried, commands: list[Command], torso: list[flo
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The largest violations of each gain set, in degrees along the normal, negative inside; of several seeds the worst search."""
+    """Return the largest violations of each gain set, in degrees along the normal, negative inside; of several seeds the worst."""
     table: dict[str, Any] = {}
     for state in sorted(_searches(found), key=lambda state: state.worst):
         table.setdefault(state.gains, {})[KINDS[state.forced]] = _summary(state)
@@ -156,13 +156,13 @@ def _summary(state: Search) -> dict[str, Any]:
 
 
 def _searches(found: Cells) -> list[Search]:
-    """By gain set, without forces of a client first."""
+    """Return the searches by gain set, those without forces of a client first."""
     states = [Search(**result.values) for result in found.values()]
     return sorted(states, key=lambda state: (GAINS.index(state.gains), state.forced, state.seed))
 
 
 def plot(found: Cells) -> Any:
-    """Three panels: worst so far against tries, worst of each clause, the worst tries over time."""
+    """Draw three panels: largest violation against tries, by clause, and the worst tries over time."""
     states = _searches(found)
     drawing = new_figure(14.0, 4.6)
     course, clauses, over_time = drawing.subplots(1, 3, width_ratios=(1.0, 1.35, 1.0))
@@ -190,7 +190,7 @@ def plot(found: Cells) -> Any:
 
 
 def _repeat(state: Search) -> tuple[Array, Array]:
-    """Run the worst try once more: times [s], and the violation of its clause [deg]."""
+    """Repeat the worst try; returns times [s], and the violation of its clause [deg]."""
     known: dict[str, Any] = state.worst_try
     commands = [from_numbers(numbers) for numbers in known["commands"]]
     tried = try_commands(Gains.named(state.gains), commands, np.array(known["torso"]), known["seed"])

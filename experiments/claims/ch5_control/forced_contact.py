@@ -1,13 +1,13 @@
-"""Wall: a hand is pushed by ever more force into table, own body and joint limits, and drawn to and through singular poses.
+"""Forced contact: growing forces push a hand into table, body and joint limits, and draw it to and through singular poses.
 
 Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a
-limit; and a hand that is drawn to a target, reachable or not, through singular poses or not, never stops dead before it arrives and does
-not oscillate above 1 mm when it has come to rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
+limit; and a hand that is drawn to a target, reachable or not, through singular poses or not, does not stop before it arrives and does
+not oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
 dominate the constraint forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").
 Published: no numbers.  Run time: about six minutes.
 
-The force rises in steps, each in force for three seconds, for both gain sets.  The hand is drawn by the whole body (`mobee.Reacher`).
-Depths are of the joints' true positions.
+The force rises in steps of three seconds each, for both gain sets.  The hand is drawn by the whole body (`mobee.Reacher`).
+Depths are measured at the true joint positions.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from mobee.control import Reacher
 from mobee.simulation import OfflinePlant
 
 SOLID, CLAUSE = 2.0, 2.0  # mm, degrees: allowed with the default gains
-OSCILLATION, DEAD = 1.0, 0.3  # mm at rest; s without motion before it is at rest
+OSCILLATION, DEAD = 1.0, 0.3  # mm at rest; s without motion before the end: allowed
 
 LEVELS = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # N/kg at a marker; rad/s^2 at a motor; before the squash
 QUICK_LEVELS, QUICK_CASES = LEVELS[::3], 3  # walls and targets
-LEVEL_SECONDS, LEVEL_REST = 3.0, 2.0  # a level lasts; its end, in which restlessness is measured
-INSIDE = np.deg2rad(1.0)  # only motors that are so far within their limits at home are judged by them; some stand at theirs
+LEVEL_SECONDS, LEVEL_REST = 3.0, 2.0  # s, duration of a level; its end, in which oscillation is measured
+INSIDE = np.deg2rad(1.0)  # rad; motors nearer to their limits at home are not judged
 SAMPLING = 0.02  # s between two postures whose contacts are evaluated
 PALMS = ("left_palm", "right_palm")
 
 MARKER, ARM = "left_palm", "left_arm"
 DRAWN_SECONDS, DRAWN_REST = 60.0, 3.0  # s, the run; its end, in which oscillation is measured
-# m/s, s, m: slower than this over that time, farther than that from where it comes to rest, the hand has stopped dead.
+# m/s, s, m: a hand slower than this during the window, farther than this from its end position, has stopped early.
 SLOW, WINDOW, NEAR = 2e-4, 0.5, 0.01
 
 PANELS = (
@@ -55,7 +55,7 @@ PANELS = (
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """First motors of the left arm at the start [deg], and targets one after the other: from the palm at home [m], root frame."""
+    """Start angles of the first motors of the left arm [deg], and successive targets relative to the palm at home [m], root frame."""
 
     start: tuple[float, ...]
     targets: tuple[tuple[float, float, float], ...]
@@ -63,7 +63,7 @@ class Goal:
 
 HOME = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)
 STRETCHED = (-70.0, 30.0, 0.0, 16.0, 0.0, -40.0, 0.0)
-ALIGNED = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)  # the axes of prosup and wrist yaw: at wrist pitch 0
+ALIGNED = (-26.0, 20.0, 0.0, 60.0, 0.0, 0.0, 0.0)  # at wrist pitch 0 the axes of prosup and wrist yaw are aligned
 GOALS = {
     "in-reach": Goal(HOME, ((-0.05, 0.0, 0.15),)),
     "stretched-ahead": Goal(HOME, ((-0.5, 0.0, 0.1),)),
@@ -78,7 +78,7 @@ GOALS = {
 
 @dataclass(frozen=True, slots=True)
 class Pressed(Row):
-    """A level of force and the worst while it lasted; angles are negative inside."""
+    """A level of force and the worst measures during it; angles are negative inside."""
 
     gains: str
     wall: str
@@ -88,23 +88,23 @@ class Pressed(Row):
     clause_deg: float
     limit_deg: float
     restless_mm: float
-    beside_mm: float  # solids that do not count
+    beside_mm: float  # solid pairs that are not listed
     pair: str  # of solids, the deepest
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn(Row):
-    """Measures of a hand that was drawn to its targets."""
+    """Measures of a hand that is drawn to its targets."""
 
     gains: str
     target: str
     oscillation_mm: float  # at rest
-    dead_s: float  # the longest time without motion before it was at rest
+    dead_s: float  # the longest time without motion before the end
     from_target_mm: float  # at rest
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Gains, walls and targets."""
+    """Add gains, walls and targets."""
     walls, targets = list(PUSHES), list(GOALS)
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
     parser.add_argument("--walls", nargs="+", choices=walls, default=walls, metavar="WALL", help=f"of {', '.join(walls)}")
@@ -112,7 +112,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """With each gain set every wall, then every target; --quick: the first of them, with few levels of force."""
+    """Return every wall and every target with each gain set; --quick: the first of them, with few levels of force."""
     levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
     found = []
     for gains in arguments.gains:
@@ -125,7 +125,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Press into a wall: "pressed", a record a level; or draw the hand to a target: "drawn", and its path (times, distances)."""
+    """Press into a wall: "pressed", a record for each level; or draw the hand to a target: "drawn", and its path."""
     if "wall" in settings:
         return {"pressed": [one.record() for one in press(settings["gains"], settings["wall"], settings["levels"], seed)]}
     drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
@@ -133,7 +133,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Pressed]:
-    """Push with one level of force after the other, from home."""
+    """Push from home with one level of force after the other."""
     plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
     robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
     free = limit_violations(robot, robot.home[None])[0] < -INSIDE
@@ -163,7 +163,7 @@ def _worst(angles: Array) -> float:
 
 
 def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
-    """Draw the hand to the targets of a goal, each for its share of the time; also times (T,) s and distances from the target (T,) m."""
+    """Draw the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m."""
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
     start = robot.home.copy()
@@ -192,8 +192,8 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
 
 
 def dead_time(hand: Array, dt: float) -> float:
-    """The longest time [s] in which the hand (T, 3) m was SLOW although it was not NEAR where it ends."""
-    window = max(1, round(WINDOW / dt))  # the play of the motors makes single ticks count for nothing
+    """Return the longest time [s] in which the hand (T, 3) m was SLOW although it was not NEAR its end position."""
+    window = max(1, round(WINDOW / dt))  # single ticks are meaningless because of the motors' play
     speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
     stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
     begins = np.flatnonzero(stopped & ~np.r_[False, stopped[:-1]])
@@ -202,7 +202,7 @@ def dead_time(hand: Array, dt: float) -> float:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """The worst of every wall, and of the hand that is drawn."""
+    """Return the worst measures for every wall, and for every target."""
     pressed, drawn = _pressed(found), _drawn(found)
     table: dict[str, Any] = {}
     for gains in GAINS:
@@ -235,7 +235,7 @@ def _drawn(found: Cells) -> list[Drawn]:
 
 
 def plot(found: Cells) -> Any:
-    """Above, depth and margin against the force; below, the distance of the hand from its targets over time."""
+    """Draw depths and margins against the force, and below them the distance of the hand from its targets over time."""
     drawing = new_figure(15.0, 8.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.1))
     _plot_pressing(above.subplots(1, len(PANELS)), _pressed(found))
@@ -262,14 +262,14 @@ def _plot_pressing(panels: Any, pressed: Sequence[Pressed]) -> None:
     for axes in panels[2:]:
         axes.axhline(0.0, color="0.3", linewidth=0.8)
     for gains, color in COLORS.items():
-        panels[0].plot([], [], color=color, label=f"{gains}, one line a wall")
+        panels[0].plot([], [], color=color, label=f"{gains}, one line per wall")
     panels[0].legend(fontsize=7)
 
 
 def _plot_distances(axes: Any, name: str, runs: dict[str, dict[str, Any]]) -> None:
     for values in runs.values():
         drawn = Drawn(**values["drawn"])
-        label = f"{drawn.gains}: at rest ±{drawn.oscillation_mm:.2f} mm, dead {drawn.dead_s:.1f} s"
+        label = f"{drawn.gains}: at rest ±{drawn.oscillation_mm:.2f} mm, stopped {drawn.dead_s:.1f} s"
         axes.plot(values["times"], values["distances"], color=COLORS[drawn.gains], label=label)
     axes.set_title(f"drawn: {name.replace('-', ' ')}", fontsize=8)
     axes.set(xlabel="time [s]", ylabel="from the target [m]", ylim=(0.0, None))
@@ -279,7 +279,7 @@ def _plot_distances(axes: Any, name: str, runs: dict[str, dict[str, Any]]) -> No
 
 EXPERIMENT = Experiment(
     name="forced-contact",
-    claim="no force of a client drives the robot into table, body or limits, and a hand drawn through singular poses stays calm",
+    claim="no force of a client drives the robot into table, body or limits, and a hand drawn through singular poses does not oscillate",
     source="thesis 5.1 and 5.2.2-5.2.4",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),

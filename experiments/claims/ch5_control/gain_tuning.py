@@ -1,4 +1,4 @@
-"""Tune: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
+"""Gain tuning: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
 
 Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling
 time, overshoot, solids that touch while the hands press 5 to 25 cm into the table, while a client pushes and while the robot
@@ -7,7 +7,7 @@ Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none
 hour for 100 gain sets.
 
 The first set judged is `Gains.default()` itself.  Each of the others changes a few numbers of the best so far by random factors, which
-grow after a success and shrink after a failure.  The result is a table of both, and the numbers of the best.
+grow after a success and shrink after a failure.  The result is a table of the default and the best set.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from mobee.simulation import MotorParameters, OfflinePlant
 
 STEPPED = ("torso_yaw", "torso_pitch", "l_shoulder_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup", "neck_yaw")
 POSTURES, TARGETS, COMMANDS = 4, 10, 40
-AGES = (1, 3, 4)  # ticks of 10 ms; the last is one more than must be stable
-SHOVED = ("table-left-hand", "table-both-hands", "table-edge", "chest", "face", "other-hand")
+AGES = (1, 3, 4)  # ages of commands in ticks of 10 ms; the first two must be stable
+CLIENT_PUSHES = ("table-left-hand", "table-both-hands", "table-edge", "chest", "face", "other-hand")
 STRONG, PUSHED = 300.0, 3.0  # N/kg before the squash; s
-WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # how many; s each; s a target, in the joint box
-AT_ENDS = 0.5  # of the motors' targets are an end of the range, where the springs of many motors push together
-SPEEDS = (1.0, 0.2)  # speed scales, in turn; the thesis' robot ran at 0.1 and 0.2
+WANDERS, WANDER, HOLD = 6, 60.0, 6.0  # number of runs; s per run; s per target, in the joint box
+AT_ENDS = 0.5  # share of motor targets at an end of the range, where the springs of many motors push together
+SPEEDS = (1.0, 0.2)  # speed scales of the runs in turn; the thesis used 0.1 and 0.2
 WANDERING = ("torso", "head", "left_arm", "right_arm")  # without the fingers: the 23 motors of thesis 4.1.1
-FINGERS = 7  # the first of them in an arm
+FINGERS = 7  # index of the first finger motor in an arm
 
 PRESS_SEED = 7
-PRESS, REST = 6.0, 2.0  # s, a press; its end, in which chatter is measured
+PRESS, REST = 6.0, 2.0  # s, duration of a press; its end, in which chatter is measured
 PRESSING = {"torso": 3, "left_arm": 4, "right_arm": 4}
-WITHIN = (0.1, 0.9)  # of their ranges
+WITHIN = (0.1, 0.9)  # shares of their ranges
 BELOW_TOP = (-0.25, -0.05)  # m
 ABOVE_BLOCK = (-0.6, -0.2)  # m, along x
 TOP = -0.1  # m
@@ -58,23 +58,23 @@ PALMS = ("left_palm", "right_palm")
 
 @dataclass(frozen=True, slots=True)
 class Judged(Row):
-    """The criteria, of the joints' true positions."""
+    """The criteria, measured at the true joint positions."""
 
     settling_s: float  # median of steps of motors and postures
     overshoot: float  # the largest of a motor's step; the deflection by a contact does not count
     solid_mm: float  # deepest, pressing, at the ages that must be stable, and wandering
     field_mm: float  # deepest, pressing
-    pushed_mm: float  # deepest solid while a client pushes with all that it may
+    pushed_mm: float  # deepest solid while a client pushes with the largest force
     chatter_mm: float  # pressing, mean over the postures, 1 tick of age
     late_mm: float  # the same, 3 ticks
     later_mm: float  # the same, 4 ticks
     clause_deg: float  # largest violation, negative inside
     forced_deg: float  # the same while a client pushes
-    stop_deg_s: float  # fastest arrival at a hard stop without a push
-    longest_ms: float  # the control period at which the law stops being stable
+    stop_deg_s: float  # fastest impact at a hard stop without a push
+    longest_ms: float  # the longest control period at which the law is stable
 
 
-# The value that is asked for, and the price of a unit beyond it; a second of settling time costs 1.
+# The required value, and the price of a unit beyond it; a second of settling time costs 1.
 WANTED: Mapping[str, tuple[float, float]] = {
     "overshoot": (0.02, 20.0),
     "solid_mm": (1.0, 1.0),
@@ -87,19 +87,19 @@ WANTED: Mapping[str, tuple[float, float]] = {
     "forced_deg": (0.0, 0.5),
     "stop_deg_s": (0.0, 0.05),
 }
-SHORTEST_LONGEST = 25.0  # ms; a period of 20 must be possible
+MIN_LONGEST = 25.0  # ms; a period of 20 must be possible
 
 
 def objective(judged: Judged) -> float:
-    """Settling time [s] plus the prices of what is beyond the values asked for; less is better."""
-    cost = judged.settling_s + 0.2 * max(0.0, SHORTEST_LONGEST - judged.longest_ms)
+    """Return the settling time [s] plus the prices of unmet requirements; less is better."""
+    cost = judged.settling_s + 0.2 * max(0.0, MIN_LONGEST - judged.longest_ms)
     for name, (wanted, price) in WANTED.items():
         cost += price * max(0.0, getattr(judged, name) - wanted)
     return cost
 
 
 def evaluate(gains: Gains) -> Judged:
-    """Judge gains; always the same seeds, so that two of them can be compared."""
+    """Measure gains by all criteria, always with the same seeds, so that gains can be compared."""
     settling, overshoot = _steps(gains)
     pressed = {age: [press(gains, target, age) for target in _targets()] for age in AGES}
     must_hold = [p for age in AGES[:2] for p in pressed[age]]
@@ -111,7 +111,7 @@ def evaluate(gains: Gains) -> Judged:
         overshoot,
         solid_mm=1e3 * max(wandered, *(p.solid for p in must_hold)),
         field_mm=1e3 * max(p.field for p in must_hold),
-        pushed_mm=1e3 * max(_pushed(gains, push) for push in SHOVED),
+        pushed_mm=1e3 * max(_pushed(gains, push) for push in CLIENT_PUSHES),
         chatter_mm=chatter[1],
         late_mm=chatter[3],
         later_mm=chatter[4],
@@ -132,7 +132,7 @@ class Pressed:
 
 
 def press_targets(count: int) -> list[Array]:
-    """Postures, free of contacts without a table, in which a palm is 5 to 25 cm below the top that the table has."""
+    """Draw postures, free of contacts without a table, in which a palm is 5 to 25 cm below the top of the table."""
     robot = icub_at_table().robot
     rng, free = np.random.default_rng(PRESS_SEED), icub()
     found: list[Array] = []
@@ -147,7 +147,7 @@ def press_targets(count: int) -> list[Array]:
 
 
 def press(gains: Gains, target: Array, age: int, dt: float = 0.01) -> Pressed:
-    """Send all parts to the target at once, with commands that are `age` ticks old, and measure."""
+    """Send all parts to the target with commands that are `age` ticks old; returns depths and chatter."""
     late = MotorParameters(delay=float(MotorParameters().of_motors("delay", 1)[0]) + (age - 1) * dt)
     plant = OfflinePlant(icub_at_table(), PRESS_SEED, gains, late, dt)
     plant.controller.attractor = target
@@ -164,7 +164,7 @@ def _steps(gains: Gains) -> tuple[float, float]:
 
 
 def _wander(gains: Gains, seed: int) -> float:
-    """The deepest solid [m] between random postures, whatever lies between them."""
+    """Return the deepest solid contact [m] on motions between random postures."""
     robot, rng = icub_at_table().robot, np.random.default_rng(seed)
     plant = OfflinePlant(icub_at_table(), seed, gains, speed_scale=SPEEDS[seed % len(SPEEDS)])
     moving = np.concatenate([np.arange(len(robot.motors))[robot.parts[part].slice][:FINGERS] for part in WANDERING])
@@ -208,9 +208,9 @@ def _commands(forced: bool) -> list[tuple[Command, Command]]:
 
 
 RECORDS = "tune.csv"
-CLEARLY = 0.8  # of the default's objective: what is less is clearly better
+CLEARLY_BETTER = 0.8  # of the default's objective, below which a set is clearly better
 
-# Motors with a spring of their own: torso motors move the hands farthest, shoulder motors press the elbows against the chest.
+# Motors with their own spring: torso motors move the hands farthest, shoulder motors press the elbows against the chest.
 SPRINGS = {"max_spring of the torso": "torso_*", "max_spring of the shoulders": "?_shoulder_*"}
 TUNED = (
     "damping",
@@ -224,9 +224,9 @@ TUNED = (
     *SPRINGS,
 )
 COLUMNS = (*TUNED, *Judged.columns())
-CHANGED = (1, 3)  # numbers at a time, least and most
-STEP, GROW, SHRINK = 0.3, 1.5, 0.9  # of the logarithms: standard deviation at first, after a success, after a failure
-LEAST = 0.015  # s: sets that are not stable at such a control period are not judged
+CHANGED = (1, 3)  # least and largest number of values changed at a time
+STEP, GROW, SHRINK = 0.3, 1.5, 0.9  # of the logarithms: initial standard deviation, its factors after a success and a failure
+MIN_STABLE_PERIOD = 0.015  # s: sets that are not stable at this control period are not judged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -235,7 +235,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Search, going on behind what is in the folder."""
+    """Search, continuing after the sets that are in the folder."""
     path = folder / RECORDS
     tried = read_tried(path)
     with Records(path, COLUMNS) as records, Progress() as progress:
@@ -247,34 +247,34 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read_tried(path: Path) -> list[Tried]:
-    """What a run has so far."""
+    """Read the gain sets that a run has judged so far."""
     return [Tried.of_record(row) for row in read_records(path, COLUMNS)]
 
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """A gain set and how it was judged."""
+    """A gain set and its criteria."""
 
     numbers: dict[str, float]
     judged: Judged
 
     @property
     def objective(self) -> float:
-        """Less is better."""
+        """The objective; less is better."""
         return objective(self.judged)
 
     def record(self) -> dict[str, object]:
-        """For the file."""
+        """Return the record for the file."""
         return {**{name: round(value, 6) for name, value in self.numbers.items()}, **self.judged.record()}
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Tried:
-        """From the file."""
+        """Return the gain set read from a row of the file."""
         return cls({name: float(row[name]) for name in TUNED}, Judged.of_record(row))
 
 
 def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
-    """Append gain sets to those that are known until there are so many; these and the seed decide the new ones."""
+    """Append gain sets to `tried` until there are `sets`, and yield each; the known sets and the seed decide the next."""
     while len(tried) < sets:
         numbers = _next(tried, seed) if tried else numbers_of(Gains.default())
         tried.append(Tried(numbers, evaluate(gains_with(numbers))))
@@ -282,7 +282,7 @@ def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
 
 
 def numbers_of(gains: Gains) -> dict[str, float]:
-    """The values of TUNED."""
+    """Return the values of TUNED."""
     motors = icub().robot.motors
     springs = gains.of_motors("max_spring", motors)
     numbers = {name: float(getattr(gains, name)) for name in TUNED if name not in SPRINGS}
@@ -290,7 +290,7 @@ def numbers_of(gains: Gains) -> dict[str, float]:
 
 
 def gains_with(numbers: Mapping[str, float]) -> Gains:
-    """`Gains.default()` but for these numbers."""
+    """Return `Gains.default()` with these values replaced."""
     common: dict[str, Any] = {name: value for name, value in numbers.items() if name not in SPRINGS}
     gains = replace(Gains.default(), motors=(), groups=(), **common)
     for name, pattern in SPRINGS.items():
@@ -307,7 +307,7 @@ def _next(tried: list[Tried], seed: int) -> dict[str, float]:
         best = one if is_better else best
     while True:
         numbers = _changed(best.numbers, step, rng)
-        if Controller(icub(), gains_with(numbers)).max_dt > LEAST:
+        if Controller(icub(), gains_with(numbers)).max_dt > MIN_STABLE_PERIOD:
             return numbers
 
 
@@ -317,11 +317,11 @@ def _changed(numbers: dict[str, float], step: float, rng: np.random.Generator) -
 
 
 def results(tried: list[Tried]) -> dict[str, Any]:
-    """The default and the best, side by side."""
+    """Return the default and the best gain set side by side."""
     before, best = tried[0], min(tried, key=lambda one: one.objective)
     criteria = {name: [round(value, 4), round(asdict(best.judged)[name], 4)] for name, value in asdict(before.judged).items()}
     return {
-        "passed": best.objective >= CLEARLY * before.objective,
+        "passed": best.objective >= CLEARLY_BETTER * before.objective,
         "judged": len(tried),
         "objective": [round(before.objective, 3), round(best.objective, 3)],
         "each": "Gains.default() and the best",
@@ -334,14 +334,14 @@ def figure(folder: Path) -> Path:
     """Draw the course of the search; raises InvalidValue if nothing was judged."""
     tried = read_tried(folder / RECORDS)
     if not tried:
-        raise InvalidValue(f"{folder} has no gains in it: it was stopped before the first were judged.")
+        raise InvalidValue(f"{folder} has no gains in it: the run was stopped before the first were judged.")
     path = folder / "figure.png"
     plot(tried).savefig(path, dpi=130)
     return path
 
 
 def plot(tried: Sequence[Tried]) -> Any:
-    """The objective with its parts, and the gains of the best so far."""
+    """Draw the objective with its parts, and the gains of the best set so far."""
     drawing = new_figure(12.0, 4.5)
     course, numbers = drawing.subplots(1, 2)
     objectives = [one.objective for one in tried]
@@ -354,9 +354,7 @@ def plot(tried: Sequence[Tried]) -> Any:
         if any(costs):
             parts[f"{name} beyond {wanted:g}"] = costs
     course.stackplot(places, *parts.values(), labels=parts, alpha=0.8)
-    course.set(
-        xlabel="gain sets judged", ylabel="objective", title="Best so far: what its objective is made of", ylim=(0.0, 1.1 * objectives[0])
-    )
+    course.set(xlabel="gain sets judged", ylabel="objective", title="Best so far: parts of its objective", ylim=(0.0, 1.1 * objectives[0]))
     course.legend(fontsize=6)
     for name in TUNED:
         numbers.plot(places, [tried[i].numbers[name] / tried[0].numbers[name] for i in best], label=name)
@@ -372,7 +370,7 @@ def plot(tried: Sequence[Tried]) -> Any:
 
 EXPERIMENT = Experiment(
     name="gain-tuning",
-    claim="a seeded search finds no gains that are clearly better than the default ones",
+    claim="a seeded search finds no gains that are clearly better than the default gains",
     source="thesis 5.2; this project's criteria",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

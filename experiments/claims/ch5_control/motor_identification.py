@@ -1,8 +1,8 @@
 """Identify: lag, delay, backlash and friction of the PyBullet robot's motors, fitted to responses to velocities alone.
 
 Claim: the motor model of `mobee.simulation` with numbers fitted to the encoder readings of the PyBullet robot describes that robot,
-gravity and inertia included: the residual of a response is its noise.  Source: thesis 2.2 (the robot does not do exactly what it is
-told).  Nothing is published to compare with; the fit is compared with the numbers that the published findings need.
+gravity and inertia included: the residual of a response is its noise.  Source: thesis 2.2 (the robot does not follow its
+commands exactly).  Nothing is published to compare with; the fit is compared with the numbers that the published findings need.
 Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
 The robot is a black box: velocities go in, encoder positions with their noise come out.  The method is checked first, on
@@ -52,11 +52,11 @@ from services.robot_sim.kinematic import Backend
 RESPONSES, TABLE, DATA, METHOD = "responses", "motors.csv", "identified.toml", "method.json"
 
 PART = "left_arm"
-ACTION = 300  # ticks an action, for the default gains have a time constant of 0.4 s
-MIDDLE = (0.25, 0.75)  # share of the motors' ranges from which targets are drawn
-WRIST = slice(0, 7)  # the motors of the arm that are sent somewhere; the fingers stay
+ACTION = 300  # ticks per action; the default gains have a time constant of 0.4 s
+MIDDLE = (0.25, 0.75)  # shares of the motors' ranges within which targets are drawn
+WRIST = slice(0, 7)  # the motors of the arm that move; the fingers do not
 
-DIGITS = {"lag": 5, "delay": 4, "backlash": 5, "friction": 5}  # after the point, s and rad
+DIGITS = {"lag": 5, "delay": 4, "backlash": 5, "friction": 5}  # decimals, s and rad
 MADE_WITH = ("mobee", "pybullet", "icub-models", "numpy", "scipy")
 HEADER = """\
 # The motors of the PyBullet {robot}, as its encoders show them: made by `mobee experiment run motor-identification`; not edited by hand.
@@ -66,7 +66,7 @@ HEADER = """\
 
 SHOWN = ("torso_pitch", "l_shoulder_pitch", "l_elbow")
 PUBLISHED = MotorParameters()
-COLUMNS: tuple[tuple[str, float, str, Any], ...] = (  # of the table, factor of the unit that is shown, label, published setting
+COLUMNS: tuple[tuple[str, float, str, Any], ...] = (  # column of the table, factor to the shown unit, label, published setting
     ("lag_s", 1e3, "lag [ms]", PUBLISHED.lag),
     ("delay_s", 1e3, "delay [ms]", PUBLISHED.delay),
     ("backlash_deg", 1.0, "backlash [deg]", np.rad2deg(PUBLISHED.backlash)),
@@ -76,14 +76,14 @@ COLUMNS: tuple[tuple[str, float, str, Any], ...] = (  # of the table, factor of 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
-    text = "of each signal in each posture, 2 or more: they differ by the noise alone (default: 2)"
+    text = "of each signal in each posture, 2 or more, to measure the noise (default: 2)"
     parser.add_argument("--repetitions", type=whole_from_two, default=2, metavar="N", help=text)
     parser.add_argument("--postures", type=positive_whole, default=3, metavar="N", help="home and N - 1 others (default: 3)")
     parser.add_argument("--actions", type=positive_whole, default=20, metavar="N", help="of an arm, to compare the plants (default: 20)")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Check the method, record, fit, compare."""
+    """Check the method, record the responses, fit the motors, and compare the plants."""
     robot = load_robot("icub")
     method = _check(arguments, robot, folder / METHOD)
     with prints_to_stderr():
@@ -121,7 +121,7 @@ def _record(arguments: argparse.Namespace, robot: Robot, folder: Path) -> list[P
 
 
 class BodyPlant:
-    """An `OfflinePlant` with another body: a command formed in a tick moves it in the next."""
+    """An `OfflinePlant` with another simulated body: a command formed in a tick moves it in the next."""
 
     def __init__(self, model: Model, body: Backend) -> None:
         self.controller = Controller(model, Gains.default())
@@ -129,7 +129,7 @@ class BodyPlant:
         self._command: Array | None = None
 
     def tick(self) -> Array:
-        """The encoders of this tick (n,) rad."""
+        """Run a tick; returns its encoder readings, (n,) rad."""
         self._k += 1
         q = self._body.motors.encoders(self._k, DT)
         if self._command is not None:
@@ -140,7 +140,7 @@ class BodyPlant:
 
 
 def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]:
-    """How far the offline plant is from PyBullet with the motors identified, published and ideal, deg."""
+    """Return the differences [deg] between PyBullet and the offline plant with identified, published and ideal motors."""
     model = Model(robot, World())
     targets = free_targets(model, actions, np.random.default_rng([seed, 3]))
 
@@ -168,13 +168,13 @@ def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]
 
 
 def identified_motors(fit: Fit) -> MotorParameters:
-    """The fitted numbers, as a plant takes them."""
+    """Return the fitted values as motor parameters of a plant."""
     p = fit.parameters
     return MotorParameters(lag=p.lag, delay=p.delay, backlash=p.backlash, friction=p.friction, encoder_noise=encoder_noise(fit))
 
 
 def free_targets(model: Model, count: int, rng: np.random.Generator) -> Array:
-    """Targets of the arm, (count, n_part) rad, at which nothing of the robot is in a field of another."""
+    """Draw targets of the arm, (count, n_part) rad, at which no fields of the robot are in contact."""
     robot, part = model.robot, model.robot.part(PART)
     low, high = robot.limits[part.slice][WRIST].T
     targets: list[Array] = []
@@ -188,7 +188,7 @@ def free_targets(model: Model, count: int, rng: np.random.Generator) -> Array:
 
 
 def _trajectory(tick: Callable[[], Array], controller: Controller, targets: Array) -> Array:
-    """(actions, ticks, ...) rad."""
+    """Run the actions; returns encoder readings (actions, ticks, ...) rad."""
     courses = []
     for target in targets:
         controller.set_attractor(PART, target)
@@ -197,9 +197,9 @@ def _trajectory(tick: Callable[[], Array], controller: Controller, targets: Arra
 
 
 def _difference(course: Array) -> dict[str, float]:
-    """Of (actions, ticks, n_part) rad, in degrees."""
+    """Summarise differences (actions, ticks, n_part) rad, in degrees."""
     moved = np.rad2deg(course[..., WRIST])
-    ends = np.abs(moved[:, -20:].mean(axis=1))  # the noise that the two do not share must not count
+    ends = np.abs(moved[:, -20:].mean(axis=1))  # a mean, to average out the encoder noise
     return {
         "rms_deg": float(np.sqrt(np.square(moved).mean())),
         "largest_deg": float(np.abs(moved).max()),
@@ -209,7 +209,7 @@ def _difference(course: Array) -> dict[str, float]:
 
 
 def csv_table(robot: Robot, fit: Fit) -> str:
-    """A line a motor, s and degrees."""
+    """Return the table with a line for each motor, in s and degrees."""
     columns = [f"{name}_{UNIT[name][0].replace('/', '_')}" for name in FITTED]
     head = [column + suffix for column in columns for suffix in ("", "_deviation")]
     lines = [",".join(["motor", *head, "noise_deg", "chi_square", "misfit_deg", "held_out_chi_square", "held_out_misfit_deg"])]
@@ -224,7 +224,7 @@ def csv_table(robot: Robot, fit: Fit) -> str:
 
 
 def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
-    """The file for mobee/simulation/identified/."""
+    """Return the text of the file for mobee/simulation/identified/."""
     made = {"date": time.strftime("%Y-%m-%d"), "seed": seed, **{name: metadata.version(name) for name in MADE_WITH}}
     lines = [HEADER.format(robot=robot.name, period=NOISE_PERIOD), f"encoder_noise = {encoder_noise(fit):.6f}\n", "[made]"]
     lines += [f"{key} = {value}" if isinstance(value, int) else f'{key} = "{value}"' for key, value in made.items()]
@@ -237,7 +237,7 @@ def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
 
 
 def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
-    """For each number: median, range and uncertainty over the motors, and how far it is from the published settings."""
+    """Return median, range and uncertainty of each parameter over the motors, and its distance from the published setting."""
     published, found = MotorParameters(), {}
     for name in FITTED:
         unit, factor = UNIT[name]
@@ -265,15 +265,15 @@ def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
 
 
 def encoder_noise(fit: Fit) -> float:
-    """One number for all encoders, rad."""
+    """Return the rms noise of all encoders, rad."""
     return float(np.sqrt(np.square(fit.noise).mean()))
 
 
 def figure(folder: Path) -> Path:
-    """Measured and fitted responses, and the numbers with their uncertainty; raises InvalidValue for a run without a fit."""
+    """Draw measured and fitted responses, and the values with their uncertainty; raises InvalidValue for a run without a fit."""
     table, robot = folder / TABLE, load_robot("icub")
     if not table.exists():
-        raise InvalidValue(f"{folder} has no fit yet: go on with `mobee experiment run motor-identification --resume {folder}`.")
+        raise InvalidValue(f"{folder} has no fit yet: continue with `mobee experiment run motor-identification --resume {folder}`.")
     rows = list(csv.DictReader(table.read_text().splitlines()))
     parameters = _parameters(rows)
     drawing = new_figure(12.0, 13.0)

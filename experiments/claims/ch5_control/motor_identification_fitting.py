@@ -1,9 +1,7 @@
-"""Fits of the motor model (mobee.simulation.motors) to responses, and a check with simulated motors.
+"""Fits the motor model (mobee.simulation.motors) to responses, and checks the method with simulated motors.
 
-Fitted are lag, delay, backlash, friction and encoder noise of every motor.
-
-The model itself is run, all motors at once: they do not influence each other in it.  Where a signal starts does not matter to the
-model, so each response is compared without its mean.
+Fitted are lag, delay, backlash, friction and encoder noise of every motor.  The model is simulated for all motors at once, since they do
+not influence each other.  The model does not depend on the start of a signal, so each response is compared without its mean.
 """
 
 from __future__ import annotations
@@ -25,10 +23,10 @@ from mobee.simulation.motors import NOISE_PERIOD, MotorParameters, Motors
 SHAPED = ("lag", "backlash", "friction")  # fitted at a fixed delay, which the model rounds to substeps
 SCALE = np.array([0.05, np.deg2rad(0.2), np.deg2rad(0.2)])  # s, rad, rad/s
 START = np.array([1.0, 1.0, 0.5])  # times SCALE
-AWAY = 0.05  # times SCALE, from zero: where a fit starts, steps of a derivative being relative
-LONGEST = 0.05  # s of delay
-FLAT = 1e-6  # change of chi-square, relative, with which a fit is over
-INFORMED = 1e-3  # step of a derivative, times SCALE: shorter ones fall between the kinks of play and friction
+AWAY = 0.05  # times SCALE, least start value of a fit, since steps of a derivative are relative
+LONGEST = 0.05  # s, longest delay
+TOLERANCE = 1e-6  # relative change of chi-square at which a fit ends
+DERIVATIVE_STEP = 1e-3  # times SCALE; shorter steps are disturbed by the kinks of play and friction
 
 NOISE = np.deg2rad(0.1)  # rad at a tick of NOISE_PERIOD
 UNLIKELY = 5.0  # standard deviations
@@ -37,26 +35,26 @@ UNIT = {"lag": ("s", 1.0), "delay": ("s", 1.0), "backlash": ("deg", 180.0 / np.p
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Numbers a motor, (n,): values, standard deviations, and how well they explain the responses."""
+    """Fitted values of the motors, (n,), their standard deviations, and the quality of the fit."""
 
     parameters: MotorParameters
     deviation: dict[str, Array]  # lag, delay s; backlash rad; friction rad/s
     noise: Array  # rad, of the encoders at a tick of NOISE_PERIOD
-    chi_square: Array  # of the fitted responses, a degree of freedom: 1 if only encoder noise is left
+    chi_square: Array  # of the fitted responses per degree of freedom: 1 if only encoder noise remains
     misfit: Array  # rad, rms residual of the mean fitted response beyond the noise
     held_out_chi_square: Array
     held_out_misfit: Array
 
 
 def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Array]) -> Fit:
-    """`responses`: of each motor of the robot, in its order, to the same two signals."""
+    """Fit the motors of a robot; `responses`: of each motor, in the robot's order, to the same two signals."""
     noise = np.array([_noise(each.fitted, each.held_out) for each in responses])  # at a tick of DT
     sigma = noise / np.sqrt(responses[0].fitted[..., 0].size)  # of the mean response
     measured, held_out = (_centred(np.array([q.mean(axis=(0, 1)) for q in kind])) for kind in zip(*map(_both, responses), strict=True))
     problem = _Problem(robot, signals[0], measured / sigma[:, None], sigma)
     x, delay, squares, delay_deviation = _best(problem, len(responses))
     chi_square = squares / (measured.shape[1] - len(SHAPED) - 2)
-    excess = np.sqrt(np.maximum(chi_square, 1.0))  # what the model cannot explain makes the numbers less certain
+    excess = np.sqrt(np.maximum(chi_square, 1.0))  # unexplained residuals make the values less certain
     deviation = dict(zip(SHAPED, (problem.deviation(delay, x) * excess[:, None]).T, strict=True))
     parameters = _parameters(x, delay)
     left = (held_out - _centred(respond(robot, parameters, signals[1]))) / sigma[:, None]
@@ -73,7 +71,7 @@ def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Arra
 
 
 def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
-    """The model's encoder positions without noise, rad, (n, ticks), when every motor is commanded the signal (ticks,) rad/s."""
+    """Return the model's encoder positions without noise, (n, ticks) rad, for a signal (ticks,) rad/s to every motor."""
     motors = Motors(robot, parameters, 0, robot.limits.mean(axis=1))
     substeps = parameters.substeps(DT)
     q = np.empty((len(signal), len(robot.motors)))
@@ -88,7 +86,7 @@ def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
 
 
 class _Problem:
-    """Residuals of the model from mean responses, in units of their noise."""
+    """Residuals between the model and mean responses, in units of their noise."""
 
     def __init__(self, robot: Robot, signal: Array, measured: Array, sigma: Array) -> None:
         self._robot, self._signal, self._measured, self._sigma = robot, signal, measured, sigma
@@ -99,30 +97,30 @@ class _Problem:
         self._sparsity = csr_array((ones, (rows.repeat(len(SHAPED)), columns.ravel())))  # a motor's rows depend on its own numbers
 
     def solve(self, delay: float, start: Array) -> Array:
-        """Least squares at this delay from a start (n, 3) in SCALE; the same shape."""
+        """Solve least squares at this delay from a start (n, 3) in SCALE; returns the same shape."""
         motors = len(self._measured)
         found = least_squares(
             lambda x: self.residuals(delay, x.reshape(motors, -1)).ravel(),
             start.ravel(),
             bounds=(0.0, np.inf),
             jac_sparsity=self._sparsity,
-            diff_step=INFORMED,
-            ftol=FLAT,
+            diff_step=DERIVATIVE_STEP,
+            ftol=TOLERANCE,
         )
         x: Array = found.x.reshape(motors, -1)
         return x
 
     def residuals(self, delay: float | Array, x: Array) -> Array:
-        """(n, ticks), one standard deviation of the noise is 1."""
+        """Return the residuals (n, ticks) in standard deviations of the noise."""
         predicted = _centred(respond(self._robot, _parameters(x, delay), self._signal)) / self._sigma[:, None]
         difference: Array = predicted - self._measured
         return difference
 
     def deviation(self, delay: Array, x: Array) -> Array:
-        """Standard deviations at the solution, (n, 3), in s, rad, rad/s."""
+        """Return the standard deviations at the solution, (n, 3), in s, rad, rad/s."""
         here = self.residuals(delay, x)
-        steps = INFORMED * np.eye(len(SHAPED))
-        slopes = np.stack([(self.residuals(delay, x + step) - here) / INFORMED for step in steps], axis=-1)  # (n, ticks, 3)
+        steps = DERIVATIVE_STEP * np.eye(len(SHAPED))
+        slopes = np.stack([(self.residuals(delay, x + step) - here) / DERIVATIVE_STEP for step in steps], axis=-1)  # (n, ticks, 3)
         covariance = np.linalg.inv(np.swapaxes(slopes, 1, 2) @ slopes)
         spread: Array = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)) * SCALE
         return spread
@@ -133,7 +131,7 @@ def _both(responses: Responses) -> tuple[Array, Array]:
 
 
 def _best(problem: _Problem, motors: int) -> tuple[Array, Array, Array, Array]:
-    """Of all delays the one that fits each motor best: x (n, 3), delay (n,) s, sum of squares (n,), deviation of the delay (n,) s."""
+    """Return the best delay of each motor: x (n, 3), delay (n,) s, sum of squares (n,), deviation of the delay (n,) s."""
     delays = np.arange(0.0, LONGEST + 1e-9, _substep())
     x = np.tile(START, (motors, 1))
     found, squares = [], []
@@ -156,14 +154,14 @@ def _substep() -> float:
 
 
 def _centred(q: Array) -> Array:
-    """Without the preload and without the mean of the rest, (n, ticks)."""
+    """Return responses without the preload and their mean, (n, ticks)."""
     kept = q[:, PRELOAD:]
     centred: Array = kept - kept.mean(axis=1, keepdims=True)
     return centred
 
 
 def _noise(*responses: Array) -> float:
-    """Standard deviation of repetitions around their mean in a posture, rad, each without its own mean."""
+    """Return the standard deviation of repetitions around their mean in a posture, rad, each without its own mean."""
     squares, freedom = 0.0, 0
     for each in responses:
         kept = each[:, :, PRELOAD:]
@@ -175,7 +173,7 @@ def _noise(*responses: Array) -> float:
 
 
 def _delay_deviation(squares: Array, best: Array) -> Array:
-    """From the curvature of chi-square over the grid of delays around the best, s, (n,)."""
+    """Return the deviations of the delays, (n,) s, from the curvature of chi-square over the grid of delays."""
     motors, middle = np.arange(squares.shape[1]), best.clip(1, len(squares) - 2)
     curvature = squares[middle - 1, motors] + squares[middle + 1, motors] - 2.0 * squares[middle, motors]
     deviation: Array = _substep() * np.sqrt(2.0 / curvature)
@@ -183,7 +181,7 @@ def _delay_deviation(squares: Array, best: Array) -> Array:
 
 
 def known_motors(count: int, seed: int) -> MotorParameters:
-    """Random parameters over their whole range, every third motor without friction, every fifth without play."""
+    """Draw parameters over their whole range, every third motor without friction, every fifth without play."""
     rng = np.random.default_rng([seed, 1])
     lag, delay = rng.uniform(0.01, 0.1, count), 0.005 * rng.integers(0, 9, count)
     backlash, friction = np.deg2rad(rng.uniform(0.0, 0.8, count)), np.deg2rad(rng.uniform(0.0, 2.0, count))
@@ -195,7 +193,7 @@ def known_motors(count: int, seed: int) -> MotorParameters:
 def synthetic(
     robot: Robot, parameters: MotorParameters, signals: tuple[Array, Array], shape: tuple[int, int], seed: int
 ) -> list[Responses]:
-    """Responses of motors with these parameters, with encoder noise; `shape`: postures, repetitions."""
+    """Return simulated responses of motors with these parameters and encoder noise; `shape`: postures, repetitions."""
     rng = np.random.default_rng([seed, 2])
     sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)
     clean = [respond(robot, parameters, signal) for signal in signals]
@@ -206,7 +204,7 @@ def synthetic(
 
 
 def check_method(robot: Robot, postures: int, repetitions: int, seed: int) -> dict[str, Any]:
-    """The largest errors over as many motors as the robot has, absolute and in their standard deviations."""
+    """Fit simulated motors with known values; returns the largest errors, absolute and in standard deviations."""
     signals = fitted_signal(), held_out_signal(np.random.default_rng(seed))
     known = known_motors(len(robot.motors), seed)
     found = fit(robot, synthetic(robot, known, signals, (postures, repetitions), seed), signals)

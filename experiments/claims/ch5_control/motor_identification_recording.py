@@ -1,4 +1,4 @@
-"""Recordings of the PyBullet robot's motors: velocities [rad/s] in, tick by tick, encoder positions out."""
+"""Records the responses of the PyBullet robot's motors: velocities [rad/s] in, encoder positions out, every tick."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from mobee.robot.robot import Robot
 from services.robot_sim.kinematic import Backend, BackendUnavailable
 
 DT = 0.01  # s, a tick
-ROOM = np.deg2rad(14.0)  # rad, no signal goes farther from its start
+ROOM = np.deg2rad(14.0)  # rad, largest distance of a signal from its start
 SPEEDS = np.deg2rad([5.0, 10.0, 20.0, 40.0])  # rad/s, of the steps
-REACH = np.deg2rad(11.0)  # rad, that a random signal keeps to, its lag not counted
-PRELOAD = 60  # ticks at the beginning that take up the play in the positive direction; they are not fitted
+REACH = np.deg2rad(11.0)  # rad, bound of a random signal, without lag
+PRELOAD = 60  # ticks at the beginning that take up the play in the positive direction; not fitted
 
 TRAVEL = 250  # ticks to move to a posture
-RETURN = 60  # ticks to move back to where the signal started
+RETURN = 60  # ticks to move back to the start of a signal
 ARRIVED = np.deg2rad(1.0)  # rad
 SHARE = 0.4  # of the distance from home to a random posture of the whole range
 TRIES = 1000
@@ -34,7 +34,7 @@ ALL = slice(None)
 
 
 def fitted_signal() -> Array:
-    """Steps of four sizes and both signs, reversals without rest, slow ramps through zero; shape (ticks,)."""
+    """Return steps of four sizes and both signs, reversals without rest, slow ramps through zero; (ticks,) rad/s."""
     parts = [_preload()]
     for speed in SPEEDS:
         parts += [_hold(speed, 0.3), _hold(0.0, 0.3), _hold(-speed, 0.3), _hold(0.0, 0.3)]
@@ -47,7 +47,7 @@ def fitted_signal() -> Array:
 
 
 def held_out_signal(rng: np.random.Generator) -> Array:
-    """Random steps of random length, 4 s; not used in the fit."""
+    """Return random steps of random length, 4 s, (ticks,) rad/s; not used in the fit."""
     parts, position = [_preload()], 0.0
     while sum(map(len, parts)) * DT < 4.0:
         speed, duration = np.deg2rad(rng.uniform(-40.0, 40.0)), rng.uniform(0.05, 0.4)
@@ -69,9 +69,9 @@ def _hold(speed: float, duration: float) -> Array:
 
 
 def make_body(robot: Robot, seed: int) -> Backend:
-    """The robot with its default motors and nothing else in its world; raises BackendUnavailable where there is no PyBullet."""
+    """Return the simulated robot in an empty world; raises BackendUnavailable without PyBullet."""
     try:
-        from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which not every Python has
+        from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which is not available for every Python
     except ModuleNotFoundError as error:
         raise BackendUnavailable(f'identify needs the module {error.name!r}: pip install "mobee[sim]" on Python 3.11.') from error
     return BulletBackend(robot, World, MotorParameters(), seed, DT)
@@ -79,7 +79,7 @@ def make_body(robot: Robot, seed: int) -> Backend:
 
 @contextmanager
 def prints_to_stderr() -> Iterator[None]:
-    """PyBullet prints a line on standard output for every scene, from C; it goes to standard error while entered."""
+    """Redirect standard output to standard error: PyBullet prints a line for every scene, from C."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -92,16 +92,16 @@ def prints_to_stderr() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Responses:
-    """Encoders [rad] of one motor at the beginning of every tick: (postures, repetitions, ticks)."""
+    """Encoder readings [rad] of one motor at the beginning of every tick, (postures, repetitions, ticks)."""
 
     fitted: Array
     held_out: Array
 
 
 def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> Array:
-    """Home and random postures around it, rad, shape (count, n), in which the motor has its room and the robot touches nothing.
+    """Return home and random postures around it, (count, n) rad, in which the motor has ROOM and the robot touches nothing.
 
-    Raises InvalidValue if there are not so many.
+    Raises InvalidValue if too few are found.
     """
     robot = model.robot
     low, high = robot.limits.T
@@ -120,7 +120,7 @@ def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> 
 
 
 def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Array, Array], repetitions: int) -> Responses:
-    """Responses to both signals in each of the postures `at` (postures, n), several times."""
+    """Record responses to both signals in each of the postures `at` (postures, n) rad, several times."""
     shape = (len(at), repetitions)
     fitted, held_out = np.empty((*shape, len(signals[0]))), np.empty((*shape, len(signals[1])))
     k = 0  # ticks since the body was made: the noise of the encoders depends on it
@@ -135,7 +135,7 @@ def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Ar
 
 
 def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Array]) -> None:
-    """All in SI units; the file is there only when it is whole."""
+    """Write responses, postures and signals in SI units, whole or not at all."""
     unfinished = path.with_suffix(".part.npz")
     np.savez_compressed(
         unfinished, fitted=responses.fitted.astype(np.float32), held_out=responses.held_out.astype(np.float32), postures=at,
@@ -145,7 +145,7 @@ def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Arra
 
 
 def load(path: Path) -> tuple[Responses, tuple[Array, Array]]:
-    """The responses and the signals."""
+    """Read the responses and the signals."""
     with np.load(path) as file:
         responses = Responses(file["fitted"].astype(float), file["held_out"].astype(float))
         return responses, (file["fitted_signal"], file["held_out_signal"])
@@ -159,7 +159,7 @@ def _go(body: Backend, robot: Robot, posture: Array, k: int, ticks: int) -> int:
     error = np.abs(body.motors.encoders(k, DT) - posture)
     if error.max() > ARRIVED:
         worst = int(error.argmax())
-        raise InvalidValue(f"{robot.motors[worst]} is {np.rad2deg(error[worst]):.1f} deg from the posture to start in: something blocks it")
+        raise InvalidValue(f"{robot.motors[worst]} is {np.rad2deg(error[worst]):.1f} deg from the start posture: something blocks it")
     return k
 
 

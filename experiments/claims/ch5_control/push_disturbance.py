@@ -1,13 +1,13 @@
-"""Shove: a force from outside at the robot's hand, which MoBeE does not promise to withstand.
+"""Push disturbance: an external force at the robot's hand, against which MoBeE gives no guarantee.
 
-Claim: MoBeE protects the robot from itself, not from energy that comes from outside (thesis 5.2, footnote 4: Justin "can sense when there
-is too much energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: up to which force at the
-hand nothing touches, from where on solids touch, a constraint is violated or a motor is driven into its stop, and that the robot goes back
-where it was when it is let go.  Source: thesis 5.2, footnote 4.  Published: no numbers.  Run time: a minute.
+Claim: MoBeE protects the robot from itself, not from external energy (thesis 5.2, footnote 4: Justin "can sense when there is too much
+energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: the forces at the hand from which solids
+touch, a constraint is violated or a motor is driven into its stop, and whether the robot returns afterwards.  Source: thesis 5.2, footnote
+4.  Published: no numbers.  Run time: a minute.
 
-A shove is a force at the left hand for 0.4 s while the controller holds the posture.  It moves the joints by what J^T makes of it and the
-motors' inertia and friction (those of the torque modality); the controller feels only where the joints have gone.  With MoBeE off the
-same shove meets a robot that does not answer.
+A force acts at the left hand for 0.4 s while the controller holds the posture.  It moves the joints through J^T and the inertia and
+friction of the motors (those of the torque modality); the controller senses only the joint positions.  With MoBeE off, the same force
+acts on a robot that does not react.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MARKER = "left_palm"
 LAWS = ("default", "published_2014", "off")
 FORCES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # N
 QUICK_FORCES = FORCES[1::2]
-BEFORE, SHOVE, AFTER = 1.0, 0.4, 6.0  # s
+BEFORE, PUSH, AFTER = 1.0, 0.4, 6.0  # s
 DIRECTIONS = {  # root frame: x backwards, y right, z up
     "down-to-table": (0.0, 0.0, -1.0),
     "back-to-body": (1.0, 0.0, 0.0),
@@ -42,31 +42,31 @@ DIRECTIONS = {  # root frame: x backwards, y right, z up
     "up-to-face": (0.5, 0.4, 0.75),
     "outward": (0.0, -1.0, 0.0),
 }
-BACK = 5.0  # mm from where the hand was, after the shove
-GENTLE = 5.0  # N: up to here nothing may touch, with the default gains
+RETURNED = 5.0  # mm, allowed distance of the hand from its start after the push
+GENTLE = 5.0  # N: with the default gains nothing may touch up to this force
 
 PANELS = (("moved_mm", "the hand moved [mm]"), ("solid_mm", "deepest solid [mm]"), ("away_mm", "the hand stayed away [mm]"))
 
 
 @dataclass(frozen=True, slots=True)
-class Shoved(Row):
-    """The worst during and after a shove; the angle is negative inside."""
+class PushResult(Row):
+    """The worst measures during and after a push; the angle is negative inside."""
 
     law: str
     direction: str
     force: float  # N
-    moved_mm: float  # how far the hand went
+    moved_mm: float  # largest distance of the hand from its start
     solid_mm: float
-    beside_mm: float  # solids that do not count
+    beside_mm: float  # solid pairs that are not listed
     field_mm: float
     clause_deg: float
-    stop_deg_s: float  # fastest arrival at a hard stop
-    away_mm: float  # of the hand from where it was, at the end
+    stop_deg_s: float  # fastest impact at a hard stop
+    away_mm: float  # distance of the hand from its start, at the end
     pair: str  # of solids, the deepest
 
 
-class Shove:
-    """Moves the joints of a plant: inertia dv/dt = J^T f - friction v, as the motors give way in the torque modality."""
+class ExternalPush:
+    """Moves the joints of a plant: inertia dv/dt = J^T f - friction v, as motors yield in the torque modality."""
 
     def __init__(self, plant: OfflinePlant, force: Array, start: float, end: float) -> None:
         self._plant, self._force = plant, force
@@ -74,10 +74,10 @@ class Shove:
         self._velocity = np.zeros(len(plant.robot.motors))
 
     def __call__(self, tick: int) -> None:
-        """Ahead of a tick."""
+        """Move the joints before a tick."""
         plant = self._plant
         torque = plant.model.jacobian(plant.motors.q, MARKER)[:3].T @ self._force if tick in self._ticks else 0.0
-        # Exactly over one tick: the friction is stiff at 20 ms.
+        # The exact solution over one tick: at 20 ms the friction is stiff.
         decay = np.exp(-FRICTION / INERTIA * plant.dt)
         self._velocity = decay * self._velocity + (1.0 - decay) * torque / FRICTION
         if self._velocity.any():
@@ -85,37 +85,37 @@ class Shove:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Laws and directions."""
+    """Add laws and directions."""
     choices = tuple(DIRECTIONS)
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS), metavar="LAW", help=f"of {', '.join(LAWS)}")
     parser.add_argument("--directions", nargs="+", choices=choices, default=list(choices), metavar="WHERE", help=f"of {', '.join(choices)}")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every law, direction and force."""
+    """Return every law, direction and force."""
     return grid(law=arguments.laws, direction=arguments.directions, force=QUICK_FORCES if arguments.quick else FORCES)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """One shove."""
-    return shove(settings["law"], settings["direction"], settings["force"], seed).record()
+    """Push once and measure."""
+    return push_hand(settings["law"], settings["direction"], settings["force"], seed).record()
 
 
-def shove(law: str, direction: str, force: float, seed: int) -> Shoved:
-    """Hold home while the hand is shoved; law "off": the commanded velocity is 0 throughout."""
+def push_hand(law: str, direction: str, force: float, seed: int) -> PushResult:
+    """Hold home while the hand is pushed; law "off": the commanded velocity is always 0."""
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
         gains = replace(gains, weights=(("*", 0.0),))
     plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])
     push = force * np.array(DIRECTIONS[direction]) / np.linalg.norm(DIRECTIONS[direction])
     home = plant.robot.home
-    run = run_plant(plant, BEFORE + SHOVE + AFTER, Shove(plant, push, BEFORE, BEFORE + SHOVE))
+    run = run_plant(plant, BEFORE + PUSH + AFTER, ExternalPush(plant, push, BEFORE, BEFORE + PUSH))
     hand = icub_at_table().evaluate(run.q).position(MARKER)
     start = hand[round(BEFORE / plant.dt) - 1]
     away = np.linalg.norm(hand - start, axis=1)
     depths = deepest(icub_at_table(), run.q)
     inside = limit_violations(plant.robot, home[None])[0] < -AT_STOP
-    return Shoved(
+    return PushResult(
         law,
         direction,
         force,
@@ -131,47 +131,47 @@ def shove(law: str, direction: str, force: float, seed: int) -> Shoved:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """For each law and direction the least force at which something happened, None where nothing did up to the strongest."""
-    shoved = _shoved(found)
+    """Return for each law and direction the least force at which each event occurred; None if it did not occur."""
+    results = _results(found)
     table = {
-        law: {direction: _summary(mine) for direction in DIRECTIONS if (mine := _of(shoved, law, direction))}
+        law: {direction: _summary(mine) for direction in DIRECTIONS if (mine := _of(results, law, direction))}
         for law in LAWS
-        if any(one.law == law for one in shoved)
+        if any(one.law == law for one in results)
     }
-    judged = [one for one in shoved if one.law == "default" and one.force <= GENTLE]
-    passed = all(one.solid_mm == 0.0 and one.clause_deg <= 0.0 and one.away_mm <= BACK for one in judged)
+    judged = [one for one in results if one.law == "default" and one.force <= GENTLE]
+    passed = all(one.solid_mm == 0.0 and one.clause_deg <= 0.0 and one.away_mm <= RETURNED for one in judged)
     return {"passed": passed if judged else None, **table}  # the claim is about the default gains
 
 
-def _summary(shoved: Sequence[Shoved]) -> dict[str, Any]:
-    """Of one law and direction, by force."""
+def _summary(results: Sequence[PushResult]) -> dict[str, Any]:
+    """Summarise the pushes of one law and direction."""
     return {
-        "solids_touch_from_N": next((one.force for one in shoved if one.solid_mm > 0.0), None),
-        "constraint_violated_from_N": next((one.force for one in shoved if one.clause_deg > 0.0), None),
-        "motor_into_its_stop_from_N": next((one.force for one in shoved if one.stop_deg_s > 0.0), None),
-        "deepest_solid_mm": max(one.solid_mm for one in shoved),
-        "back_within_mm": max((one.away_mm for one in shoved if one.force <= GENTLE), default=0.0),
+        "solids_touch_from_N": next((one.force for one in results if one.solid_mm > 0.0), None),
+        "constraint_violated_from_N": next((one.force for one in results if one.clause_deg > 0.0), None),
+        "motor_into_its_stop_from_N": next((one.force for one in results if one.stop_deg_s > 0.0), None),
+        "deepest_solid_mm": max(one.solid_mm for one in results),
+        "back_within_mm": max((one.away_mm for one in results if one.force <= GENTLE), default=0.0),
     }
 
 
-def _shoved(found: Cells) -> list[Shoved]:
-    return [Shoved(**result.values) for result in found.values()]
+def _results(found: Cells) -> list[PushResult]:
+    return [PushResult(**result.values) for result in found.values()]
 
 
-def _of(shoved: Iterable[Shoved], law: str, direction: str) -> list[Shoved]:
-    return sorted((one for one in shoved if (one.law, one.direction) == (law, direction)), key=lambda one: one.force)
+def _of(results: Iterable[PushResult], law: str, direction: str) -> list[PushResult]:
+    return sorted((one for one in results if (one.law, one.direction) == (law, direction)), key=lambda one: one.force)
 
 
 def plot(found: Cells) -> Any:
-    """Distances and depths against the force, a column a direction."""
-    shoved = _shoved(found)
-    directions = [name for name in DIRECTIONS if any(one.direction == name for one in shoved)]
+    """Draw distances and depths against the force, a column for each direction."""
+    results = _results(found)
+    directions = [name for name in DIRECTIONS if any(one.direction == name for one in results)]
     drawing = new_figure(3.0 * len(directions), 7.0)
     panels = drawing.subplots(len(PANELS), len(directions), squeeze=False, sharex=True, sharey="row")
     for row, (quantity, label) in enumerate(PANELS):
         for axes, direction in zip(panels[row], directions, strict=True):
             for law, color in {**COLORS, "off": "0.5"}.items():
-                mine = _of(shoved, law, direction)
+                mine = _of(results, law, direction)
                 forces, values = [one.force for one in mine], [getattr(one, quantity) for one in mine]
                 axes.plot(forces, values, ".-", color=color, label=law if law != "off" else "no MoBeE")
             axes.grid(alpha=0.2)
@@ -189,7 +189,7 @@ def plot(found: Cells) -> Any:
 
 EXPERIMENT = Experiment(
     name="push-disturbance",
-    claim="MoBeE gives way to a shove and comes back, but energy from outside can drive it into contact",
+    claim="MoBeE yields to a push and returns, but external energy can drive it into contact",
     source="thesis 5.2, footnote 4",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),

@@ -1,13 +1,13 @@
-"""Settle: step responses, how long they last, whether they overshoot, and whether that depends on the control period.
+"""Step responses: settling time and overshoot, and whether they depend on the control period.
 
-Claim: at control periods of 1 to 20 ms alike, every motor alone and whole postures go where they are sent and stay there, with the
-default gains in three and six seconds at most (steps of 20 degrees alone, of up to half a range together), without overshoot worth
-the name.  Source: thesis 5.2 (the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of
-an arm took some 9.6 s, 18 000 in two days, three agents at once (thesis 7.3).
-Run time: a few minutes.
+Claim: at all control periods of 1 to 20 ms, single motors and whole postures reach their targets and stay there, with the default gains
+within three and six seconds (steps of 20 degrees alone, of up to half a range together), with at most 5 % overshoot.  Source: thesis 5.2
+(the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s, 18 000 in two
+days, three agents at once (thesis 7.3). Run time: a few minutes.
 
-Settling time: until the joint stays within 5 % of the step around where it comes to rest.  Error: how far that is from the attractor, as
-it must be where a limit or a constraint pushes.  Measured are the joints, not the encoders; the motors have lag, delay, play and noise.
+Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of that from the attractor, which is
+not zero where a limit or a constraint pushes.  Measured are the true joint positions, not the encoders; the motors have lag, delay, play
+and noise.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from mobee.simulation import OfflinePlant
 PERIODS = (1.0, 2.0, 5.0, 10.0, 20.0)  # ms
 QUICK_PERIODS = (10.0, 20.0)  # ms
 QUICK_MOTORS, QUICK_POSTURES = ("torso_pitch", "l_shoulder_roll", "l_elbow", "l_wrist_prosup"), 2
-OVERSHOOT, ALONE, TOGETHER = 0.05, 3.0, 6.0  # of the step; s, a motor and a posture: what is asked of the default gains
-POSTURE = "posture "  # how the name of a step of many motors begins
+MAX_OVERSHOOT, MAX_ALONE, MAX_TOGETHER = 0.05, 3.0, 6.0  # of the step; s, a motor and a posture: allowed with the default gains
+POSTURE = "posture "  # prefix of the name of a step of many motors
 
 SHOWN = QUICK_MOTORS
-SHARES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # % of a step, marked
-ASIDE = {False: 0.96, True: 1.04}  # the mark of a motor, and of a posture, stands at so many times its period
+SHARES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # % of a step, ticks of the plot
+ASIDE = {False: 0.96, True: 1.04}  # factors that separate the marks of motors and postures in the plot
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +58,12 @@ class Response(Row):
 
     @property
     def is_posture(self) -> bool:
-        """Whether many motors stepped together."""
+        """Whether the step is that of a posture."""
         return self.step.startswith(POSTURE)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Gains, periods, postures and motors."""
+    """Add gains, periods, postures and motors."""
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
     parser.add_argument("--periods", nargs="+", type=positive_number, default=list(PERIODS), metavar="MS", help="control periods in ms")
     parser.add_argument("--postures", type=positive_whole, default=10, metavar="N", help="steps of torso and arms together (default: 10)")
@@ -71,7 +71,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Every gain set, period and step; motors that the gain set never moves are left out.
+    """Return every gain set, period and step; motors that the gain set never moves are left out.
 
     Raises UnknownName, and InvalidValue for a period at which the law is not stable.
     """
@@ -87,7 +87,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
         steps = [motor for i, motor in enumerate(known) if weight[i] and (chosen is None or motor in chosen)]
         steps += [f"{POSTURE}{number}" for number in range(count)]
         for period in periods:
-            OfflinePlant(icub(), gains=Gains.named(gains), dt=period / 1e3)  # refuses an unstable period before anything is run
+            OfflinePlant(icub(), gains=Gains.named(gains), dt=period / 1e3)  # raises for an unstable period before anything is run
             for step in steps:
                 name = f"{gains}-{period:g}-{step.replace(' ', '-')}"
                 found.append(Condition(name, {"gains": gains, "period_ms": period, "step": step}, 1.0 / period))
@@ -95,7 +95,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """One step."""
+    """Run and measure one step."""
     step, gains = settings["step"], Gains.named(settings["gains"])
     if step.startswith(POSTURE):
         number = int(step.removeprefix(POSTURE))
@@ -108,7 +108,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _posture_step(gains: str, number: int, seed: int) -> tuple[Array, Array]:
-    """From the posture before, or home, to a posture; motors that the gain set never moves stay at home."""
+    """Return the previous posture, or home, and a posture; motors that the gain set never moves stay at home."""
     home, moving = icub().robot.home, Gains.named(gains).weight(icub().robot.motors) > 0
     before, after = (_posture(n, seed) if n >= 0 else home for n in (number - 1, number))
     return np.where(moving, before, home), np.where(moving, after, home)
@@ -120,7 +120,7 @@ def _posture(number: int, seed: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Median and worst of each gain set and period."""
+    """Return median and worst of each gain set and period."""
     responses = _responses(found)
     table: dict[str, Any] = {}
     for gains in GAINS:
@@ -134,7 +134,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _is_good(one: Response) -> bool:
-    return one.is_settled and one.overshoot <= OVERSHOOT and one.settling <= (TOGETHER if one.is_posture else ALONE)
+    return one.is_settled and one.overshoot <= MAX_OVERSHOOT and one.settling <= (MAX_TOGETHER if one.is_posture else MAX_ALONE)
 
 
 def _summary(responses: Sequence[Response]) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def _responses(found: Cells) -> list[Response]:
 
 
 def plot(found: Cells) -> Any:
-    """Settling time and overshoot against the control period, and the responses of some motors."""
+    """Draw settling time and overshoot against the control period, and the responses of some motors."""
     responses = _responses(found)
     drawing = new_figure(13.0, 4.2)
     time, overshoot, steps = drawing.subplots(1, 3)
@@ -212,7 +212,7 @@ def _single_steps(axes: Any, sets: Sequence[str]) -> None:
 
 EXPERIMENT = Experiment(
     name="step-response",
-    claim="motors alone and whole postures settle in seconds without overshoot, alike at control periods of 1 to 20 ms",
+    claim="single motors and whole postures settle in seconds without overshoot, at all control periods of 1 to 20 ms",
     source="thesis 5.2, eq. 5.7",
     notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),

@@ -106,7 +106,7 @@ def test_a_posture_that_is_not_reached_is_refused(monkeypatch):
     body = KinematicBackend(ICUB, mobee.World, MotorParameters(), seed=0)
     far = ICUB.home.copy()
     far[0] += 0.5
-    with pytest.raises(mobee.MobeeError, match="torso_yaw is 2.* deg from the posture"):
+    with pytest.raises(mobee.MobeeError, match="torso_yaw is 2.* deg from the start posture"):
         record(body, ICUB, 0, far[None], (np.zeros(3), np.zeros(3)), 1)
 
 
