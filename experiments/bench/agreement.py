@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.bench.collision_peers import CoalPeer
 from experiments.bench.mujoco_peer import MujocoPeer
 from experiments.bench.scenes import Scene
 from mobee.arrays import Array, Ints
@@ -170,6 +169,8 @@ def _fcl(scene: Scene) -> Detect:
 
 
 def _coal(scene: Scene) -> Detect:
+    from experiments.bench.collision_peers import CoalPeer  # raises NotInstalled without python-fcl
+
     peer = CoalPeer(scene.robot, scene.world.snapshot)
     return lambda pose: peer.touching(scene.q[pose])
 

@@ -101,15 +101,15 @@ def verdict(rows: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> str:
     """Format the measurements."""
     lines = [
-        "Right palm among 100 boxes: 5 mm, 5 degrees, no contact; torso and arm (10 motors).",
+        "Right palm among 100 boxes: 5 mm, 5 degrees, no contact; torso and arm move.",
         "Median / 95 % of a target; processor time of one core; times faster than CMA-ES:",
-        f"  {'':<29}{'targets':>7}{'reached':>9}{'evaluations':>14}{'ms':>14}{'times':>7}",
+        f"  {'':<29}{'targets':>7}{'reached':>8}{'evaluations':>14}{'ms':>14}{'times':>6}",
     ]
     for name, row in result["rows"].items():
         evaluations = f"{row['evaluations']:.0f} / {row['evaluations_95']:.0f}"
         ms = f"{_three_digits(row['ms'])} / {_three_digits(row['ms_95'])}"
-        counts = f"{row['targets']:>7}{100.0 * row['reached']:>7.1f} %{evaluations:>14}{ms:>14}"
-        lines.append(f"  {name:<29}{counts}{_three_digits(row['times_cma']):>7}")
+        counts = f"{row['targets']:>7}{100.0 * row['reached']:>6.1f} %{evaluations:>14}{ms:>14}"
+        lines.append(f"  {name:<29}{counts}{_three_digits(row['times_cma']):>6}")
     return verdicts.report_text(lines, result)
 
 

@@ -22,7 +22,6 @@ import numpy as np
 from experiments.bench import verdicts
 from experiments.bench.agreement import DEPTH_TOLERANCE, MIN_OVERLAP, Agreement, agreements
 from experiments.bench.calibration import Crew
-from experiments.bench.collision_peers import FclPairs, FclTrees
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.scenes import ICUB, MAKERS, MIXED, OBJECTS, PLAIN, Scene, boxes_world, upper_body, upper_body_poses, upper_body_scene
 from experiments.bench.timing import Contestant, cores_text, one_core, rates
@@ -149,6 +148,8 @@ def summarized(
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
     """Return all that is timed on the iCub, in the same world and the same poses."""
+    from experiments.bench.collision_peers import FclPairs, FclTrees  # raises NotInstalled without python-fcl
+
     scene = Scene(ICUB, robot, boxes_world(boxes), upper_body_poses(poses))
     model, rows = Model(robot, scene.world), list(scene.q)
     pairs, trees = FclPairs(robot, scene.world.snapshot), FclTrees(robot, scene.world.snapshot)
