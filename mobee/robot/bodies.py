@@ -1,4 +1,4 @@
-"""Combines the masses of a link into one body."""
+"""Masses and moments of inertia: one body for each link, conversions, plausibility."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.robot.robot import Body
 
-WATER = 1000.0  # kg/m^3
-ROUNDING = 1e-6  # of the largest moment of inertia
+WATER_DENSITY = 1000.0  # kg/m^3
+ROUNDING = 1e-6  # tolerance, relative to the largest moment of inertia
 
 
 def one_a_link(bodies: Iterable[Body]) -> tuple[Body, ...]:
-    """The same masses with one body for each link that has any, in the order of the links."""
+    """Return the masses merged into one body for each link, in the order of the links."""
     of: dict[int, list[Body]] = {}
     for body in bodies:
         of.setdefault(body.link, []).append(body)
@@ -31,30 +31,30 @@ def _merged(bodies: list[Body]) -> Body:
 
 
 def _spread(arm: Array) -> Array:
-    """The inertia (3, 3) of 1 kg at the end of an arm (3,) m (Steiner)."""
+    """Return the inertia (3, 3) of 1 kg at the end of an arm (3,) m (Steiner)."""
     spread: Array = arm @ arm * np.eye(3) - np.outer(arm, arm)
     return spread
 
 
 def ball_of_water(mass: float) -> Array:
-    """The inertia (3, 3) [kg m^2] of a ball of water of this mass [kg]: a stand-in where only the mass is known."""
-    radius = (3.0 * mass / (4.0 * np.pi * WATER)) ** (1.0 / 3.0)
+    """Return the inertia (3, 3) [kg m^2] of a ball of water of this mass [kg], for a body of which only the mass is known."""
+    radius = (3.0 * mass / (4.0 * np.pi * WATER_DENSITY)) ** (1.0 / 3.0)
     return np.diag(np.full(3, 0.4 * mass * radius**2))
 
 
 def from_six(values: Iterable[float]) -> Array:
-    """The inertia (3, 3) of ixx, ixy, ixz, iyy, iyz, izz."""
+    """Return the inertia (3, 3) from ixx, ixy, ixz, iyy, iyz, izz."""
     xx, xy, xz, yy, yz, zz = values
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def to_six(inertia: Array) -> list[float]:
-    """ixx, ixy, ixz, iyy, iyz, izz of an inertia (3, 3)."""
+    """Return ixx, ixy, ixz, iyy, iyz, izz of an inertia (3, 3)."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))]
 
 
 def can_be(inertia: Array) -> bool:
-    """Whether a solid thing can have this inertia (3, 3): no principal moment is negative or larger than the two others together."""
+    """Return whether a rigid body can have this inertia (3, 3): no principal moment is negative or above the sum of the other two."""
     moments = np.linalg.eigvalsh(inertia)
     slack = ROUNDING * float(np.abs(moments).max())
     return bool(moments[0] >= -slack and moments[2] <= moments[0] + moments[1] + slack)

@@ -16,15 +16,15 @@ MODEL = "iCubGazeboV2_5"
 LEGS = ("l_hip_pitch", "r_hip_pitch")
 PALM_FRAMES = ("l_hand_dh_frame", "r_hand_dh_frame")
 DROPPED = ("gazebo", "sensor")
-# A frame without inertia counts as 1 kg in PyBullet, so the palm frames get next to nothing.
-NEXT_TO_NOTHING = {
+# PyBullet takes a frame without inertia for 1 kg, so the palm frames get a negligible one.
+NEGLIGIBLE = {
     "mass": {"value": "1e-4"},
     "inertia": dict.fromkeys(("ixx", "iyy", "izz"), "1e-8") | dict.fromkeys(("ixy", "ixz", "iyz"), "0"),
 }
 
 
 def models_folder() -> Path:
-    """The folder `iCub` of the installed icub-models, which holds `robots` and `meshes`; raises MobeeError when it is missing."""
+    """Return the folder `iCub` of the installed icub-models, with `robots` and `meshes`; raises MobeeError if it is missing."""
     try:
         package = importlib.import_module("icub_models")
     except ModuleNotFoundError as error:
@@ -53,11 +53,11 @@ def write_upper_body_urdf(path: Path) -> Path:
     for link in root.iter("link"):
         if link.find("inertial") is None:
             inertial = ET.SubElement(link, "inertial")
-            for tag, attributes in NEXT_TO_NOTHING.items():
+            for tag, attributes in NEGLIGIBLE.items():
                 ET.SubElement(inertial, tag, attributes)
     for mesh in root.iter("mesh"):
         mesh.set("filename", mesh.attrib["filename"].replace("package://iCub", folder.as_posix()))
-    for axis in root.iter("axis"):  # given with six digits, of which PyBullet complains
+    for axis in root.iter("axis"):  # PyBullet warns of axes with six digits
         direction = np.array(axis.attrib["xyz"].split(), dtype=float)
         axis.set("xyz", numbers(direction / np.linalg.norm(direction)))
     path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
@@ -65,7 +65,7 @@ def write_upper_body_urdf(path: Path) -> Path:
 
 
 def _remove_subtree(root: ET.Element, joint_name: str) -> None:
-    """Remove a joint, its child link and all beyond."""
+    """Remove a joint, its child link and everything mounted on it."""
     joint = next(joint for joint in root.iter("joint") if joint.get("name") == joint_name)
     link = _end(joint, "child")
     root.remove(joint)
@@ -75,7 +75,7 @@ def _remove_subtree(root: ET.Element, joint_name: str) -> None:
 
 
 def _empty_frames(root: ET.Element) -> list[str]:
-    """Fixed joints whose child is an end of the tree without inertia, the palms' frames excepted."""
+    """Return fixed joints whose child is a leaf of the tree without inertia, except the palms' frames."""
     parents = {_end(joint, "parent") for joint in root.iter("joint")}
     heavy = {link.get("name") for link in root.iter("link") if link.find("inertial") is not None}
     return [

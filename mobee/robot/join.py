@@ -15,12 +15,12 @@ from mobee.robot.bodies import one_a_link
 from mobee.robot.pairs import joined_pairs, joined_untested
 from mobee.robot.robot import Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
 
-SEPARATOR = "_"  # part names are chunks of keys on the bus: a-z, 0-9 and _ only
+SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A robot, what its names begin with ("" leaves them as they are), and its root frame in the common one."""
+    """A robot, the prefix of its names ("" for none), and its root frame in the common one."""
 
     prefix: str
     robot: Robot
@@ -28,19 +28,19 @@ class Placed:
     rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3)
 
     def name(self, own: str) -> str:
-        """What a part, motor, joint, link, marker or shape of this robot is called in the joined one."""
+        """Return the name of a part, motor, joint, link, marker or shape of this robot in the joined one."""
         return f"{self.prefix}{SEPARATOR}{own}" if self.prefix else own
 
 
 def join_robots(
     robots: Mapping[str, Robot], places: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None, name: str | None = None
 ) -> Robot:
-    """One robot of several, each standing at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
+    """Join several robots into one, each at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
 
-    Names of parts, motors, joints, links, markers and shapes begin with the key and "_"; the key "" leaves them as they are.
-    Parts and motors follow each other in the order given.  The bases become one link, named after the first robot's.  Every solid
-    is tested against all solids of the other robots, every field against all fields; within a robot its own pairs stay.
-    Raises InvalidValue when two names are the same, when there is no robot or a place is no pose, UnknownName for a place of no robot.
+    Names of parts, motors, joints, links, markers and shapes get the key and "_" as a prefix; the key "" leaves them unchanged.
+    Parts and motors are in the order given. The bases become one link, with the name of the first. Every solid is tested against all
+    solids of the other robots, every field against all fields; within a robot its own pairs are kept.
+    Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place without a robot.
     """
     for key in places or {}:
         if key not in robots:
@@ -51,7 +51,7 @@ def join_robots(
 
 
 def join_placed(placed: Sequence[Placed], name: str) -> Robot:
-    """One robot of several; see join_robots."""
+    """Join several robots into one; see `join_robots`."""
     if not placed:
         raise InvalidValue("there is no robot to join. Give at least one.")
     joints = np.cumsum([0, *(len(one.robot.joints) for one in placed)]).tolist()
@@ -86,7 +86,7 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
 
 
 def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
-    """A robot with its new names and place, its links counted behind `joints` others, its motors behind `motors` of `all_motors`."""
+    """Return a robot with its new names and place; its links come after `joints` others, its motors after `motors` of `all_motors`."""
     robot, turn = one.robot, one.rotation
 
     def link(index: int) -> int:
@@ -142,7 +142,7 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
 
 
 def _check_names(bodies: Sequence[Robot]) -> None:
-    """Raise InvalidValue when two robots give two things of one kind the same name."""
+    """Raise InvalidValue if elements of one kind have equal names in two robots."""
     kinds = {
         "parts": [key for body in bodies for key in body.parts],
         "motors": [motor for body in bodies for motor in body.motors],
@@ -154,7 +154,7 @@ def _check_names(bodies: Sequence[Robot]) -> None:
     for kind, names in kinds.items():
         twice = [name for name, count in Counter(names).items() if count > 1]
         if twice:
-            raise InvalidValue(f"two {kind} of the joined robots are called {twice[0]!r}. Give each robot a name of its own")
+            raise InvalidValue(f"two {kind} of the joined robots have the name {twice[0]!r}. Give each robot its own name")
 
 
 def _pose(key: str, position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:

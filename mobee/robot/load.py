@@ -24,14 +24,20 @@ def load_robot(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Robot:
-    """A shipped robot by name (see shipped_robots), or the robot of a zero-position .xml or a .urdf file.
+    """Load a shipped robot by name (see `shipped_robots`), or the robot of a zero-position .xml or a .urdf file.
 
-    For URDF files only: `field` gives every solid a field that reaches so much farther, in [m] (none when left out);
-    `meshes` is "hull" (when left out) or "bounding", see UrdfOptions; `corners` is how many the hull of a mesh has at most (64 when
-    left out), or "all" for the exact hull; `srdf` is the SRDF file (when left out the one that is found, see docs/robots.md); `home`
-    names a <group_state> of it, or is "zero".
-    Raises UnknownName with the nearest shipped name, InvalidValue for an option that the file cannot have, or RobotFileError
-    with file, line, field and remedy.
+    Args:
+        name_or_path: a shipped name, or the path of a file.
+        field: URDF only: gives every solid a field that extends it by so many m; None: no fields.
+        meshes: URDF only: "hull" (the default) or "bounding", see `UrdfOptions`.
+        corners: URDF only: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
+        srdf: URDF only: the SRDF file; None: the one that is found, see docs/robots.md.
+        home: URDF only: a <group_state> of the SRDF, or "zero".
+
+    Raises:
+        UnknownName: with the nearest shipped name.
+        InvalidValue: for an option that is not valid for the file.
+        RobotFileError: with file, line, field and remedy.
     """
     path = find_file(name_or_path, ROBOTS, "robot")
     if path.suffix.lower() == ".urdf":
@@ -39,24 +45,24 @@ def load_robot(
     options = {"field": field, "meshes": meshes, "corners": corners, "srdf": srdf, "home": home}
     given = [name for name, value in options.items() if value is not None]
     if given:
-        raise InvalidValue(f"{given[0]}= is for .urdf files, and {path} is none: zero-position XML has tags for all of it. Leave it out.")
+        raise InvalidValue(f"{given[0]}= is for .urdf files only, and {path} is none: zero-position XML has tags for it. Leave it out.")
     return read_robot(path)
 
 
 def shipped_robots() -> tuple[str, ...]:
-    """Names of the robots that come with this library, sorted."""
+    """Return the names of the robots that come with this library, sorted."""
     return shipped(ROBOTS)
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
-    """The file that a shipped name or a path stands for; raises InvalidValue for what is neither."""
+    """Return the file of a shipped name or a path; raises InvalidValue, UnknownName or RobotFileError if there is none."""
     if not isinstance(name_or_path, str | Path):
         raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")
     path, given = Path(name_or_path), str(name_or_path)
     suffixes = ".xml or .urdf" if kind == "robot" else ".xml"
     if path.suffix.lower() == ".xacro":
         urdf = f"{path.stem.removesuffix('.urdf')}.urdf"
-        raise RobotFileError(f"{path}: xacro files are made into URDF first. Run: xacro {path.name} > {urdf}")
+        raise RobotFileError(f"{path}: a xacro file must be converted to URDF first. Run: xacro {path.name} > {urdf}")
     if path.suffix or path.name != given:
         if not is_file(path):
             raise RobotFileError(f"{path}: no such file. Give a path to a file ({suffixes}), or a name: {', '.join(shipped(folder))}.")
@@ -67,5 +73,5 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
 
 
 def shipped(folder: Path) -> tuple[str, ...]:
-    """Names of the .xml files of a folder, sorted."""
+    """Return the names of the .xml files of a folder, sorted."""
     return tuple(sorted(path.stem for path in folder.glob("*.xml")))

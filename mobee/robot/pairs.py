@@ -1,17 +1,17 @@
-"""Which shapes of a robot, or of several on one base, are tested against each other.
+"""The pairs of shapes of a robot, or of several on one base, that are tested for contacts.
 
-Solids and fields follow one rule; a pair is left out when
+Solids and fields follow one rule; a pair is excluded if
 - both shapes are on the same link, or their links are joined (below);
 - both are inside one subtree marked noSelfCollision (a hand: its fingers touch each other and the palm by design);
-- the file says so: <ignore first="link" second="link"/>;
+- the file excludes it: <ignore first="link" second="link"/>;
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
 Joined: a cluster is a group of joints, each within 5 cm of the one that carries it or of one beside it (shoulder, elbow and
-pro-supination, wrist, neck, torso), for a shape there fills the whole cluster. The link that carries a cluster and all links that
+pro-supination, wrist, neck, torso), since a shape there fills the whole cluster. The link that carries a cluster and all links that
 its joints move are joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with
 wrist and hand.
-So hands and forearms are tested against torso, head and the other arm, and only what overlaps in every pose is left out.
-With adjacency="listed" only what <ignore> tags name is left out, so that `write_xml` can keep the pairs of any robot.
+So hands and forearms are tested against torso, head and the other arm, and only pairs that overlap in every pose are excluded.
+With adjacency="listed" only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ import numpy as np
 from mobee.arrays import Ints
 from mobee.robot.robot import Joint, LinkPair, Robot, Shape
 
-CLUSTER = 0.05  # m between the points of joints that count as one place
-NAMED = 4  # joints of a cluster that a reason lists
+CLUSTER = 0.05  # m: joints whose points are nearer than this belong together
+MAX_NAMED = 4  # joints of a cluster that a reason lists
 
 
 def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
-    """Pairs of links that meet in one cluster of joints, and why each pair is one."""
+    """Return the pairs of links that meet in one cluster of joints, with the reason for each pair."""
     clusters = _clusters(joints)
     joined: dict[LinkPair, str] = {}
     for cluster in clusters:
-        names = ", ".join(joints[k].name for k in cluster[:NAMED]) + (", ..." if len(cluster) > NAMED else "")
+        names = ", ".join(joints[k].name for k in cluster[:MAX_NAMED]) + (", ..." if len(cluster) > MAX_NAMED else "")
         reason = f"joined at {names}" if len(cluster) == 1 else f"joined at a cluster of joints ({names})"
         links = sorted({joints[k].parent for k in cluster} | {k + 1 for k in cluster})
         for pair in combinations(links, 2):
@@ -42,7 +42,7 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
 
 
 def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
-    """The joints of each cluster, in order; a joint belongs to that of the first joint near it that carries it or is beside it."""
+    """Return the joints of each cluster; a joint joins the cluster of the first joint near it that carries it or is beside it."""
     points = np.array([joint.point for joint in joints]).reshape(-1, 3)
     beside: dict[int, list[int]] = {}  # link -> joints that it carries
     home: list[int] = []  # joint -> its cluster
@@ -61,7 +61,7 @@ def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
 
 
 def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPair, str]:
-    """Pairs of links of one noSelfCollision subtree; `subtree`: for each link the one that it is in, -1 for none; `names` of subtrees."""
+    """Return pairs of links of one noSelfCollision subtree; `subtree`: that of each link, -1 for none; `names`: of the subtrees."""
     members: dict[int, list[int]] = {}
     for link, start in enumerate(subtree):
         if start != -1:
@@ -74,9 +74,9 @@ def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPai
 
 
 def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair], own: bool = False) -> Ints:
-    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`.
+    """Return the tested pairs of shapes of one role, (p, 2), indices into `shapes`.
 
-    `untested`: link pairs left out; `own`: fields of one part are tested against each other too.
+    `untested`: excluded pairs of links; `own`: fields of one part are tested against each other too.
     """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
@@ -94,20 +94,20 @@ def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPa
 
 
 def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
-    """The pairs of links that these pairs of shapes belong to."""
+    """Return the pairs of links of these pairs of shapes."""
     link = np.array([shape.link for shape in shapes], dtype=np.intp)
     return {frozenset(pair) for some in pairs for pair in set(map(tuple, link[some].reshape(-1, 2).tolist()))}
 
 
 def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
-    """All pairs, each with the reason of the first rule that leaves it out."""
+    """Return all excluded pairs, each with the reason of the first rule that excludes it."""
     return {pair: reason for rule in reversed(rules) for pair, reason in rule.items()}
 
 
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
-    """Pairs of shapes of one role, shape (p, 2), sorted: each robot's own, and all of different robots unless both stand on the base.
+    """Return pairs of shapes of one role, (p, 2), sorted: each robot's own, and all of different robots unless both are on the base.
 
-    `starts`: where the shapes of each robot begin.
+    `starts`: the index of each robot's first shape.
     """
     pairs = [
         (body.solid_pairs if role == "solid" else body.field_pairs).reshape(-1, 2) + start
@@ -127,6 +127,6 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 
 
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
-    """Each robot's own reasons, but for its base, which has become everybody's, where that is tested now."""
+    """Return the reasons of all robots, without those for pairs with the common base that are tested now."""
     tested = link_pairs(shapes, *pairs)
     return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

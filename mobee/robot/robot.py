@@ -1,4 +1,4 @@
-"""What a robot is: a tree of joints in zero-position form, parts, motors, markers, constraints, shapes."""
+"""The description of a robot: a tree of joints in zero-position form, parts, motors, markers, constraints, shapes, masses."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """One axis of the tree, given in the root frame with every joint at zero (thesis 2.3.1).
+    """An axis of the tree, given in the root frame with every joint at zero (thesis 2.3.1).
 
-    `parent` is the index of the link it is mounted on; joint j moves link j + 1.
+    `parent` is the index of the link that it is mounted on; joint j moves link j + 1.
     """
 
     name: str
@@ -35,11 +35,11 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motor:
-    """What is commanded: drives one or more joints affinely, joint = scale * motor + offset.
+    """A motor, which commands set: it drives one or more joints affinely, joint = scale * motor + offset.
 
-    A motor counts in rad. That of a prismatic joint counts in m where the scale is 1, as from a URDF: read m for rad and N for N m then.
-    `zone_ends_at_home`: where home lies so near to a limit that the limit zone of the control law reaches over it, the zone ends at
-    home instead, so that the robot rests there; a motor of a URDF does this, one of a zero-position file is pushed away from home.
+    Its unit is rad. For a motor that drives a prismatic joint with scale 1, as from a URDF, it is m: read m for rad and N for N m.
+    `zone_ends_at_home`: where the limit zone of the control law would include home, the zone ends at home instead, so that the robot
+    rests there. It is set for motors of a URDF; a motor of a zero-position file is pushed away from such a home.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Motor:
     limits: Array  # (2,) rad
     home: float  # rad
     joints: tuple[tuple[int, float, float], ...]  # (joint index, scale, offset in the joint's unit)
-    max_velocity: float = np.deg2rad(60.0)  # rad/s, the last resort that the gate enforces
+    max_velocity: float = np.deg2rad(60.0)  # rad/s, enforced by the safety gate
     max_acceleration: float = np.deg2rad(600.0)  # rad/s^2
     max_torque: float = 40.0  # N m
     zone_ends_at_home: bool = False
@@ -55,7 +55,7 @@ class Motor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A body part with its own device: a contiguous slice of the robot's motor vector."""
+    """A body part: motors that are commanded together, a contiguous slice of the robot's motor vector."""
 
     name: str
     motors: tuple[str, ...]
@@ -63,7 +63,7 @@ class Part:
 
     @property
     def slice(self) -> slice:
-        """Where the part's motors lie in the robot's motor vector."""
+        """The part's motors as a slice of the robot's motor vector."""
         return slice(self.start, self.start + len(self.motors))
 
     def __len__(self) -> int:
@@ -72,10 +72,10 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """A volume on a link: a solid, or a larger field that only generates force.
+    """A volume on a link: a solid, or a larger field, which only generates force.
 
-    `size`: sphere (r,); capsule and cylinder (r, height along local z; a capsule's caps lie beyond it);
-    box (x, y, z) full edges; convex (): the hull of `vertices`; all in m.  `position`, `rotation`: root frame, zero pose.
+    `size` in m: sphere (r,); capsule and cylinder (r, height along local z; a capsule's caps are beyond it); box (x, y, z), full
+    edges; convex (): the hull of `vertices`. `position`, `rotation`: in the root frame, at zero pose.
     """
 
     name: str
@@ -107,15 +107,14 @@ class Body:
     link: int
     mass: float  # kg
     centre: Array  # (3,) m, centre of mass
-    inertia: Array | None = None  # (3, 3) kg m^2 about the centre, along the root frame's axes; None where nobody knows it
+    inertia: Array | None = None  # (3, 3) kg m^2 about the centre, along the root frame's axes; None where it is unknown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clause:
-    """A disjunction of linear rows over the motor vector, each satisfied when a.q + b > 0 (thesis 5.14-5.17).
+    """A condition on motor positions: at least one of its linear rows holds, a.q + b > 0 (thesis eqs. 5.14 to 5.17).
 
-    The clauses of a robot form a conjunction.  Radians: the degrees of the file are converted so that
-    a is unchanged and b is in rad.
+    All clauses of a robot should hold. Of the file's degrees only b is converted to rad; a is unchanged.
     """
 
     part: str
@@ -125,16 +124,26 @@ class Clause:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A kinematic tree with everything the model, the controller and the agents need to know of it.
+    """A kinematic tree with everything that the model, the controller and the agents need.
 
-    `field_pairs` and `solid_pairs` are (p, 2) indices into `shapes`: what is tested against each other.
-    `base_shapes` marks shapes that are never tested against world objects (they stand on them).  `untested` says of every two
-    links that are never tested against each other why, `where` from which file and line a thing was read: ("joint", its name).
-    `bodies` holds at most one a link, in the order of the links; () where the file says nothing of masses.
+    Attributes:
+        name: of the robot.
+        links: their names; link 0 is the fixed base.
+        joints: joint j moves link j + 1.
+        motor_table: the motors, in the order of q.
+        parts: by name. `part(name)` does the same and raises UnknownName with the nearest name.
+        markers: by name; see `marker(name)`.
+        shapes: solids and fields of all links.
+        clauses: conditions on motor positions, all of which should hold.
+        field_pairs, solid_pairs: (p, 2) indices into `shapes`: the pairs that are tested for contacts.
+        base_shapes: indices of shapes that are never tested against world objects, since they stand on them.
+        untested: for every pair of links that is never tested, the reason.
+        where: file and line of every element, as {("joint", name): "file:line"}.
+        bodies: masses, at most one for each link, in the order of the links; () where the file names none.
     """
 
     name: str
-    links: tuple[str, ...]  # link 0 is the fixed base
+    links: tuple[str, ...]
     joints: tuple[Joint, ...]
     motor_table: tuple[Motor, ...]
     parts: dict[str, Part]
@@ -150,22 +159,22 @@ class Robot:
 
     @cached_property
     def motors(self) -> tuple[str, ...]:
-        """Motor names in the order of every q in this library."""
+        """Names of the motors, in the order of every q in this library."""
         return tuple(m.name for m in self.motor_table)
 
     @cached_property
     def limits(self) -> Array:
-        """Motor limits, shape (n, 2), in [rad], or [m] of a prismatic joint; read-only."""
+        """Motor limits, (n, 2) rad, or m for a prismatic joint; read-only."""
         return _fixed(np.array([m.limits for m in self.motor_table]))
 
     @cached_property
     def home(self) -> Array:
-        """Motor positions at home, shape (n,), in [rad], or [m] of a prismatic joint; read-only."""
+        """Motor positions at home, (n,) rad, or m for a prismatic joint; read-only."""
         return _fixed(np.array([m.home for m in self.motor_table]))
 
     @cached_property
     def coupling(self) -> tuple[Array, Array]:
-        """Joint positions (rad or m) as coupling @ q + offset: shapes (joints, n) and (joints,); read-only."""
+        """Matrix (joints, n) and offset (joints,) with joint positions [rad or m] = matrix @ q + offset; read-only."""
         matrix = np.zeros((len(self.joints), len(self.motor_table)))
         offset = np.zeros(len(self.joints))
         for column, motor in enumerate(self.motor_table):
@@ -175,26 +184,26 @@ class Robot:
         return _fixed(matrix), _fixed(offset)
 
     def part(self, name: str) -> Part:
-        """The part of that name; raises UnknownName with the nearest one."""
+        """Return the part of that name; raises UnknownName with the nearest name."""
         if name not in self.parts:
             raise UnknownName("part", name, self.parts)
         return self.parts[name]
 
     def motor_index(self, name: str) -> int:
-        """Where a motor stands in q; raises UnknownName with the nearest one."""
+        """Return the index of a motor in q; raises UnknownName with the nearest name."""
         if name not in self.motors:
             raise UnknownName("motor", name, self.motors)
         return self.motors.index(name)
 
     def marker(self, name: str) -> Marker:
-        """The marker of that name; raises UnknownName with the nearest one."""
+        """Return the marker of that name; raises UnknownName with the nearest name."""
         if name not in self.markers:
             raise UnknownName("marker", name, self.markers)
         return self.markers[name]
 
 
 def _fixed(array: Array) -> Array:
-    """The array, which is shared from now on."""
+    """Make an array read-only, since it will be shared."""
     array.flags.writeable = False
     return array
 

@@ -45,7 +45,7 @@ PHRASES = {
     "robots/includes_itself.xml": "the file includes itself",
     "robots/includes_nothing.xml": "'nowhere.xml' is no file",
     "robots/includes_with_capitals.xml": "'Left' cannot begin the name of a part",
-    "robots/includes_without_a_name.xml": "of the joined robots are called 'arm'",
+    "robots/includes_without_a_name.xml": "of the joined robots have the name 'arm'",
     "robots/joint_axis_missing.xml": "<joint> x y z: the direction has no length",
     "robots/joint_axis_tiny.xml": "<joint> x y z: the direction has no length",
     "robots/joint_axis_zero.xml": "<joint> x y z: the direction has no length",

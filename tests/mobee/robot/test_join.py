@@ -89,7 +89,7 @@ def test_clauses_concern_the_motors_they_concerned_alone() -> None:
 
 def test_equal_names_are_refused() -> None:
     inner = join_robots({"b": KATANA})
-    with pytest.raises(InvalidValue, match="two parts of the joined robots are called 'a_b_arm'"):
+    with pytest.raises(InvalidValue, match="two parts of the joined robots have the name 'a_b_arm'"):
         join_robots({"a": inner, "a_b": KATANA})
 
 

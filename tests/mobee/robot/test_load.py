@@ -50,7 +50,7 @@ def test_a_urdf_is_loaded_by_its_path_with_its_options(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("option", [{"field": 0.03}, {"meshes": "hull"}, {"srdf": "x.srdf"}])
 def test_options_of_a_urdf_are_refused_for_other_files(option: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValue, match=f"{next(iter(option))}= is for .urdf files, and .*katana.xml is none.*Leave it out"):
+    with pytest.raises(InvalidValue, match=f"{next(iter(option))}= is for .urdf files only, and .*katana.xml is none.*Leave it out"):
         load_robot("katana", **option)
 
 
@@ -64,7 +64,7 @@ def test_unknown_values_of_options_are_refused(tmp_path: Path) -> None:
 
 def test_xacro_is_refused_with_the_command_that_makes_a_urdf_of_it(tmp_path: Path) -> None:
     with pytest.raises(
-        RobotFileError, match="mine.urdf.xacro: xacro files are made into URDF first. Run: xacro mine.urdf.xacro > mine.urdf"
+        RobotFileError, match="mine.urdf.xacro: a xacro file must be converted to URDF first. Run: xacro mine.urdf.xacro > mine.urdf"
     ):
         load_robot(tmp_path / "mine.urdf.xacro")
 

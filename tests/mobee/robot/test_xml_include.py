@@ -84,7 +84,7 @@ def test_the_same_file_may_stand_in_two_places(tmp_path: Path) -> None:
         (f'<robot file="{"x" * 5000}"/>', "is no file"),
         ("<robot/>", "<robot> file: is required and missing"),
         ('<robot file="arm.xml" name="My Arm"/>', "<robot> name: 'My Arm' cannot begin the name of a part"),
-        ('<robot file="arm.xml"/>', "<robot> name: two parts of the joined robots are called 'arm'"),
+        ('<robot file="arm.xml"/>', "<robot> name: two parts of the joined robots have the name 'arm'"),
         ('<robot file="both.xml"/>', "<robot> file: the file includes itself (both.xml -> both.xml)"),
         ('<bodypart name="b"><robot file="arm.xml"/></bodypart>', "<robot> position in the file: this tag cannot stand here"),
         ('<robot name="b" file="arm.xml"><marker name="m"/></robot>', "<marker> position in the file: nothing stands inside <robot>"),
