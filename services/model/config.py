@@ -8,13 +8,13 @@ from services.common.config import WorldConfig
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The model's settings; objects of its world that have the role target are left to be perceived."""
+    """The model's settings; objects of its world with the role target are not loaded, vision perceives them."""
 
     gains: Literal["default", "published_2014"] = "published_2014"
     """Which set shapes the constraint forces; the controller must use the same."""
     propagate: Literal["tree", "part"] = "tree"
-    """How far down the body a contact is felt."""
+    """Motors on which a contact acts: all between the body's root and the contact, or those of the touched part only."""
     contact_forces: bool = True
-    """False: contacts are reported but exert no force, as a control experiment."""
+    """False: contacts are published but exert no force, for control experiments."""
     terms: list[str] = []
-    """Those of the controller: it is told the contacts, on which they may depend."""
+    """User-defined terms of the controller; if there are any, contacts are published with the forces, because terms may depend on them."""

@@ -1,4 +1,4 @@
-"""Runs the model: once a tick, from the newest state of every part to the forces that constrain them."""
+"""Runs the model: once per tick, from the newest state of every part to the constraint forces."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
 from services.common.worlds import TABLE
 from services.model.config import Config
-from services.model.world import WorldDesk
+from services.model.world import WorldServer
 
 
 class ModelNode:
-    """Assembles q, evaluates, publishes."""
+    """Assembles q from the parts, evaluates the model, publishes forces, poses and contacts."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
@@ -39,19 +39,19 @@ class ModelNode:
                 self._model.world.remove(name)
         self._track = self._model.track()
         self._gains = Gains.named(config.gains)
-        self._tells_contacts = bool(config.terms) or needs_contacts()
+        self._publishes_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
-        self._desk = WorldDesk(service, self._model)
+        self._world = WorldServer(service, self._model)
         bus = service.bus
         self._forces = bus.publisher(Forces, "model")
         self._participant = Participant(service)
         self._pose = bus.publisher(Pose)
         self._contacts = bus.publisher(Contacts)
         self._targets = bus.publisher(Targets)
-        self._reaches: dict[str, Reach] = {}  # of the parts that reach now
+        self._reaches: dict[str, Reach] = {}  # of the parts that are reaching
         self._reaching: tuple[str, ...] | None = None  # their markers
         self._last_k = -1
-        self._known: tuple[bytes, tuple[str, ...]] = b"", ()  # contacts of the tick before; what follows is said of them
+        self._last_contacts: tuple[bytes, tuple[str, ...]] = b"", ()  # of the last tick; the next three are computed from them
         self._touching: dict[str, list[str]] = {}  # world objects by part
         self._touches_table = False
         self._kinds: set[str] = set()
@@ -64,10 +64,10 @@ class ModelNode:
         for part in robot.parts:
             service.on_newest(Reach, partial(self._note_reach, part), part)
         service.on_tick(self._tick)
-        constraint_forces(self._desk.pose, self._gains, config.propagate)  # what is built once is built before the robot moves
+        constraint_forces(self._world.pose, self._gains, config.propagate)  # fills caches before the robot moves
 
     def _new_run(self) -> None:
-        self._desk.forget()
+        self._world.forget()
         self._forget_reaches()
         self._last_k = -1
 
@@ -80,9 +80,9 @@ class ModelNode:
         self._reaching = None
 
     def _note_reach(self, part: str, reach: Reach) -> None:
-        """Hands that reach do not feel the targets."""
+        """Targets exert no force on links that are reaching."""
         if reach.marker not in self._robot.markers:
-            self._service.bus.reject("value", f"a reach of {part} with {reach.marker!r}: this robot has no such marker")
+            self._service.bus.reject("value", f"a reach of {part} with the marker {reach.marker!r}, which this robot does not have")
             return
         if reach.phase == "reaching":
             self._reaches[part] = reach
@@ -92,27 +92,27 @@ class ModelNode:
 
     def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
-        self._desk.expire(tick.t)
+        self._world.expire(tick.t)
         self._q = np.array(tick.q)
-        pose = self._desk.pose = self._track.evaluate(self._q, self._reaching)
+        pose = self._world.pose = self._track.evaluate(self._q, self._reaching)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         self._note_contacts(pose)
         if self._reaches:
-            self._targets.put(re_k=tick.k, positions=self._desk.positions({reach.object for reach in self._reaches.values()}))
+            self._targets.put(re_k=tick.k, positions=self._world.positions({reach.object for reach in self._reaches.values()}))
         self._forces.put(
             re_k=tick.k,
             terms={name: forces[name].tolist() for name in published_terms()},
             part_age={part: tick.t - status.t for part, status in tick.parts.items()},
             touched=self._touching,
-            contacts=[_item(contact) for contact in pose.contacts] if self._tells_contacts else None,
+            contacts=[_item(contact) for contact in pose.contacts] if self._publishes_contacts else None,
         )
         self._time.add(1e3 * (time.perf_counter() - begin))
         self._participant.done(tick.k, implied=tick.k > 0 and bool(self._service.alive.get("controller")))
-        self._tell_viewers(tick.k, pose)
+        self._publish_for_viewers(tick.k, pose)
         self._count(tick.k)
 
-    def _tell_viewers(self, k: int, pose: ModelPose) -> None:
-        """What is dear to make is made only if somebody listens; in lockstep not here, for the forces leave when this handler ends."""
+    def _publish_for_viewers(self, k: int, pose: ModelPose) -> None:
+        """Publish pose and contacts if there are subscribers; in lockstep after this handler, which first sends the forces."""
         if self._pose.heard or self._contacts.heard:
             if self._service.locked:
                 self._service.inbox.put(partial(self._publish_pose, k, pose))
@@ -132,11 +132,11 @@ class ModelNode:
             self._contacts.put(re_k=k, contacts=[_item(contact) for contact in pose.contacts])
 
     def _note_contacts(self, pose: ModelPose) -> None:
-        """What touches what; most ticks it is the same as in the tick before."""
+        """Find which objects the parts touch, if the contacts are not those of the last tick."""
         table = pose.table
         contacts = table.numbers.tobytes(), table.objects
-        if contacts != self._known:
-            self._known = contacts
+        if contacts != self._last_contacts:
+            self._last_contacts = contacts
             self._touching = {part: list(names) for part, names in touched(pose).items() if names}
             self._touches_table = any(TABLE in names for names in self._touching.values())
             self._kinds = {KINDS[kind] for kind in table.kind.tolist()}

@@ -1,4 +1,4 @@
-"""Edits the model's world, by calls and by messages of the locator."""
+"""Edits the model's world, by calls of clients and by messages of vision."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from services.common.service import CallRefused, Service
 DONE = Done(v=VERSION)
 
 
-class WorldDesk:
-    """Serves the world of a model on the bus."""
+class WorldServer:
+    """Answers calls that edit the world of a model, and adds objects that vision perceives."""
 
     def __init__(self, service: Service, model: Model) -> None:
         self._service, self._model = service, model
-        self.pose = model.evaluate(model.robot.home)  # the newest, for what is attached to a link
-        self._expiry: dict[str, int] = {}  # of what only perception put there, ns of the bus clock
-        self._presenter = ""  # the service whose target is there
+        self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
+        self._expiry: dict[str, int] = {}  # of objects that vision added, ns of the bus clock
+        self._presenter = ""  # service that presents the target
         service.on_alive(self._note_alive)
         service.on_each(WorldObject, self._perceive)
         service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._add(w, r)))
@@ -43,18 +43,18 @@ class WorldDesk:
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
 
     def expire(self, t: int) -> None:
-        """Forget what was perceived and not seen again in time; t in ns of the bus clock."""
+        """Remove perceived objects that were not seen again in time; t in ns of the bus clock."""
         for name in [name for name, until in self._expiry.items() if until < t]:
             self._remove(self._model.world, name)
-            self._service.bus.event("info", "expired", f"{name} was not seen again in time")
+            self._service.bus.event("info", "expired", f"{name} was removed: it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
-        """Where those of the objects are that are known, in m in the root frame."""
+        """Positions of those named objects that are in the world, m, root frame."""
         known = self._model.world.objects
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 
     def forget(self) -> None:
-        """A new run: what was perceived in the last one is not known any more."""
+        """A new run: remove the perceived objects of the last one."""
         for name in list(self._expiry):
             self._remove(self._model.world, name)
 
@@ -80,28 +80,28 @@ class WorldDesk:
         if request.name == TARGET:
             self._require_presenter(request.who)
         self._put(world, request)
-        self._expiry.pop(request.name, None)  # whoever added it removes it
+        self._expiry.pop(request.name, None)  # the client that added it removes it
 
     def _require_presenter(self, who: str) -> None:
-        """Two who reach at a time would each move the other's target."""
+        """Refuse a second service that presents a target: both would move the same object."""
         other = self._presenter
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
             raise InvalidValue(
-                f"{TARGET!r} is there for {other}, and one at a time can present a target: {who} can when {other} has ended. "
+                f"{other} presents {TARGET!r}, and only one service at a time can: {who} can after {other} has ended. "
                 "A scenario can have one agent with targets."
             )
         self._presenter = who
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
-        """A target goes with who presented it."""
+        """Remove the target when the service that presents it has ended."""
         if not up and who == self._presenter and not self._service.alive.get(who) and TARGET in self._model.world.objects:
             self._remove(self._model.world, TARGET)
-            self._service.bus.event("info", "target_gone", f"{TARGET} is taken away: {who}, who presented it, is gone")
+            self._service.bus.event("info", "target_gone", f"{TARGET} was removed: {who}, which presented it, has ended")
 
     def _attach(self, world: World, request: Attach) -> None:
         world.follow(self.pose)
         world.attach(request.name, request.link)
-        self._expiry.pop(request.name, None)  # what is in a hand may be hidden from the eyes
+        self._expiry.pop(request.name, None)  # an object in a hand may be hidden from the eyes
 
     def _detach(self, world: World, name: str) -> None:
         world.follow(self.pose)
@@ -122,7 +122,7 @@ class WorldDesk:
         shape = _shape(seen.geometry)
         valid_shape(seen.name, shape)
         valid_position(seen.name, seen.position)
-        if known is not None:  # nothing is removed for what cannot be added
+        if known is not None:  # after the checks: an invalid object replaces nothing
             world.remove(seen.name)
         world.add(seen.name, shape, position=seen.position, rotation=rotation, role=seen.role)
 
@@ -151,7 +151,7 @@ class WorldDesk:
 
 
 def _shape(given: Geometry) -> geometry.Geometry:
-    """The library's shape, which checks the number of sizes that the message leaves open."""
+    """The library's shape; raises InvalidValue for a wrong number of sizes."""
     expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[given.kind]
     if len(given.size) != expected:
         raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
@@ -165,7 +165,7 @@ def _geometry(thing: Thing) -> Geometry:
 
 
 def _rotation(quaternion: list[float]) -> Array:
-    """The matrix (3, 3) of a quaternion wxyz that may need normalising, but not inventing."""
+    """The matrix (3, 3) of a quaternion wxyz; raises InvalidValue if its length is far from 1."""
     if not 0.5 < np.linalg.norm(quaternion) < 2.0:
         raise InvalidValue(f"quaternion {quaternion}: must be of length 1")
     return matrix_from_quaternion(np.array(quaternion))

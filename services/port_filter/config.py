@@ -22,15 +22,15 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     participants: list[str] = []
     """Lockstep: clients whose answers every tick waits for."""
     contacts: Literal["solid", "field", "both"] = "both"
-    """Kinds of contact that call the reflex: bodies, or the larger volumes around them."""
+    """Kinds of contact that start the reflex: of bodies, or of the larger volumes around them."""
     tolerance: Annotated[float, Meta(ge=0)] = math.radians(1.0)
-    """By how much a motor limit or a clause may be exceeded, rad."""
+    """Tolerance of motor limits and clauses, rad."""
     history: Annotated[float, Meta(gt=0, le=3600)] = _SETTINGS.history
-    """How long poses are remembered, s."""
+    """Time for which poses are recorded, s."""
     confirm: Seconds = _SETTINGS.confirm
     """How long a violation must last before it counts, s; 0: the first one counts, as in the original."""
     release: Seconds = _SETTINGS.release
-    """How long it must be away before it is over, s."""
+    """Time without a violation after which it is over, s."""
     brake: Annotated[float, Meta(ge=0.05, le=60)] = _SETTINGS.brake
     """How long the robot brakes before it is rewound, s; the safety gate refuses to reverse it in full motion."""
     dead_time: Seconds = _SETTINGS.dead_time
@@ -44,6 +44,6 @@ class Config(WorldConfig, frozen=True, kw_only=True):
 
     @property
     def reflex(self) -> ReflexSettings:
-        """The part of it that is the reflex's."""
+        """The settings of the reflex."""
         names = ("history", "confirm", "release", "brake", "dead_time", "pace", "must_be_clear")
         return ReflexSettings(**{name: getattr(self, name) for name in names})

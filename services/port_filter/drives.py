@@ -18,18 +18,18 @@ from services.common.service import CallRefused, Service
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """A client, as long as its token lives."""
+    """A client, as long as its liveliness token exists."""
 
     who: str
     instance: str
 
 
-class DriveDesk:
-    """Passes drive calls on, unless the clients are cut off; robot_sim's epochs are the clients' too."""
+class DriveServer:
+    """Forwards drive calls to robot_sim, unless the reflex is active; the clients use robot_sim's epochs."""
 
-    def __init__(self, service: Service, twin: Service, robot: Robot, why_cut: Callable[[], str], on_arm: Callable[[], None]) -> None:
-        """`why_cut`: why no client may drive now, "" when they may; `on_arm` is called when a client has got control of a part."""
-        self._service, self._twin, self._why_cut, self._on_arm = service, twin, why_cut, on_arm
+    def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:
+        """`refusal` returns why no client may drive now, or ""; `on_arm` is called when a client has armed a part."""
+        self._service, self._twin, self._refusal, self._on_arm = service, twin, refusal, on_arm
         self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         twin.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
@@ -38,14 +38,14 @@ class DriveDesk:
         twin.on_alive(self._note_alive)
 
     def forget(self) -> None:
-        """A new run: nobody owns anything."""
+        """A new run: no part has an owner."""
         self._owners = dict.fromkeys(self._owners)
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
-    def rest(self, part: str) -> None:
-        """Have robot_sim hold the part: its owner must arm it again; without an owner anybody may take it.
+    def hold(self, part: str) -> None:
+        """Let robot_sim hold the part: its owner must arm it again; without an owner any client may take it.
 
-        One that is dead need not be waited for: it comes back in hold, owned by nobody.
+        If robot_sim is gone, nothing is done: it starts again in hold, without owners.
         """
         if not self._service.alive.get("robot_sim"):
             return
@@ -62,8 +62,8 @@ class DriveDesk:
         self._refuse_while_cut(part)
         owner = self._owners[part]
         if owner is not None and owner.instance != request.instance and owner.instance in self._twin.alive.get(owner.who, ()):
-            raise CallRefused("owned", f"{part} belongs to {owner.who}, which lives; it must release the part first")
-        with _passed_on():
+            raise CallRefused("owned", f"{part} belongs to {owner.who}, which is running and must release it first")
+        with _forwarded():
             taken = self._service.call(keys.drive(part, "take"), Take, Taken, instance=self._service.instance)
         self._owners[part], self.epochs[part] = Owner(request.who, request.instance), taken.epoch
         return taken
@@ -76,19 +76,19 @@ class DriveDesk:
         if verb == "arm":
             self._refuse_while_cut(part)
             if owner.instance not in self._twin.alive.get(owner.who, ()):
-                raise CallRefused("no_token", f"{part}: alive/{owner.who}/{owner.instance} is not there; declare it, then arm")
+                raise CallRefused("no_token", f"{part}: no liveliness token alive/{owner.who}/{owner.instance}: declare it, then arm")
         if verb == "release":
             self._owners[part] = None
-        if self._why_cut():
-            return Driven(v=request.v, gate="hold")  # which is what it looks like; the reflex keeps the drive
-        with _passed_on():
+        if self._refusal():
+            return Driven(v=request.v, gate="hold")  # as the clients see it; the reflex keeps the drive
+        with _forwarded():
             driven = self._call(part, verb)
         if driven.gate == "armed":
             self._on_arm()
         return driven
 
     def _refuse_while_cut(self, part: str) -> None:
-        if why := self._why_cut():
+        if why := self._refusal():
             raise CallRefused("reflex", f"{part}: {why}")
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
@@ -96,21 +96,21 @@ class DriveDesk:
             if not up and owner == Owner(who, instance):
                 self._service.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
                 self._owners[part] = None
-                if not self._why_cut():
-                    self.rest(part)
+                if not self._refusal():
+                    self.hold(part)
 
 
 @contextmanager
-def _passed_on() -> Iterator[None]:
-    """What robot_sim refuses is refused to the client, in the same words."""
+def _forwarded() -> Iterator[None]:
+    """Refuse to the client what robot_sim refuses, with the same code and text."""
     try:
         yield
     except CallFailed as failed:
         raise CallRefused(failed.code, str(failed)) from None
 
 
-class HandThrough:
-    """Between the robot (`service`) and its filtered twin."""
+class Forwarder:
+    """Forwards metadata, emergency stops and the router's token between the robot (`service`) and its filtered twin."""
 
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:
         self._service, self._twin = service, twin
@@ -139,7 +139,7 @@ class HandThrough:
             self._up.put(set=stop.set, source=stop.source, reason=stop.reason)
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
-        """A client without a router ends itself: in its namespace too there must be one."""
+        """Declare the router in the clients' namespace: a client without a router ends."""
         if who != "router":
             return
         if up:

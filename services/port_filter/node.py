@@ -14,22 +14,22 @@ from mobee.robot.robot import Robot
 from services.common.lockstep import Barrier, Participant
 from services.common.service import CallRefused, Service
 from services.port_filter.config import Config
-from services.port_filter.drives import DriveDesk, HandThrough
-from services.port_filter.passage import Passage
+from services.port_filter.drives import DriveServer, Forwarder
+from services.port_filter.passage import Streams
 
 
 class Switch:
-    """The model, the watch over its poses and the reflex of one run."""
+    """The model, the check of its poses for violations, and the reflex of one run."""
 
     def __init__(self, config: Config, robot: Robot) -> None:
         self._settings = config.reflex
         model = Model(robot, config.load_world())
         for name, item in list(model.world.objects.items()):
-            if item.role == "target":  # left to be perceived, as in the model's own process
+            if item.role == "target":  # vision perceives targets, as in the model service
                 model.world.remove(name)
         self._track, self._watch = model.track(), Watch(robot, KINDS if config.contacts == "both" else (config.contacts,), config.tolerance)
         self._max_velocity = np.array([motor.max_velocity for motor in robot.motor_table])
-        self._track.evaluate(robot.home).contacts  # noqa: B018  # what is built once is built before the robot moves
+        self._track.evaluate(robot.home).contacts  # noqa: B018  # fills caches before the robot moves
         self.q: Array = robot.home
         self.violations: tuple[Violation, ...] = ()
         self.restart(0.01)
@@ -46,7 +46,7 @@ class Switch:
 
 
 class FilterNode:
-    """`service` is a client of the robot, `twin` is the robot of the filter's clients."""
+    """The port filter: `service` is a client of the robot, `twin` plays the robot for the filter's clients."""
 
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
         self._service, self._twin, self._config, self._robot = service, twin, config, robot
@@ -54,9 +54,9 @@ class FilterNode:
         self._driven: list[str] = []  # parts that the reflex moves
         self._last_k = -1
         self._complete = self._is_waiting = False  # lockstep: every client that takes part has come; some have not answered yet
-        self._drives = DriveDesk(service, twin, robot, self._why_cut, self._mark)
-        self._passage = Passage(service, twin, robot, self._drives.epochs, self._why_cut, self._mark)
-        HandThrough(service, twin, robot)
+        self._drives = DriveServer(service, twin, robot, self._refusal, self._mark)
+        self._streams = Streams(service, twin, robot, self._drives.epochs, self._refusal, self._mark)
+        Forwarder(service, twin, robot)
         self._clock = twin.bus.publisher(Clock)
         self._participant = Participant(service)
         twin.keeps_step = twin.locked
@@ -66,7 +66,7 @@ class FilterNode:
             lambda who, why: twin.bus.event("warning", "not_repeatable", f"{who} {why}"),
             patience=config.patience,
         )
-        self._passage.answered = lambda commands, answer: self._barrier.note(commands.src, commands.re_k, answer)
+        self._streams.answered = lambda commands, answer: self._barrier.note(commands.src, commands.re_k, answer)
         self._declare()
 
     def _declare(self) -> None:
@@ -77,38 +77,39 @@ class FilterNode:
         service.on_run(self._new_run)
         service.on_tick(self._tick)
 
-    def _why_cut(self) -> str:
-        """Why the clients are cut off; "" when they are not."""
+    def _refusal(self) -> str:
+        """Why clients may not command now; "" if they may."""
         state = self._switch.reflex.state
         if state == "stuck":
-            return f"{self._where()}, and there is no way back; if this pose is safe, say so by the call rpc/waypoint of any part"
-        return "" if state == "forward" else f"the reflex takes the robot back ({state}); wait, then arm again"
+            accept = "if this pose is safe, accept it by the call rpc/waypoint of any part"
+            return f"{self._where()}, and there is no way back; {accept}"
+        return "" if state == "forward" else f"the reflex moves the robot back ({state}): wait, then arm again"
 
     def _tick(self, tick: Tick) -> None:
         twin = self._twin.bus
         if self._is_waiting:
             return  # robot_sim went on without its late participants
         twin.run, twin.k, twin.t, twin.dt = tick.run, tick.k, tick.t, tick.dt
-        self._passage.note(tick)
+        self._streams.note(tick)
         if tick.mode != "paused" and tick.k != self._last_k:
             if self._last_k < 0:
                 self._switch.restart(tick.dt * 1e-9)
             self._last_k = tick.k
-            self._judge(tick)
-        self._passage.pass_on(tick)
+            self._check_pose(tick)
+        self._streams.publish(tick)
         if self._clock.heard:
             self._clock.put(dt=tick.dt, mode=tick.mode, rate=tick.rate)
         if tick.mode == "lock":
             self._answer(tick.k)
 
-    def _judge(self, tick: Tick) -> None:
-        if self._passage.is_stale:
+    def _check_pose(self, tick: Tick) -> None:
+        if self._streams.is_stale:
             return
         reflex = self._switch.reflex
         before = reflex.state
-        if before not in ("forward", "stuck") and not all(map(self._passage.obeys, self._driven)):
+        if before not in ("forward", "stuck") and not all(map(self._streams.follows, self._driven)):
             reflex.give_up()
-        target = self._switch.tick(self._passage.q())
+        target = self._switch.tick(self._streams.q())
         if before == "forward" and reflex.state != "forward":
             self._cut_off()
         if before != "stuck" and reflex.state == "stuck":
@@ -122,25 +123,26 @@ class FilterNode:
         for part in self._driven:
             where = self._robot.part(part).slice
             reference = target[where].clip(self._robot.limits[where, 0], self._robot.limits[where, 1]).tolist()
-            self._passage.commands[part].put(self._drives.epochs[part], k, "position" if moving else "hold", reference, self._config.ttl)
+            self._streams.commands[part].put(self._drives.epochs[part], k, "position" if moving else "hold", reference, self._config.ttl)
 
     def _cut_off(self) -> None:
-        self._driven = [part for part in self._robot.parts if self._passage.obeys(part)]
-        self._passage.forget_moves()
+        self._driven = [part for part in self._robot.parts if self._streams.follows(part)]
+        self._streams.forget_moves()
         if self._driven:
-            self._tell("warning", "reflex", f"{self._where()}: clients are cut off, {', '.join(self._driven)} go back the way they came")
+            driven = ", ".join(self._driven)
+            self._report("warning", "reflex", f"{self._where()}: clients' commands are refused, {driven} move back along their path")
         else:
-            self._switch.reflex.give_up()  # nobody drives the robot, so there is nothing to rewind
+            self._switch.reflex.give_up()  # no part is driven, so there is no motion to undo
 
     def _hand_back(self) -> None:
-        self._rest()
+        self._end_recovery()
         recovery = self._switch.reflex.recovery
         if recovery is not None:
             where = "the robot stays where it was held" if recovery.outcome == "stuck" else f"was undone to the {recovery.outcome}"
-            self._tell(
+            self._report(
                 "warning",
                 "motion_failed",
-                f"the motion failed and {where}; arm to go on",
+                f"the motion failed and {where}; arm to continue",
                 deepest=recovery.deepest,
                 ticks=float(recovery.ticks),
                 again=float(recovery.again),
@@ -148,16 +150,16 @@ class FilterNode:
             )
 
     def _get_stuck(self) -> None:
-        self._rest()
-        self._tell("error", "stuck", self._why_cut())
+        self._end_recovery()
+        self._report("error", "stuck", self._refusal())
 
-    def _rest(self) -> None:
+    def _end_recovery(self) -> None:
         for part in self._driven:
-            self._drives.rest(part)
+            self._drives.hold(part)
         self._driven = []
 
     def _where(self) -> str:
-        """What is wrong, in a few words."""
+        """The worst violation, in a few words."""
         recovery = self._switch.reflex.recovery
         worst = next(iter(self._switch.violations or (recovery.cause if recovery else ())), None)
         if worst is None:
@@ -165,19 +167,19 @@ class FilterNode:
         size = f"{1e3 * worst.depth:.0f} mm deep" if worst.kind == "contact" else f"by {np.rad2deg(worst.depth):.1f} degrees"
         return f"{worst.kind} {worst.what} {size}"
 
-    def _tell(self, level: str, code: str, text: str, **values: float) -> None:
+    def _report(self, level: str, code: str, text: str, **values: float) -> None:
         for bus in (self._service.bus, self._twin.bus):
             bus.event(level, code, text, **values)
 
     def _mark(self) -> None:
-        """A client has got control of a part, or a move of it begins: what it does from now on can be undone to here."""
+        """Mark the pose to which later motions can be undone: a client has armed a part, or begins a move."""
         self._switch.reflex.mark()
 
     def _waypoint(self, request: Empty, key: str) -> Done:
         reflex = self._switch.reflex
         if reflex.state == "stuck":
             reflex.accept(self._switch.q, self._switch.violations)
-            self._tell("info", "accepted", f"{request.who} answers for the pose as it is")
+            self._report("info", "accepted", f"{request.who} accepted the present pose as safe")
         elif reflex.state != "forward":
             raise CallRefused("reflex", f"no waypoint while the reflex is in control ({reflex.state})")
         elif not reflex.mark():
@@ -194,7 +196,7 @@ class FilterNode:
             self._participant.done(k, ok=not late)
 
     def _new_run(self) -> None:
-        self._passage.forget()
+        self._streams.forget()
         self._drives.forget()
         self._barrier.begin()
         self._driven, self._last_k, self._complete = [], -1, False

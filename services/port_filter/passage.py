@@ -14,15 +14,15 @@ from mobee.robot.robot import Robot
 from services.common.bus import Bus
 from services.common.service import Service
 
-REST = 0.1  # s for which a reference has stayed the same before it is said to rest
+REST_TIME = 0.1  # s; a reference that has not changed for so long is at rest
 
 
-class Moves:
-    """Watches the commands of one part."""
+class MoveDetector:
+    """Detects when a client begins a position move of one part: its reference leaves rest."""
 
     def __init__(self) -> None:
-        self._reference: list[float] | None = None  # of position commands; None: the part was commanded otherwise, or not at all
-        self._since = 0  # ns, when the reference became what it is
+        self._reference: list[float] | None = None  # of position commands; None: there was none, or another mode
+        self._since = 0  # ns, time of the last change of the reference
         self._moving = False
 
     def begins(self, command: Command, t: int) -> bool:
@@ -31,92 +31,92 @@ class Moves:
             self._reference, self._moving = None, False
             return False
         if command.ref == self._reference:
-            self._moving = self._moving and t - self._since < REST * 1e9
+            self._moving = self._moving and t - self._since < REST_TIME * 1e9
             return False
         begins = not self._moving
         self._reference, self._since, self._moving = command.ref, t, True
         return begins
 
     def forget(self) -> None:
-        """The part is out of the client's hands."""
+        """The client does not control the part any more."""
         self._reference, self._moving = None, False
 
 
-REMEMBERED = 1000  # commands under way, at most
+MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
-class Stream:
-    """One stream with one numbering, and which number of the client's is behind each."""
+class CommandStream:
+    """Commands of one part to robot_sim, from a client or from the reflex, numbered together; remembers the client's numbers."""
 
     def __init__(self, bus: Bus, part: str) -> None:
         self._stream = bus.publisher(Command, part)
         self._seq = 0
-        self._theirs: OrderedDict[int, int] = OrderedDict()
+        self._client_seq: OrderedDict[int, int] = OrderedDict()
 
     def forward(self, command: Command) -> None:
-        """Pass a client's command on."""
-        self._theirs[self._seq] = command.seq
-        if len(self._theirs) > REMEMBERED:
-            self._theirs.popitem(last=False)
+        """Forward a client's command."""
+        self._client_seq[self._seq] = command.seq
+        if len(self._client_seq) > MAX_REMEMBERED:
+            self._client_seq.popitem(last=False)
         self.put(command.epoch, command.re_k, command.mode, command.ref, command.ttl)
 
     def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
-        """Command the part."""
+        """Publish a command."""
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1
 
-    def theirs(self, seq: int) -> int:
-        """The client's number of what robot_sim knows as `seq`; -1 when it was none of the client's."""
-        return self._theirs.get(seq, -1)
+    def client_seq(self, seq: int) -> int:
+        """The client's number of the command with number `seq` at robot_sim; -1 if it was not a client's."""
+        return self._client_seq.get(seq, -1)
 
 
-STALE = 100_000_000  # ns: a part whose state is older cannot be judged
+MAX_STATE_AGE = 100_000_000  # ns; a pose with an older state of a part is not checked
 
 
-class Passage:
-    """The streams of all parts."""
+class Streams:
+    """The streams of all parts between robot_sim and the clients."""
 
     def __init__(
-        self, service: Service, twin: Service, robot: Robot, epochs: dict[str, int], why_cut: Callable[[], str], mark: Callable[[], object]
+        self, service: Service, twin: Service, robot: Robot, epochs: dict[str, int], refusal: Callable[[], str], mark: Callable[[], object]
     ) -> None:
-        """`epochs`: the drive epoch of each part; `why_cut` as for DriveDesk; `mark` is called when a position move begins."""
+        """`epochs`: the drive epoch of each part; `refusal` as for DriveDesk; `mark` is called when a position move begins."""
         self._service, self._twin, self._robot = service, twin, robot
-        self._epochs, self._why_cut, self._mark = epochs, why_cut, mark
+        self._epochs, self._refusal, self._mark = epochs, refusal, mark
         self._parts: dict[str, PartStatus] = {}
         self._q: Array = robot.home
         self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
         self.is_stale = False  # the states are too old to be judged, so that no command may follow them
-        self.commands = {part: Stream(service.bus, part) for part in robot.parts}
-        self._moves = {part: Moves() for part in robot.parts}
+        self.commands = {part: CommandStream(service.bus, part) for part in robot.parts}
+        self._moves = {part: MoveDetector() for part in robot.parts}
         self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
         self._streams = {part: twin.bus.publisher(State, part) for part in robot.parts}
         self._tick = twin.bus.publisher(Tick)
-        twin.on_newest(Commands, self._down_all)
+        twin.on_newest(Commands, self._take_commands)
         for part in robot.parts:
-            twin.on_newest(Command, partial(self._down, part), part)
-            service.on_newest(State, partial(self._up, part), part)
+            twin.on_newest(Command, partial(self._take_command, part), part)
+            service.on_newest(State, partial(self._publish_state, part), part)
 
     def note(self, tick: Tick) -> None:
         """A tick begins, with the body as it is."""
         self._parts, self._q = tick.parts, np.array(tick.q)
-        self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > STALE
+        self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > MAX_STATE_AGE
 
-    def pass_on(self, tick: Tick) -> None:
-        """Tell the clients of it."""
-        parts = {part: self._as_told(part, state) for part, state in tick.parts.items()}
+    def publish(self, tick: Tick) -> None:
+        """Publish the tick to the clients."""
+        parts = {part: self._for_clients(part, state) for part, state in tick.parts.items()}
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
     def q(self) -> Array:
         """Motor positions as the encoders say, (n,) rad."""
         return self._q
 
-    def obeys(self, part: str) -> bool:
-        """Whether robot_sim does with the part what this filter commands, as of the newest tick."""
+    def follows(self, part: str) -> bool:
+        """Whether the part follows this filter's commands, by the newest tick."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 
     def forget_moves(self) -> None:
-        """The clients are cut off: what they command next is a new motion."""
+        """The clients lose control: their next commands are a new motion."""
         for moves in self._moves.values():
             moves.forget()
 
@@ -127,13 +127,13 @@ class Passage:
         self._newest = dict.fromkeys(self._newest, (0, -1))
         self.forget_moves()
 
-    def _down(self, part: str, command: Command) -> None:
+    def _take_command(self, part: str, command: Command) -> None:
         """A client's command."""
         epoch, seq = self._newest[part]
-        if why := self._why_cut():
+        if why := self._refusal():
             self._twin.bus.reject("reflex", f"{part}: {why}")
         elif self.is_stale:
-            self._twin.bus.reject("stale", f"{part}: the robot's states are too old to be judged")
+            self._twin.bus.reject("stale", f"{part}: the robot's states are too old to check the pose")
         elif command.epoch != self._epochs[part]:
             self._twin.bus.reject("epoch", f"{part}: epoch {command.epoch}, in force is {self._epochs[part]}")
         elif command.epoch == epoch and command.seq <= seq:
@@ -144,40 +144,40 @@ class Passage:
                 self._mark()
             self.commands[part].forward(command)
 
-    def _down_all(self, commands: Commands) -> None:
+    def _take_commands(self, commands: Commands) -> None:
         """A client's commands to several parts."""
         for part, order in commands.parts.items():
             if part not in self._robot.parts:
-                self._twin.bus.reject("part", f"Commands to {part}: this robot has {', '.join(self._robot.parts)}")
+                self._twin.bus.reject("part", f"Commands to the part {part}; this robot has {', '.join(self._robot.parts)}")
                 continue
             fields = {name: getattr(commands, name) for name in ("v", "run", "src", "seq", "k", "t", "tw", "re_k", "ttl")}
             one = Command(**fields, epoch=order.epoch, mode=order.mode, ref=commands.ref[self._robot.parts[part].slice])
-            self._down(part, one)
+            self._take_command(part, one)
         if commands.answer is not None:
             self.answered(commands, commands.answer)
 
-    def _up(self, part: str, state: State) -> None:
-        """The robot's state, as the client's own robot would be in."""
+    def _publish_state(self, part: str, state: State) -> None:
+        """Publish the robot's state, as the clients should see it."""
         self._twin.bus.run = self._service.bus.run
-        told = self._as_told(part, state)
+        shown = self._for_clients(part, state)
         self._streams[part].put(
             k=state.k,
             t=state.t,
             q=state.q,
             dq=state.dq,
             tau=state.tau,
-            mode=told.mode,
-            gate=told.gate,
-            faults=told.faults,
-            epoch=told.epoch,
-            cmd_seq=told.cmd_seq,
-            cmd_age=told.cmd_age,
+            mode=shown.mode,
+            gate=shown.gate,
+            faults=shown.faults,
+            epoch=shown.epoch,
+            cmd_seq=shown.cmd_seq,
+            cmd_age=shown.cmd_age,
         )
 
-    def _as_told(self, part: str, state: State | PartStatus) -> PartStatus:
-        """How a client sees the part: while it is cut off, in hold."""
-        is_cut = state.gate == "armed" and bool(self._why_cut())
-        seq = -1 if is_cut else self.commands[part].theirs(state.cmd_seq)
+    def _for_clients(self, part: str, state: State | PartStatus) -> PartStatus:
+        """The status of a part as the clients should see it: in hold while the reflex is active."""
+        is_cut = state.gate == "armed" and bool(self._refusal())
+        seq = -1 if is_cut else self.commands[part].client_seq(state.cmd_seq)
         return PartStatus(
             k=state.k,
             t=state.t,

@@ -26,19 +26,19 @@ BORDER_INSET = 0.5  # px: the centres of border pixels lie half a pixel inside t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """A ball as one eye sees it, in the camera's frame: columns right, rows down, depth forward."""
+    """A ball in one picture, in the camera's frame: x right, y down, z forward."""
 
     direction: Array  # (3,) unit vector to the ball's centre
     half_angle: float  # rad, of the cone that touches the ball
     arc: float  # how much of the outline is seen, 0..1
 
     def distance(self, radius: float) -> float:
-        """How far away a ball of this radius [m] is, by its size, in m."""
+        """Distance [m] of a ball of this radius [m], by its size in the picture."""
         return radius / math.sin(self.half_angle)
 
 
 def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
-    """Every round red thing in a picture (height, width, 3) of bytes red, green, blue; the largest first.
+    """Find every round red object in a picture (height, width, 3) of bytes red, green, blue; the largest first.
 
     A sphere's outline is an ellipse that is not centred on its centre, but its rays form a circular cone about the
     ray to its centre: the cone is fitted, so perspective leaves no bias.  Points hidden by something are trimmed.
@@ -89,7 +89,7 @@ def _rays(points: Array, intrinsics: Array) -> Array:
 
 
 def _fit(rays: Array, focal: float) -> Sighting | None:
-    """The cone through most of the border, None if that is not what a ball looks like."""
+    """Fit a cone to the border; None if the border is not that of a ball."""
     keep = np.ones(len(rays), dtype=bool)
     for _ in range(FIT_ROUNDS):
         direction, half_angle = _cone(rays[keep])
@@ -112,7 +112,7 @@ def _cone(rays: Array) -> tuple[Array, float]:
 
 
 def _arc(rays: Array, direction: Array) -> float:
-    """Which share of the sectors around the axis holds a ray."""
+    """Share of the sectors around the axis that contain a ray."""
     side = np.cross(direction, (0.0, 1.0, 0.0))
     up = np.cross(direction, side)
     around = np.arctan2(rays @ up, rays @ side)
@@ -121,9 +121,9 @@ def _arc(rays: Array, direction: Array) -> float:
 
 Frame = tuple[Array, Array]  # optical centre (3,) m; rotation (3, 3), columns right, down, forward; root frame
 
-MAX_GAP = 0.015  # m between the two rays: more is not the same thing seen twice
-MAX_SIZE_ERROR = 0.2  # of the distance, between what size and what parallax say
-REACH = (0.08, 1.5)  # m, from an eye
+MAX_GAP = 0.015  # m between the two rays; larger gaps are of two different objects
+MAX_SIZE_ERROR = 0.2  # relative difference of the distances by size and by parallax
+DISTANCES = (0.08, 1.5)  # m, from an eye
 RAY_ERROR = 0.003  # rad, standard deviation: a third of a pixel, and the encoders' noise along neck and torso
 
 
@@ -137,13 +137,13 @@ class Fix:
 
 
 def locate(left: Sequence[Sighting], right: Sequence[Sighting], frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """The pair of sightings that agrees best about where a ball of this radius [m] is; None when no pair does."""
+    """The position by the two sightings that agree best on a ball of this radius [m]; None if no pair agrees."""
     fixes = [fix for a in left for b in right if (fix := triangulate(a, b, frames, radius)) is not None]
     return min(fixes, key=lambda fix: fix.gap, default=None)
 
 
 def triangulate(left: Sighting, right: Sighting, frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """Where two sightings place the ball; None if their rays pass each other, or the size contradicts the distance."""
+    """The ball's position by two sightings; None if their rays do not meet, or the size contradicts the distance."""
     origins = np.array([frame[0] for frame in frames])
     rays = np.array([frame[1] @ seen.direction for frame, seen in zip(frames, (left, right), strict=True)])
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]  # (2, 3, 3): what a ray says nothing about is along it
@@ -156,7 +156,7 @@ def triangulate(left: Sighting, right: Sighting, frames: tuple[Frame, Frame], ra
     misses = np.linalg.norm(np.einsum("eij,ej->ei", across, offsets), axis=1)
     by_size = np.array([left.distance(radius), right.distance(radius)])
     ahead = np.einsum("ei,ei->e", rays, offsets) > 0.0
-    near_enough = (distances > REACH[0]) & (distances < REACH[1])
+    near_enough = (distances > DISTANCES[0]) & (distances < DISTANCES[1])
     if not (ahead & near_enough).all() or misses.sum() > MAX_GAP or (np.abs(by_size / distances - 1.0) > MAX_SIZE_ERROR).any():
         return None
     information = np.einsum("eij,e->ij", across, 1.0 / (RAY_ERROR * distances) ** 2)

@@ -20,7 +20,7 @@ BALL = "ball"
 
 
 class VisionNode:
-    """Waits for both pictures and both cameras of one tick; reads nothing else of the robot."""
+    """Locates the ball when both pictures and both cameras of a tick are there; reads no other stream of the robot."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
@@ -31,14 +31,14 @@ class VisionNode:
         self._mark()
         service.mark, service.describe = self._mark, self._describe
         service.on_run(self._forget)
-        service.on_clock(lambda clock: None)  # the service keeps the run's id
+        service.on_clock(lambda clock: None)  # for the id of the run
         for eye in keys.EYES:
             service.on_newest(Camera, self._take_camera, eye)
             service.on_newest(Image, self._take_image, eye)
 
     def _take_camera(self, camera: Camera) -> None:
         self._cameras[camera.eye] = camera
-        self._look()
+        self._try_locate()
 
     def _take_image(self, image: Image) -> None:
         if len(image.data) != image.width * image.height * 3:
@@ -47,10 +47,10 @@ class VisionNode:
             )
             return
         self._images[image.eye] = image
-        self._look()
+        self._try_locate()
 
-    def _look(self) -> None:
-        """Locate the ball, once all four messages of a tick are here."""
+    def _try_locate(self) -> None:
+        """Locate the ball, once all four messages of a tick are there."""
         parts: list[Image | Camera] = [*self._images.values(), *self._cameras.values()]
         if len(parts) < 2 * len(keys.EYES) or len({part.k_capture for part in parts}) > 1:
             return

@@ -121,7 +121,7 @@ def test_the_target_is_taken_away_when_who_presented_it_is_gone(reacher: Reacher
 
 def test_a_second_who_presents_a_target_is_told_to_wait(reacher: Reacher) -> None:
     reacher.present()
-    with pytest.raises(CallFailed, match="agent_right_arm can when agent_left_arm has ended. A scenario can have one") as caught:
+    with pytest.raises(CallFailed, match="agent_right_arm can after agent_left_arm has ended. A scenario can have one") as caught:
         reacher.present("agent_right_arm")
     assert caught.value.code == "world"
     reacher.present(position=[-0.3, 0.2, 0.1])

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 from bus_schema import VERSION
 from bus_schema.messages import Command, Mode
-from services.port_filter.passage import Moves
+from services.port_filter.passage import MoveDetector
 
 TICK = 10_000_000  # ns
 
 
-def begins(moves: Moves, positions: list[float], mode: Mode = "position", start: int = 0) -> list[int]:
+def begins(moves: MoveDetector, positions: list[float], mode: Mode = "position", start: int = 0) -> list[int]:
     """The ticks at which a move begins; one command a tick."""
     found = []
     for k, position in enumerate(positions, start):
@@ -18,26 +18,26 @@ def begins(moves: Moves, positions: list[float], mode: Mode = "position", start:
 
 
 def test_the_first_position_begins_a_move() -> None:
-    assert begins(Moves(), [1.0, 2.0, 3.0]) == [0]
+    assert begins(MoveDetector(), [1.0, 2.0, 3.0]) == [0]
 
 
 def test_a_move_begins_where_the_reference_leaves_a_rest() -> None:
-    assert begins(Moves(), [1.0] * 20 + [2.0, 3.0] + [4.0] * 20 + [3.0]) == [0, 20, 42]
+    assert begins(MoveDetector(), [1.0] * 20 + [2.0, 3.0] + [4.0] * 20 + [3.0]) == [0, 20, 42]
 
 
 def test_a_reference_that_pauses_for_less_than_a_rest_goes_on() -> None:
-    assert begins(Moves(), [1.0, 2.0, 2.0, 2.0, 3.0]) == [0]
+    assert begins(MoveDetector(), [1.0, 2.0, 2.0, 2.0, 3.0]) == [0]
 
 
 def test_other_modalities_begin_no_move_and_end_one() -> None:
-    moves = Moves()
+    moves = MoveDetector()
     assert begins(moves, [1.0, 2.0]) == [0]
     assert begins(moves, [1.0, 2.0], "velocity", 2) == []
     assert begins(moves, [3.0, 4.0], start=4) == [4]
 
 
 def test_after_the_reflex_the_next_position_begins_a_move() -> None:
-    moves = Moves()
+    moves = MoveDetector()
     begins(moves, [1.0, 2.0])
     moves.forget()
     assert begins(moves, [3.0], start=2) == [2]
