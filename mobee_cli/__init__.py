@@ -1,1 +1,1 @@
-"""The command `mobee`: one file a verb."""
+"""The command `mobee`: one file per verb."""

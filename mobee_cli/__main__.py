@@ -30,7 +30,7 @@ VERBS = {
     "experiment": "measure the claims of the papers: list, run, figure",
     "bench": "measure the speed of mobee on this machine, beside other programs",
     "check": "report what is wrong with a robot or world file",
-    "view": "show a robot's file as a picture that moves",
+    "view": "show a robot file in motion",
 }
 
 EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "icub_models": "sim"}

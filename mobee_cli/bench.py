@@ -17,7 +17,7 @@ from services.common.exit_codes import ENVIRONMENT, FAILED, OK
 
 _MAX_RATE = 1000  # Hz, of robot_sim
 _PICTURES = (".png", ".svg", ".pdf")
-_NOTES = "Exit code: 0 every requirement is met and all agree, 1 not, 3 a peer is not installed or a system did not start."
+_NOTES = "Exit code: 0 every requirement is met and all agree, 1 not, 3 another program is not installed or a system did not start."
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def _count_of_boxes(text: str) -> int:
 def _picture(text: str) -> Path:
     path = Path(text)
     if path.suffix not in _PICTURES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no picture; valid endings: {', '.join(_PICTURES)}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a picture; valid endings: {', '.join(_PICTURES)}")
     if not path.absolute().parent.is_dir():
         raise argparse.ArgumentTypeError(f"{text!r}: there is no folder {str(path.parent)!r}; make it first")
     return path
@@ -147,7 +147,7 @@ BENCHES = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add a parser for each benchmark."""
-    benches = parser.add_subparsers(dest="bench", required=True, metavar="|".join(BENCHES))
+    benches = parser.add_subparsers(dest="bench", required=True, metavar="BENCHMARK")
     for name, bench in BENCHES.items():
         one = benches.add_parser(name, help=bench.text, description=bench.text, epilog=_NOTES)
         one.add_argument("--json", action="store_true", help="print as JSON")

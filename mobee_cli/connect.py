@@ -1,4 +1,4 @@
-"""How a verb reaches the running system."""
+"""Connects a verb to the running system."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _PATIENCE = 0.3  # s: a system that runs answers at once
 
 
 def add_endpoint(parser: argparse.ArgumentParser) -> None:
-    """The option that names the router."""
-    parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="router of the system (default: %(default)s)")
+    """Add the option for the address of the router."""
+    parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="address of the router (default: %(default)s)")
 
 
 @contextmanager
 def connected(endpoint: str) -> Iterator[Any]:
-    """A session with the running system; UserError when there is none."""
+    """Open a session with the running system; raises UserError if there is none."""
     try:
         session = open_client(endpoint, patience=_PATIENCE)
     except BusUnreachable as error:

@@ -1,4 +1,4 @@
-"""`mobee convert IN OUT`: zero-position XML to URDF and back, and an older zero-position file or world into today's form."""
+"""`mobee convert`: converts zero-position XML to URDF and back, and older zero-position files to the present version."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The two files and how a URDF is read."""
-    parser.add_argument("source", metavar="IN", help="a shipped robot, or a .xml or .urdf file; or a world in .xml")
-    parser.add_argument("target", metavar="OUT", type=Path, help="the .xml or .urdf file to write")
+    """Add the two files and the options of a URDF."""
+    parser.add_argument("source", metavar="IN", help="shipped robot, or a .xml or .urdf file, or a world in .xml")
+    parser.add_argument("target", metavar="OUT", type=Path, help=".xml or .urdf file to write")
     add_urdf_options(parser)
-    parser.add_argument("--force", action="store_true", help="write over files that are there")
+    parser.add_argument("--force", action="store_true", help="overwrite existing files")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, write, and say what came out and what the new file cannot hold."""
+    """Convert the file, and print what was written and what the new format cannot express."""
     target: Path = arguments.target
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)
     if not target.resolve().parent.is_dir():
-        raise UserError(f"{target}: there is no folder {target.resolve().parent}: make it, or choose another", FAILED)
+        raise UserError(f"{target}: there is no folder {target.resolve().parent}: create it", FAILED)
     taken = [path for path in _written(target) if path.exists()]
     if taken and not arguments.force:
-        raise UserError(f"{taken[0]} is there already. Choose another name, or write over it with --force", BAD_INPUT)
+        raise UserError(f"{taken[0]} exists already. Choose another name, or overwrite it with --force", BAD_INPUT)
     try:
         lines = _convert(arguments, target)
     except MobeeError as error:
@@ -51,14 +51,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _convert(arguments: argparse.Namespace, target: Path) -> list[str]:
-    """Write the target, and say what it holds."""
+    """Write the target, and return a description of its content."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         world = world_file(arguments.source)
         content = load_robot(arguments.source, **urdf_options(arguments)) if world is None else load_world(world)
     if isinstance(content, World):
         if world is None or target.suffix.lower() != ".xml":
-            raise UserError(f"{target}: a world is written as .xml: URDF knows robots only", BAD_INPUT)
+            raise UserError(f"{target}: a world can only be written as .xml: a URDF holds robots only", BAD_INPUT)
         return [f"{target}: {len(content.objects)} objects", *_understood(write_upgraded(world, target) or [])]
     source = find_file(arguments.source, ROBOTS, "robot")
     if source.suffix.lower() == target.suffix.lower() == ".xml":
@@ -70,7 +70,7 @@ def _convert(arguments: argparse.Namespace, target: Path) -> list[str]:
 
 
 def _understood(remarks: list[Remark]) -> list[str]:
-    """How an older file was understood, a line each."""
+    """Return how an older file was interpreted, a line for each remark."""
     return [f"{remark.node.file}:{remark.node.line}: {remark.what}" for remark in remarks]
 
 
@@ -84,5 +84,5 @@ def _summary(robot: Robot, target: Path) -> str:
     if target.suffix.lower() == ".urdf":
         lines.append(f"{target.with_suffix('.srdf')}: parts as groups, home, pairs that are not tested")
         if robot.clauses:
-            lines.append(f"{len(robot.clauses)} clauses stand in a comment only: URDF cannot express them")
+            lines.append(f"{len(robot.clauses)} clauses are written as a comment only: URDF cannot express them")
     return "\n".join(lines)

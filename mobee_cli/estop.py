@@ -1,4 +1,4 @@
-"""`mobee estop`: stop the robot at once, or release it again."""
+"""`mobee estop`: stops the robot at once, or releases it again."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _REPEAT, _PATIENCE = 0.1, 2.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     add_endpoint(parser)
-    parser.add_argument("--reset", action="store_true", help="release the robot: the controller arms it and the agents go on at once")
-    parser.add_argument("--reason", default="asked for at the terminal", help="what the event log says (default: %(default)s)")
+    parser.add_argument("--reset", action="store_true", help="release the robot: the controller and the agents continue at once")
+    parser.add_argument("--reason", default="asked for at the terminal", help="text for the event log (default: %(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Send it, and wait until the robot confirms."""
+    """Send the stop or the release, and wait until the robot confirms it."""
     with connected(arguments.endpoint) as session:
         if arguments.reset:
             try:
                 rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)
             except rpc.CallFailed as failed:
                 raise UserError(f"the robot was not released: {failed}") from None
-            print("released: the controller arms the parts again, and agents that are still there go on")
+            print("released: the controller arms the parts again, and running agents continue")
         else:
             parts = _stop(session, arguments.reason)
             print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _stop(session: Any, reason: str) -> list[str]:
-    """Repeat the stop until every part that is heard says so; UserError when none does."""
+    """Repeat the stop until every part reports it; raises UserError if one does not, or if none is there."""
     gates: dict[str, str] = {}
 
     def note(heard: Heard) -> None:
@@ -58,5 +58,5 @@ def _stop(session: Any, reason: str) -> list[str]:
         if seen and all(gate == "estop" for gate in seen.values()):
             return sorted(seen)
     moving = [part for part, gate in gates.items() if gate != "estop"]
-    said = f"{', '.join(moving)} did not stop" if moving else "no part of a robot is heard"
-    raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {said}: use the robot's own emergency button")
+    result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot is heard"
+    raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {result}: use the robot's own emergency button")

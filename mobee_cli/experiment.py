@@ -1,4 +1,4 @@
-"""`mobee experiment`: the experiments that come with mobee."""
+"""`mobee experiment`: lists and runs the experiments, draws their figures, and prints the table of claims."""
 
 from __future__ import annotations
 
@@ -34,34 +34,34 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPT
 
 RUNS = Path("runs")
 _NEWEST = Path()  # --resume without the name of a run
-_NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it goes on
+_NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it is resumed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """One parser an action."""
+    """Add a parser for each action."""
     parser.set_defaults(make_parser=type(parser))
     actions = parser.add_subparsers(dest="action", required=True, metavar="list|run|figure|claims")
-    listing = actions.add_parser("list", help="what there is", description="What there is: names, claims and their sources.")
+    listing = actions.add_parser("list", help="list all experiments", description="List all experiments with claims and sources.")
     listing.add_argument("--json", action="store_true", help="print as JSON")
-    text = "Run an experiment; `mobee experiment run NAME --help` tells its options."
-    running = actions.add_parser("run", help="run one", description=text)
+    text = "Run an experiment; `mobee experiment run NAME --help` explains its options."
+    running = actions.add_parser("run", help="run an experiment", description=text)
     running.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
-    running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="of the experiment")
-    drawing = actions.add_parser("figure", help="draw a run", description="Draw the figure of a run.")
-    drawing.add_argument("name", metavar="NAME|RUN", help=f"folder of a run, or of whose newest: {', '.join(EXPERIMENTS)}")
-    drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run, after a name")
-    drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the newest is looked for (default: runs)")
+    running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="options of the experiment")
+    drawing = actions.add_parser("figure", help="draw the figure of a run", description="Draw the figure of a run.")
+    drawing.add_argument("name", metavar="NAME|RUN", help="folder of a run, or the name of an experiment, for its newest run")
+    drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run, after the name of an experiment")
+    drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of the runs' folders (default: runs)")
     drawing.add_argument("--json", action="store_true", help="print as JSON")
-    text = "The table of claims: what was published, what was found here. Without RUN and --write: as experiments/README.md has it."
-    telling = actions.add_parser("claims", help="what holds", description=text)
-    telling.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, whose numbers are put in")
-    telling.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from those with the most seeds")
-    telling.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where those are looked for (default: runs)")
-    telling.add_argument("--json", action="store_true", help="print as JSON")
+    text = "Print the table of claims: published and measured numbers. Without RUN and --write it is the table of experiments/README.md."
+    claiming = actions.add_parser("claims", help="print the table of claims", description=text)
+    claiming.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, to use their numbers")
+    claiming.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the runs with the most seeds")
+    claiming.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of these runs' folders (default: runs)")
+    claiming.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do the action."""
+    """Run the action."""
     try:
         if arguments.action == "list":
             return _list(arguments)
@@ -92,15 +92,15 @@ def _list(arguments: argparse.Namespace) -> int:
 
 
 def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser], given: Sequence[str]) -> argparse.Namespace:
-    """Options of the run; those of a run that is resumed are its own unless they are given again."""
+    """Parse the options of a run; a resumed run keeps its own unless they are given again."""
     notes = _wrapped(experiment.notes.strip())
     parser = make_parser(
         prog=f"mobee experiment run {experiment.name}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     experiment.method.add_arguments(parser)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
-    parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the run's folder is made (default: runs)")
-    parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="go on with a run, or with the newest")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of the run's folder (default: runs)")
+    parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="resume a run, or the newest one")
     parser.add_argument("--json", action="store_true", help="print the results as JSON")
     options = parser.parse_args(given)
     if options.resume is None:
@@ -111,14 +111,14 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     options = parser.parse_args(given)
     options.resume, seed = run, begun.get("seed")
     if options.seed != seed:
-        raise InvalidValue(f"{run} has seed {seed}, not {options.seed}, and keeps it. Begin a new run without --resume.")
+        raise InvalidValue(f"{run} has seed {seed}, not {options.seed}. Start a new run without --resume.")
     if getattr(options, "quick", False) and not begun.get("quick"):
-        raise InvalidValue(f"{run} was begun without --quick; what both find must not be mixed. Begin a new run without --resume.")
+        raise InvalidValue(f"{run} was started without --quick; their results must not be mixed. Start a new run without --resume.")
     return options
 
 
 def _wrapped(notes: str) -> str:
-    """Paragraphs, filled to the terminal's width."""
+    """Wrap paragraphs to the width of the terminal."""
     columns = shutil.get_terminal_size().columns
     return "\n\n".join(textwrap.fill(" ".join(text.split()), columns, break_on_hyphens=False) for text in notes.split("\n\n"))
 
@@ -135,9 +135,9 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
     except CellsFailed as error:
-        raise UserError(f"{error}\nTry them again with `mobee experiment run {experiment.name} --resume {folder}`", FAILED) from None
+        raise UserError(f"{error}\nRepeat them with `mobee experiment run {experiment.name} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:
-        raise UserError(f"interrupted; go on with `mobee experiment run {experiment.name} --resume {folder}`", INTERRUPTED) from None
+        raise UserError(f"interrupted; resume with `mobee experiment run {experiment.name} --resume {folder}`", INTERRUPTED) from None
     if options.json:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:

@@ -1,29 +1,36 @@
-"""`mobee export`: the transitions of a run as one table, for other programs."""
+"""`mobee export`: writes the transitions of a run as one table, for other programs."""
 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import astuple
 from pathlib import Path
+from typing import Any
 
-from experiments.kit.learning.recorded_transitions import records
+from experiments.kit.learning.recorded_transitions import Record, records
 from mobee.errors import MobeeError
+from mobee.learning.reaching.store import COLUMNS as STEP_COLUMNS
+from mobee.learning.reaching.store import ReachStore, reaching_parts
 from mobee_cli.errors import UserError
-from mobee_cli.reach_learned import write_reaches
-from mobee_cli.transition_tables import write_csv, write_parquet
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 
+COLUMNS = ("source", "agent", "n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched", "time")
+REACH_COLUMNS = ("source", "part", "x", "y", "z", *STEP_COLUMNS, "time")
 _NOTES = """Columns: source (file in the run), agent, n (1, 2, ... of this agent), s, a,
 s_next (state, action, state reached), reward (nats), settled, duration (s),
 q (rad, all motors of the part), touched (names of objects), time (s since
-1970). Cells of a sweep keep the first six. A Parquet file holds all settings in
-its metadata, as JSON under "mobee". With --reaches: where the target is (m, root
-frame), then the steps as docs/reaching.md says."""
+1970). Trials of experiments have the first six only. A Parquet file holds all
+settings in its metadata, as JSON under "mobee". With --reaches: the position of
+the target (m, root frame), then the columns described in docs/reaching.md."""
 _IN_THE_RUN = Path()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Run and file."""
+    """Add the run and the file."""
     parser.epilog = _NOTES
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run of `mobee launch` or `mobee experiment`")
     kinds = parser.add_mutually_exclusive_group()
@@ -31,7 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds.add_argument("--csv", nargs="?", type=Path, const=_IN_THE_RUN, metavar="FILE", help=text.format("write CSV, the default", "csv"))
     kinds.add_argument("--parquet", nargs="?", type=Path, const=_IN_THE_RUN, metavar="FILE", help=text.format("write Parquet", "parquet"))
     kinds.add_argument(
-        "--reaches", nargs="?", type=Path, const=_IN_THE_RUN, metavar="FILE", help="write the steps of problem-tries, as CSV (reaches.csv)"
+        "--reaches",
+        nargs="?",
+        type=Path,
+        const=_IN_THE_RUN,
+        metavar="FILE",
+        help="write the steps of reaches as CSV (default FILE: reaches.csv)",
     )
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
 
@@ -39,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the table."""
     if not arguments.run.is_dir():
-        raise UserError(f"{arguments.run}: there is no such folder; give that of a run, as in runs/", BAD_INPUT)
+        raise UserError(f"{arguments.run}: there is no such folder; give the folder of a run, one of those in runs/", BAD_INPUT)
     file: Path = arguments.parquet or arguments.csv or arguments.reaches or _IN_THE_RUN
     kind = "parquet" if arguments.parquet is not None else "csv"
     what = "transitions" if arguments.reaches is None else "reaches"
@@ -57,3 +69,77 @@ def run(arguments: argparse.Namespace) -> int:
     unit = "transitions" if arguments.reaches is None else "steps"
     print(json.dumps({"file": str(file), unit: rows}) if arguments.json else f"{file}: {rows} {unit}")
     return 0
+
+
+def write_csv(file: Path, records: Iterable[Record]) -> int:
+    """Write one line per transition, lists as JSON, empty cells where a record lacks a column; return the number of lines."""
+    rows = 0
+    with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
+        lines = csv.writer(sink)
+        lines.writerow(COLUMNS)
+        for record in records:
+            columns = [[_text(value) for value in column] for column in _columns(record)]
+            lines.writerows(zip(*columns, strict=True))
+            rows += len(columns[0])
+    return rows
+
+
+def write_parquet(file: Path, records: Iterable[Record]) -> int:
+    """Write a row per transition, a row group per agent, and all settings as JSON in the metadata; return the number of rows."""
+    try:
+        import pyarrow as arrow
+        from pyarrow import parquet
+    except ModuleNotFoundError:
+        raise UserError('Parquet needs pyarrow: pip install "mobee[parquet]"; or omit --parquet', ENVIRONMENT) from None
+    name, whole, real = arrow.dictionary(arrow.int32(), arrow.string()), arrow.int32(), arrow.float64()
+    kinds = (name, name, whole, whole, whole, whole, real, arrow.bool_(), real, arrow.list_(real), arrow.list_(arrow.string()), real)
+    schema = arrow.schema(list(zip(COLUMNS, kinds, strict=True)))
+    rows, settings = 0, []
+    with written_whole(file) as unfinished, parquet.ParquetWriter(unfinished, schema) as sink:
+        for record in records:
+            columns = [arrow.array(column, kind) for column, kind in zip(_columns(record), kinds, strict=True)]
+            sink.write_table(arrow.Table.from_arrays(columns, schema=schema))
+            rows += len(columns[0])
+            settings.append({"source": record.source, "agent": record.agent, "settings": record.settings})
+        sink.add_key_value_metadata({"mobee": json.dumps(settings)})
+    return rows
+
+
+def _columns(record: Record) -> list[list[Any]]:
+    length = len(record.columns["n"])
+    same = {"source": [record.source] * length, "agent": [record.agent] * length}
+    return [(same | record.columns).get(name, [None] * length) for name in COLUMNS]
+
+
+def _text(value: Any) -> Any:
+    return json.dumps(value) if isinstance(value, bool | tuple) else value
+
+
+@contextmanager
+def written_whole(file: Path) -> Iterator[Path]:
+    """Yield a temporary path, renamed to the file when everything is written."""
+    unfinished = file.with_name(f"{file.name}.unfinished")
+    try:
+        yield unfinished
+        unfinished.replace(file)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def write_reaches(file: Path, folder: Path) -> int:
+    """Write a line per step of every reach that was learned from; return the number of lines.  Raises MobeeError if there are none."""
+    rows = 0
+    with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
+        lines = csv.writer(sink)
+        lines.writerow(REACH_COLUMNS)
+        for source in sorted(folder.rglob("*.sqlite")):
+            for part in reaching_parts(source):
+                with ReachStore(source, part, read_only=True) as store:
+                    targets = [target.position.tolist() for target in store.problems()]
+                    for step, time in zip(store.load(), store.times(), strict=True):
+                        values = (json.dumps(value) if isinstance(value, bool | tuple) else value for value in astuple(step))
+                        lines.writerow((source.relative_to(folder), part, *targets[step.problem], *values, time))
+                        rows += 1
+        if not rows:
+            raise MobeeError(f"{folder}: no agent has learned to reach in this run.")
+    return rows

@@ -1,4 +1,4 @@
-"""`mobee plan`: a way from anywhere to anywhere, by what an agent of a run has learned."""
+"""`mobee plan`: plans a path between states or poses with what an agent of a run has learned."""
 
 from __future__ import annotations
 
@@ -18,31 +18,30 @@ from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, robot_of_run
 from services.common.exit_codes import BAD_INPUT
 
-SLACK = 0.01  # rad beyond the limits: poses are given rounded, and encoders are noisy
-_NOTES = """A place is the number of a state, or the angles in rad of the joints that the
-agent knows (or of all motors of its part), within their limits: the state that
-holds this pose.
-Plans trust what was observed, over a weak belief that untried actions work
-(docs/learning.md)."""
+SLACK = 0.01  # rad beyond the limits that are accepted: poses may be rounded, and encoders are noisy
+_NOTES = """A PLACE is the number of a state, or a pose: the angles in rad of the joints
+that the agent moves, or of all motors of its part. A pose stands for its state.
+Plans use the observed outcomes, and a weak prior belief that actions which were
+never tried succeed (docs/learning.md)."""
 
-_NAME_IT = " The run does not say where the file of its robot is: name it with --robot FILE."
+_NAME_IT = " The run does not record the file of its robot: name it with --robot FILE."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Run, agent, places."""
+    """Add the run, the agent, goal and start."""
     parser.epilog = _NOTES
     parser.add_argument("--run", type=Path, required=True, metavar="RUN", help=f"folder of the run, or its file {STORE}")
-    parser.add_argument("--agent", metavar="PART", help="whose plan it is, where the run had several agents")
-    parser.add_argument("--to", nargs="+", required=True, metavar="PLACE", help="where to: a state, or angles in rad")
-    parser.add_argument("--from", nargs="+", dest="start", metavar="PLACE", help="where from (default: where the agent was last)")
-    text = f"0 to 1, a factor a step: the smaller, the more a short path is preferred over a reliable one (default: {DISCOUNT})"
+    parser.add_argument("--agent", metavar="PART", help="part of the agent, if the run had several agents")
+    parser.add_argument("--to", nargs="+", required=True, metavar="PLACE", help="goal: a state, or angles in rad")
+    parser.add_argument("--from", nargs="+", dest="start", metavar="PLACE", help="start (default: the last state of the agent)")
+    text = f"discount per step, 0 to 1: smaller values prefer short paths to reliable ones (default: {DISCOUNT})"
     parser.add_argument("--discount", type=float, default=DISCOUNT, metavar="X", help=text)
-    add_robot(parser, "default: that of the run, which knows it if `mobee launch` made it or if it comes with mobee")
+    add_robot(parser, "default: the robot of the run, if `mobee launch` made the run or the robot is a shipped one")
     parser.add_argument("--json", action="store_true", help="print as JSON, with the pose of every state")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rebuild, plan, print."""
+    """Rebuild the agent's model, plan, and print the plan."""
     file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
     try:
         learned = load_learned(file, arguments.agent, _robot(arguments))
@@ -59,20 +58,20 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _robot(arguments: argparse.Namespace) -> Robot | None:
-    """The robot that is given, or that of the settings of the run; None for the one that comes with mobee under the name on record."""
+    """Return the robot of the options or of the settings of the run; None for the shipped one of the recorded name."""
     arguments.robot = arguments.robot or robot_of_run(arguments.run)
     if arguments.robot is None:
-        require_none(arguments, "it is for the robot of --robot FILE")
+        require_none(arguments, "only valid with --robot FILE")
         return None
     return robot_given(arguments)
 
 
 def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:
-    """The state meant by a place; one that is given as a pose is added to `poses`."""
+    """Return the state of a place; if this is a pose, add it to `poses`."""
     try:
         numbers = [float(word) for word in place]
     except ValueError:
-        raise UserError(f"{' '.join(place)!r} is no place: give the number of a state, or angles in rad", BAD_INPUT) from None
+        raise UserError(f"{' '.join(place)!r} is not valid: give the number of a state, or angles in rad", BAD_INPUT) from None
     if len(place) == 1 and place[0].lstrip("+-").isdigit():
         return int(target_states(learned.space, int(place[0]))[0])
     space = learned.space
@@ -87,7 +86,7 @@ def _require_within(space: Space, pose: list[float]) -> None:
     for name, angle in zip(motors, pose, strict=True):
         low, high = space.robot.limits[space.robot.motor_index(name)]
         if not low - SLACK <= angle <= high + SLACK:
-            hint = " Of several states give one." if all(number.is_integer() and number >= 0 for number in pose) else ""
+            hint = " Give one state only." if all(number.is_integer() and number >= 0 for number in pose) else ""
             raise UserError(f"{name} cannot be at {angle:g} rad: valid is {low:.3g} to {high:.3g}.{hint}", BAD_INPUT)
 
 
@@ -101,13 +100,13 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
         goal, tries = learned.space.goal(state, action), int(learned.model.tries[state, action])
         aimed = "" if goal == following else f" by aiming at {goal}"
         lines.append(f"  {state:>4} -> {following:<4} probability {chance:.2f}, tried {_times(tries)}{aimed}")
-    lines.append(f"Planning anew after each action, {plan.steps:.1f} actions on average.")
+    lines.append(f"With a new plan after each action, {plan.steps:.1f} actions on average.")
     if plan.distrusted or plan.avoided:
-        lines.append(f"If every action worked, {plan.shortest} would do. Expected to fail (probability of success):")
+        lines.append(f"If every action succeeded, {plan.shortest} would be enough. Expected to fail (probability of success):")
         lines += [f"  {state:>4} -> {goal:<4} {chance:.2f}" for (state, goal), chance in plan.distrusted.items()]
     if plan.avoided:
         avoided = ", ".join(f"{state} ({chance:.2f})" for state, chance in plan.avoided.items())
-        lines.append(f"Avoided (probability of getting through): {avoided}.")
+        lines.append(f"Avoided states (probability of passing): {avoided}.")
     return lines
 
 

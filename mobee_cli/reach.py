@@ -1,126 +1,200 @@
-"""`mobee reach`: put a hand on a place, on the robot that runs or offline."""
+"""`mobee reach`: reaches for a position or an object, with the running robot or offline."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.errors import ActionInterrupted, MobeeError
+from mobee.errors import ActionInterrupted, MobeeError, UnknownName
+from mobee.learning.reaching.evaluation import move
+from mobee.learning.reaching.failures import has_failed
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.record import load_reaches
 from mobee.learning.reaching.store import reaching_parts
-from mobee.reach import AIMS, RADIUS, ReachTarget, reward_of
+from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.reach import AIMS, RADIUS, Aim, ReachPlant, ReachTarget, reward_of
 from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
 from mobee.robot.robot import Robot
+from mobee.simulation import OfflinePlant
 from mobee.store import STORE
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
-from mobee_cli.reach_learned import go_to_pre_reach
-from mobee_cli.reach_result import ON, Result, lines
-from mobee_cli.reach_stage import Choose, Hand, Stage, hand_chosen, offline
+from mobee_cli.reach_result import REACHED_DISTANCE, Result, lines
 from mobee_cli.robot_options import add_robot, add_world, require_none, robot_given, robot_of_run, world_given
 from services.common.exit_codes import BAD_INPUT, FAILED
+from services.common.hands import PALMS, hand_for, hand_of, part_of
 
-_NOTES = f"""Places are in m in the robot's root frame; of the icub x backwards, y right,
-z up, from the waist.
-Without --run the hand is drawn there from where the robot is; with it, what the
-agent of that run has learned says from which posture, and the way there.
-Reached is a hand within {100 * ON:g} cm of the target's surface, when its force ends.
+_NOTES = f"""Positions are in m in the robot's root frame; for the icub x points backwards,
+y right, z up, and the origin is at the waist.
+Without --run a force pulls the hand from the present posture. With --run the
+robot first moves to the posture from which the agent of that run expects the
+largest reward. The target is reached if the hand ends within {100 * REACHED_DISTANCE:g} cm of its
+surface.
 Exit code: 0 reached, 1 not reached, 2 bad input, 3 no system is running."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to reach for, with what, where."""
+    """Add the target, the hand, and the robot."""
     parser.epilog = _NOTES
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="the place [m]")
-    what.add_argument("--object", metavar="NAME", help="a target of the model's world, wherever it goes; as vision's ball")
-    text = "what is put there (default: the palm nearer to the target at home; of a robot without palms its end with most motors)"
+    what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="position of the target [m]")
+    what.add_argument("--object", metavar="NAME", help="a target object of the model's world, such as the ball of vision")
+    text = "marker that reaches (default: the palm nearer to the target at home; without palms, the end that the most motors move)"
     parser.add_argument("--marker", metavar="NAME", help=text)
-    parser.add_argument("--part", help="what reaches (default: the part with most motors that move the marker)")
-    parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="of the target [m] (default: %(default)g)")
-    where = "where on it the marker is to come (default: the centre of a place, the surface of an object, which may be solid)"
+    parser.add_argument("--part", help="part that reaches (default: the part with the most motors that move the marker)")
+    parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="radius of the target [m] (default: %(default)g)")
+    where = "bring the marker to the centre or to the surface of the target (default: centre for --target, surface for --object)"
     parser.add_argument("--aim", choices=AIMS, help=where)
-    parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that learned to reach, or its file {STORE}")
-    parser.add_argument("--stay", action="store_true", help="stay there, instead of being drawn back")
-    parser.add_argument("--offline", action="store_true", help="on the offline plant, at home")
-    add_robot(parser, "offline; default: that of the run, else the icub")
+    parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that has learned to reach, or its file {STORE}")
+    parser.add_argument("--stay", action="store_true", help="stay at the target; without it the hand moves back")
+    parser.add_argument("--offline", action="store_true", help="use the offline plant, starting at home, instead of the running system")
+    add_robot(parser, "offline only; default: the robot of the run, else icub")
     add_world(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
     add_endpoint(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reach, and tell how it went."""
+    """Reach, and print the result."""
     if arguments.aim is None:
         arguments.aim = "centre" if arguments.object is None else "surface"
     try:
-        with _stage(arguments) as stage:
-            result = _reach(arguments, stage)
+        with _setup(arguments) as setup:
+            result = _reach(arguments, setup)
     except ActionInterrupted as interruption:
-        raise UserError(f"the reach was broken off: {interruption}. `mobee status` says how the robot is.", FAILED) from None
+        raise UserError(f"the reach was interrupted: {interruption}. `mobee status` shows the state of the robot.", FAILED) from None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     print(json.dumps(result.as_json(), indent=2) if arguments.json else "\n".join(lines(result)))
     return 0 if result.reached else FAILED
 
 
-def _stage(arguments: argparse.Namespace) -> AbstractContextManager[Stage]:
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """A marker, the part that moves it, and how they were chosen; "" if the user gave both."""
+
+    marker: str
+    part: str
+    why: str = ""
+
+
+Choose = Callable[[Robot, Array | None], Hand]
+"""Chooses the hand of a robot for a target at a position (3,) m, or None where the position is not known."""
+
+
+def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: str | None) -> Hand:
+    """Return the hand for a target; a part or marker that is not given follows from the target and the robot.
+
+    Raises UnknownName for a part or a marker that the robot does not have, InvalidValue if no motor moves the marker.
+    """
+    if part is not None:
+        robot.part(part)
+        return Hand(marker or hand_of(robot, part), part, "" if marker else f"the marker of {part}; --marker names another")
+    if marker is not None:
+        return Hand(marker, part_of(robot, marker), "the part with the most motors that move it; --part names another")
+    marker = hand_for(robot, position)
+    why = "the palm nearer to the target at home" if marker in PALMS else "the end of the robot that the most motors move"
+    return Hand(marker, part_of(robot, marker), f"{why}; --marker and --part name others")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """A plant, offline or live, and the hand that reaches.
+
+    `q`: measures all motors, (n,) rad.  `present_object`: makes an object of the plant's world the target.  `first_motion`: time from
+    the last request to the first command that moves [s]; None offline.
+    """
+
+    robot: Robot
+    plant: ReachPlant
+    hand: Hand
+    q: Callable[[], Array]
+    present_object: Callable[[str, Aim], ReachTarget]
+    first_motion: Callable[[], float | None]
+
+    @property
+    def model(self) -> Model:
+        """The robot without a world."""
+        return Model(self.robot)
+
+
+@contextmanager
+def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> Iterator[Setup]:
+    """Set up the offline plant with the robot at home in a world; `target`: the position (3,) m, or the name of an object."""
+    known = {name: found.position for name, found in world.objects.items()}
+    hand = choose(robot, known.get(target) if isinstance(target, str) else target)
+    plant = OfflinePlant(Model(robot, world))
+
+    def present_object(name: str, aim: Aim) -> ReachTarget:
+        found = world.objects.get(name)
+        if found is None or found.role != "target":
+            raise UnknownName("target of the offline world", name, [one for one, other in world.objects.items() if other.role == "target"])
+        target = ReachTarget(found.position, found.size[0], aim)
+        plant.present(target)
+        return target
+
+    yield Setup(robot, plant, hand, lambda: plant.q, present_object, lambda: None)
+
+
+def _setup(arguments: argparse.Namespace) -> AbstractContextManager[Setup]:
     if arguments.target is not None:
-        ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)  # a mistake in it needs no robot
+        ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)  # raises for a bad value before a robot is loaded
     target = arguments.object if arguments.target is None else np.array(arguments.target)
     if arguments.offline:
         if arguments.robot is None and arguments.run is not None:
             arguments.robot = robot_of_run(arguments.run)
         return offline(robot_given(arguments), world_given(arguments), _chooser(arguments), target)
-    require_none(arguments, "it is for --offline; without that the robot and the world are those of the system that runs")
+    require_none(arguments, "only valid with --offline; without it the robot and the world are those of the running system")
     from mobee_cli.reach_live import live
 
     return live(arguments.endpoint, _chooser(arguments), target)
 
 
 def _chooser(arguments: argparse.Namespace) -> Choose:
-    """What chooses the hand: the options, and of a run the part that learned."""
+    """Return a function that chooses the hand by the options, and for a run by the part that has learned."""
 
-    def choose(robot: Robot, place: Array | None) -> Hand:
+    def choose(robot: Robot, position: Array | None) -> Hand:
         part = arguments.part
         if part is None and arguments.run is not None and store_of(arguments.run).is_file():
             learned = reaching_parts(store_of(arguments.run))
             part = learned[0] if len(learned) == 1 else None
-        return hand_chosen(robot, place, part, arguments.marker)
+        return choose_hand(robot, position, part, arguments.marker)
 
     return choose
 
 
-def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
-    part, marker, why = stage.hand.part, stage.hand.marker, stage.hand.why
-    stage.robot.marker(marker)
-    agent = _learned(arguments, stage)
+def _reach(arguments: argparse.Namespace, setup: Setup) -> Result:
+    part, marker, why = setup.hand.part, setup.hand.marker, setup.hand.why
+    setup.robot.marker(marker)
+    agent = _learned(arguments, setup)
     if agent is not None:
         if arguments.marker not in (None, agent.marker):
             raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
         marker, why = agent.marker, ""
     if arguments.object is None:
         target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)
-        _require_outside(stage, part, marker, target.position)
-        stage.plant.present(target)
+        _require_outside(setup, part, marker, target.position)
+        setup.plant.present(target)
     else:
-        target = stage.present_object(arguments.object, arguments.aim)
-        _require_outside(stage, part, marker, target.position)
-    found = nearest_posture(stage.model, part, marker, target.position, stage.q())
-    stage.plant.measure(part)
-    way: dict[str, Any] = {}
+        target = setup.present_object(arguments.object, arguments.aim)
+        _require_outside(setup, part, marker, target.position)
+    found = nearest_posture(setup.model, part, marker, target.position, setup.q())
+    setup.plant.measure(part)
+    learned: dict[str, Any] = {}
     if agent is not None:
-        way["path"], way["avoided"], way["expected"] = go_to_pre_reach(agent, target)
-    outcome = stage.plant.reach(part, marker, arguments.stay)
+        learned["path"], learned["avoided"], learned["expected"] = go_to_pre_reach(agent, target)
+    outcome = setup.plant.reach(part, marker, arguments.stay)
     return Result(
-        **way,
+        **learned,
         part=part,
         marker=marker,
         why=why,
@@ -128,22 +202,22 @@ def _reach(arguments: argparse.Namespace, stage: Stage) -> Result:
         outcome=outcome,
         nearest=found,
         reward=reward_of(outcome.missing),
-        first_motion=stage.first_motion(),
+        first_motion=setup.first_motion(),
     )
 
 
-def _learned(arguments: argparse.Namespace, stage: Stage) -> ReachAgent | None:
+def _learned(arguments: argparse.Namespace, setup: Setup) -> ReachAgent | None:
     if arguments.run is None:
         return None
-    return load_reaches(store_of(arguments.run), stage.plant, stage.hand.part)
+    return load_reaches(store_of(arguments.run), setup.plant, setup.hand.part)
 
 
-def _require_outside(stage: Stage, part: str, marker: str, position: Array) -> None:
-    model, q = stage.model, stage.q()
+def _require_outside(setup: Setup, part: str, marker: str, position: Array) -> None:
+    model, q = setup.model, setup.q()
     link = body_at(model, part, position, q)
     if link is not None:
         free = nearest_outside(model, part, marker, position, q)
-        advice = f"the nearest to which {part} can bring {marker} is about {_place(free)} m" if free is not None else "it is far from any"
+        advice = "none is near" if free is None else f"the nearest to which {part} can bring {marker} is about {_place(free)} m"
         raise UserError(f"{_place(position)} m is inside the robot's own {link}: choose a place outside its body; {advice}", BAD_INPUT)
 
 
@@ -152,5 +226,31 @@ def _place(position: Array) -> str:
 
 
 def store_of(run: Path) -> Path:
-    """The file of a run that is given as a folder or as this file."""
+    """Return the database of a run, given as its folder or as this file."""
     return run / STORE if run.is_dir() else run
+
+
+def go_to_pre_reach(agent: ReachAgent, target: ReachTarget) -> tuple[tuple[int, ...], tuple[tuple[int, int], ...], float]:
+    """Move to the state from which reaching for a target promises the largest reward.
+
+    The agent remembers transitions that fail, and plans around them.
+
+    Returns:
+        The states of the path, the transitions (state, goal) that the plans avoided, and the reward expected in the last state.
+    """
+    state = agent.state
+    path, avoided = [state], dict[tuple[int, int], None]()
+    for _ in range(agent.limit - 1):
+        plan = agent.plan(target, state)
+        avoided.update(dict.fromkeys(plan.avoided))
+        if not plan.actions:
+            break
+        expected = np.maximum(agent.predictor.mean(target.position), 0.0)
+        values, _ = agent.planning.values(expected, agent.failures.rewards(target.position))
+        action = plan.actions[0]
+        _, following = move(agent.plant, agent.space, state, action)
+        if has_failed(values, state, following):
+            agent.failures.add(state, action, target.position, agent.penalty)
+        state = following
+        path.append(state)
+    return tuple(path), tuple(avoided), float(agent.predictor.mean(target.position)[state])

@@ -12,18 +12,17 @@ from mobee.arrays import Array
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.roadmap.reachable import Nearest
 
-ON = 0.02  # m from the target's surface: the hand is on it
+REACHED_DISTANCE = 0.02  # m from the target's surface, within which the target is reached
 _COLUMNS = 80
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Result:
-    """How a reach went.
+    """The result of a reach.
 
-    `why`: how marker and part were chosen, "" where they were given.
-    `path`: the states that it led through; none without a run.  `avoided`: state-actions that were expected to fail, as pairs of a
-    state and the state aimed at.  `expected`: reward, None without a run.  `first_motion`: s from the request to the first command
-    that moves, None offline.
+    `why`: how marker and part were chosen; "" if they were given.  `path`: the states before the reach; empty without a run.
+    `avoided`: transitions that were expected to fail, as pairs (state, goal).  `expected`: reward; None without a run.
+    `first_motion`: time from the request to the first command that moves [s]; None offline.
     """
 
     part: str
@@ -40,21 +39,21 @@ class Result:
 
     @property
     def error(self) -> float:
-        """How far from the target's surface the marker ended, in m; 0 within it."""
+        """Distance of the marker from the target's surface at the end [m]; 0 inside."""
         return max(float(np.linalg.norm(self.target.position - self.outcome.marker)) - self.target.radius, 0.0)
 
     @property
     def reached(self) -> bool:
-        """Whether the marker is on the target."""
-        return self.error <= ON
+        """Whether the marker reached the target."""
+        return self.error <= REACHED_DISTANCE
 
     @property
     def beyond(self) -> float:
-        """How far from the target's surface the nearest place is to which the marker can be brought, in m."""
+        """Distance from the target's surface to the nearest position that the marker can reach [m]."""
         return max(self.nearest.distance - self.target.radius, 0.0)
 
     def as_json(self) -> dict[str, Any]:
-        """As plain JSON values."""
+        """Return the result as plain JSON values."""
         outcome = self.outcome
         return {
             "reached": self.reached,
@@ -77,37 +76,39 @@ class Result:
 
 
 def lines(result: Result) -> list[str]:
-    """For a person, at most 80 columns wide."""
+    """Return the result as text, at most 80 columns wide."""
     outcome, aim = result.outcome, result.target.aim
-    verdict = "is on" if result.reached else "did not come to"
+    verdict = "reached" if result.reached else "did not reach"
     chosen = [f"Reaching with {result.marker}, moved by part {result.part}: {result.why}."] if result.why else []
-    told = [
+    text = [
         *chosen,
         f"{result.marker} {verdict} the target at {_place(result.target.position)}: {1e3 * outcome.missing:.0f} mm from its {aim}, "
         f"at {_place(outcome.marker)}, after {outcome.duration:.1f} s{'' if outcome.settled else ', still moving'}.",
     ]
     if not result.reached:
-        told.append(_why(result))
+        text.append(_why(result))
     if result.path:
         states = " -> ".join(map(str, result.path))
-        told.append(f"Path: states {states}, then the reach." if len(result.path) > 1 else f"It was in the best state already, {states}.")
+        text.append(
+            f"Path: states {states}, then the reach." if len(result.path) > 1 else f"The robot was already in the best state, {states}."
+        )
     if result.avoided:
-        told.append(f"Avoided, expected to fail: {', '.join(f'{state} -> {goal}' for state, goal in result.avoided)}.")
+        text.append(f"Avoided, expected to fail: {', '.join(f'{state} -> {goal}' for state, goal in result.avoided)}.")
     expected = "" if result.expected is None else f", {result.expected:.2f} expected"
-    told.append(f"Reward {result.reward:.2f}{expected}.")
+    text.append(f"Reward {result.reward:.2f}{expected}.")
     if outcome.touched:
-        told.append(f"Touched, fields included: {', '.join(outcome.touched)}.")
+        text.append(f"Contacts at the end, fields included: {', '.join(outcome.touched)}.")
     if result.first_motion is not None:
-        told.append(f"The first command that moves came {1e3 * result.first_motion:.1f} ms after the request.")
-    return [line for text in told for line in textwrap.wrap(text, _COLUMNS, subsequent_indent="  ", break_on_hyphens=False)]
+        text.append(f"The first command that moves was sent {1e3 * result.first_motion:.1f} ms after the request.")
+    return [line for one in text for line in textwrap.wrap(one, _COLUMNS, subsequent_indent="  ", break_on_hyphens=False)]
 
 
 def _why(result: Result) -> str:
     if result.beyond == 0.0:
-        learn = "" if result.path else ", as one that has learned to reach knows (--run)"
-        return f"Part {result.part} is long enough: from another posture, or past what it touched, it may come there{learn}."
+        learn = "" if result.path else "; a run that has learned to reach may know it (--run)"
+        return f"Part {result.part} can reach this far: another posture, or a path without contacts, may succeed{learn}."
     far = f"{1e3 * result.beyond:.0f} mm from the target's surface"
-    return f"The nearest that part {result.part} can bring it is {_place(result.nearest.position)}, {far}, if nothing is in the way."
+    return f"The nearest position that part {result.part} can reach is {_place(result.nearest.position)}, {far}, without obstacles."
 
 
 def _place(position: Array) -> str:

@@ -1,4 +1,4 @@
-"""Options for the robot and world of commands that need no running system."""
+"""Options for the robot and the world of verbs that need no running system."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from services.common.worlds import NO_WORLD, is_path, world_around
 
 
 def add_urdf_options(parser: argparse.ArgumentParser) -> None:
-    """The keywords of load_robot."""
-    parser.add_argument("--field", type=float, metavar="M", help="give every solid of a URDF a field that reaches so much farther [m]")
-    parser.add_argument("--meshes", choices=("hull", "bounding"), help="meshes of a URDF: convex hulls, or bounding primitives")
+    """Add options for the keywords of load_robot."""
+    parser.add_argument("--field", type=float, metavar="M", help="give every solid of a URDF a field that is larger by M [m]")
+    parser.add_argument("--meshes", choices=("hull", "bounding"), help="read meshes of a URDF as convex hulls or as bounding primitives")
     parser.add_argument(
-        "--corners", type=_corners, metavar="N", help="corners of such a hull at most (default: 64), or all: the exact hull"
+        "--corners", type=_corners, metavar="N", help="largest number of corners of a hull (default: 64), or all: the exact hull"
     )
-    parser.add_argument("--srdf", type=Path, metavar="FILE", help="the SRDF of a URDF, when it is not found by its name")
-    parser.add_argument("--home", metavar="NAME", help="the <group_state> of the SRDF that is home, or zero")
+    parser.add_argument("--srdf", type=Path, metavar="FILE", help="SRDF of a URDF, if it is not found by its name")
+    parser.add_argument("--home", metavar="NAME", help="<group_state> of the SRDF that is the home posture, or zero")
 
 
 def urdf_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The keywords of load_robot that were given."""
+    """Return the keywords of load_robot from the options."""
     return {name: getattr(arguments, name) for name in ("field", "meshes", "corners", "srdf", "home")}
 
 
@@ -46,29 +46,29 @@ _RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
 
 
 def add_robot(parser: argparse.ArgumentParser, text: str) -> None:
-    """The robot; `text` says which it is when it is left out."""
+    """Add the option for the robot; `text` explains the default."""
     parser.add_argument("--robot", metavar="FILE", help=f"shipped robot, or path of a .xml or .urdf file ({text})")
     add_urdf_options(parser)
 
 
 def add_world(parser: argparse.ArgumentParser) -> None:
-    """The world around the robot."""
+    """Add the option for the world."""
     text = f"shipped world, path of a .xml file, or {NO_WORLD} (default: the table for the shipped iCubs, {NO_WORLD} for other robots)"
     parser.add_argument("--world", metavar="FILE", help=text)
 
 
 def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
-    """The robot that the options name, or the default; raises MobeeError."""
+    """Load the robot of the options, or the default; raises MobeeError."""
     return load_robot(arguments.robot or default, **urdf_options(arguments))
 
 
 def world_given(arguments: argparse.Namespace, default: str = DEFAULT) -> World:
-    """The world around the robot of `robot_given`; raises MobeeError."""
+    """Load the world of the options; raises MobeeError."""
     return world_around(arguments.world, arguments.robot or default)
 
 
 def robot_of_run(run: Path) -> str | None:
-    """The name or path of the robot by the settings of a run, None where the run has none; raises UserError.
+    """Return the name or path of the robot in the settings of a run, None if the run has none; raises UserError.
 
     `run`: the folder of a run of `mobee launch`, or a file in it.
     """
@@ -83,19 +83,19 @@ def robot_of_run(run: Path) -> str | None:
     named = [table["robot"] for table in tables if isinstance(table, dict) and isinstance(table.get("robot"), str)]
     if named and is_path(named[0]) and not Path(named[0]).is_file():
         raise UserError(
-            f"{named[0]}: the robot of the run by its settings, and there is no such file: name it with --robot FILE",
+            f"{named[0]}: the settings of the run name this robot file, but it does not exist: name it with --robot FILE",
             BAD_INPUT,
         )
     return named[0] if named else None
 
 
 def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot", "world")) -> list[str]:
-    """The options of robot and world that were given, as on the command line: those of `names`, and all of a URDF."""
+    """Return the given options of robot and world as on the command line: those of `names`, and all of a URDF."""
     options = {name: getattr(arguments, name, None) for name in names} | urdf_options(arguments)
     return [f"--{name} {value}" for name, value in options.items() if value is not None]
 
 
 def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
-    """Raise UserError for the first of the given options, which the command does not use here."""
+    """Raise UserError for the first given option, none of which the verb uses here."""
     for option in given_options(arguments, names):
         raise UserError(f"{option}: {why}", BAD_INPUT)

@@ -17,12 +17,12 @@ _README = "README.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the robots with their parts and shapes, the worlds, and where all of it is from."""
+    """Print the robots with their parts and shapes, the worlds, and their sources and licences."""
     text = (ROBOTS / _README).read_text()
     listed = {
         "robots": {name: _robot(name, text) for name in shipped_robots()},
@@ -53,12 +53,12 @@ def _robot(name: str, readme: str) -> dict[str, Any]:
 
 
 def _world(name: str, readme: str) -> dict[str, Any]:
-    objects = {thing.name: thing.role for thing in load_world(name).objects.values()}
+    objects = {one.name: one.role for one in load_world(name).objects.values()}
     return {"objects": objects, "about": _row(readme, name), "file": str(WORLDS / f"{name}.xml")}
 
 
 def _row(readme: str, name: str) -> str:
-    """What the README's table says of a file."""
+    """Return the row of a file in the README's table."""
     found = re.search(rf"^\| `{re.escape(name)}\.xml` \| (.*?) \|$", readme, re.MULTILINE)
     return _plain(found[1]) if found else ""
 
@@ -69,7 +69,7 @@ def _section(readme: str, title: str) -> str:
 
 
 def _plain(markdown: str) -> str:
-    """Without marks and line breaks; a link is its text."""
+    """Remove marks and line breaks from Markdown; a link becomes its text."""
     return " ".join(re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", markdown).replace("`", "").replace("**", "").split())
 
 
@@ -82,7 +82,7 @@ def _as_text(listed: dict[str, Any]) -> str:
         lines += _entry("", robot["about"])
     lines += ["", "Worlds"]
     for name, world in listed["worlds"].items():
-        lines += _entry(name, ", ".join(f"{thing} ({role})" for thing, role in world["objects"].items()))
+        lines += _entry(name, ", ".join(f"{one} ({role})" for one, role in world["objects"].items()))
     lines += [
         "",
         *_entry("Licences", listed["licences"]),

@@ -1,4 +1,4 @@
-"""`mobee router`: runs the router alone, for systems whose services are started one by one, as in containers."""
+"""`mobee router`: runs only the router, for systems whose services are started one by one, as in containers."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_route
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where to listen."""
-    parser.add_argument("--listen", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="where it listens (default: %(default)s)")
+    """Add the address."""
+    parser.add_argument("--listen", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="address to listen at (default: %(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     if not any(host in arguments.listen for host in ("127.0.0.1", "localhost", "[::1]", "unixsock")):
-        print("mobee router: whoever reaches this address can move the robot: keep it inside a trusted network", file=sys.stderr)
+        print("mobee router: every program that reaches this address can move the robot: keep it inside a trusted network", file=sys.stderr)
     with Service("router", ServiceConfig(endpoint=arguments.listen), session=session) as service:
         service.describe = lambda: (f"routes at {arguments.listen}", {})
         service.ready()

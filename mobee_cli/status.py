@@ -1,4 +1,4 @@
-"""`mobee status`: services, gates of the parts, agents."""
+"""`mobee status`: shows services, gates of the parts, and agents."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _AGENT = "agent_"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
-    parser.epilog = "Exit code 1 when a service is down or does not answer."
+    """Add the options."""
+    parser.epilog = "Exit code: 0 all services are ready, 1 a service is down or does not answer, \n3 no system is running."
     add_endpoint(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask everybody and print."""
+    """Ask all services and print their states."""
     states: dict[str, Heard] = {}
     with connected(arguments.endpoint) as session:
         listen(session, State.stream.keys(), lambda heard: states.update({heard.key: heard}))
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[str, Any]:
-    """Every service that is there, or that the launcher says should be."""
+    """Return the state of every service that is present or that the launcher supervises."""
     launcher = answers.get("launcher")
     restarts = {
         name.removeprefix(_RESTARTS): int(count)
@@ -89,7 +89,7 @@ def _as_text(status: dict[str, Any]) -> str:
             f"{' '.join(says.split())}"[:columns].rstrip()
         )
     pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
-    lines += [f"page  {page}" for page in pages]  # whole: cut short it would lead nowhere
+    lines += [f"page  {page}" for page in pages]  # not cut to the width of the terminal
     if status["parts"]:
         lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>14}{'command age':>13}{'faults':>8}"]
         for part, state in sorted(status["parts"].items()):
@@ -109,7 +109,7 @@ def _as_text(status: dict[str, Any]) -> str:
 
 
 def _age(state: dict[str, Any]) -> Any:
-    """Ticks; None while no command is in force."""
+    """Return the age of the command in force in ticks; None without a command."""
     age = state.get("cmd_age")
     return None if age == -1 else age
 

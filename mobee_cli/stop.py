@@ -1,4 +1,4 @@
-"""`mobee stop`: end the running system in order."""
+"""`mobee stop`: ends the running system in order."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _START = 2.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     add_endpoint(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask the launcher to stop everything; without one, every service and then the router."""
+    """Ask the launcher to end everything; without a launcher, ask every service and then the router."""
     with connected(arguments.endpoint) as session:
         present = alive(session)
         names = ["launcher"] if "launcher" in present else sorted(set(present) - {"router"}) + ["router"]
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ask_to_end(session: Any, who: str) -> None:
-    """Again for a while when nobody answers: it may have just begun."""
+    """Ask a service to end; repeat for a while if it does not answer, as it may be starting."""
     give_up = time.monotonic() + _START
     while True:
         try:
@@ -43,14 +43,14 @@ def _ask_to_end(session: Any, who: str) -> None:
             return
         except rpc.CallFailed as failed:
             if failed.code != "no_answer" or time.monotonic() > give_up:
-                raise UserError(f"{who} did not take the request: {failed}") from None
+                raise UserError(f"{who} did not accept the request: {failed}") from None
         time.sleep(0.1)
 
 
 def _wait_until_gone(session: Any, who: str) -> None:
-    """It is the router too: with it goes the connection, and then nobody is seen any more."""
+    """Wait until a service is gone: the launcher or the router, with which the connection ends too."""
     give_up = time.monotonic() + _PATIENCE
     while who in alive(session):
         if time.monotonic() > give_up:
-            raise UserError(f"{who} is still there after {_PATIENCE:g} s; its process can be killed: see `mobee status`")
+            raise UserError(f"{who} has not ended after {_PATIENCE:g} s; kill its process, whose number `mobee status` shows")
         time.sleep(0.1)

@@ -16,12 +16,14 @@ from mobee_cli.robot_options import add_urdf_options, urdf_options
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 from services.common.worlds import world_around
 
-_NOTES = """Every motor goes through its range, then all together. What touches turns red, arrows show which way out.
-Prints the address of a page and shows it until Ctrl-C; with --save it writes a file instead, for `rerun FILE`."""
+_NOTES = """Each motor moves through its range, then all motors together. Shapes in contact
+turn red, and arrows show the direction that separates them. The verb prints the
+address of a page, and ends with Ctrl-C; with --save it writes a file instead,
+for `rerun FILE`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """File and options."""
+    """Add the file and the options."""
     parser.epilog = _NOTES
     parser.add_argument("file", help="shipped robot, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="shipped world, or path of a .xml file, to show around it")
@@ -30,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Load, move, show."""
+    """Load the robot and show it in motion."""
     save: Path | None = arguments.save
     require_recording(save)
     try:
@@ -42,15 +44,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def require_recording(save: Path | None) -> None:
-    """Raise UserError unless a recording can be written there."""
+    """Raise UserError if a recording cannot be written to this path."""
     if save is not None and save.suffix.lower() != ".rrd":
-        raise UserError(f"--save {save}: it writes recordings only: give a name that ends in .rrd", BAD_INPUT)
+        raise UserError(f"--save {save}: recordings must have a name that ends in .rrd", BAD_INPUT)
     if save is not None and not save.resolve().parent.is_dir():
-        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: make it", BAD_INPUT)
+        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: create it", BAD_INPUT)
 
 
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None) -> int:
-    """Show the robot on a page until Ctrl-C, or save it to a file; `stretches`: of the motion, None: a sweep."""
+    """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges."""
     try:
         from services.monitor.view import view  # needs the viewer, which is an extra
     except ModuleNotFoundError as error:
@@ -64,6 +66,6 @@ def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequen
             raise
         return 0
     if save is None:
-        raise UserError("the page's server ended by itself; --save FILE.rrd writes a recording instead")
+        raise UserError("the server of the page has ended unexpectedly; --save FILE.rrd writes a recording instead")
     print(f"{save}: open it with `rerun {save}`")
     return 0

@@ -28,8 +28,8 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
-from mobee_cli.roadmap.play import require_free, tell
-from mobee_cli.roadmap.query import way_of
+from mobee_cli.roadmap.play import report, require_free
+from mobee_cli.roadmap.query import find_path
 from services.common import rpc
 from services.common.bus_follow import BusFollower
 from services.common.config import ServiceConfig
@@ -42,7 +42,7 @@ TRIES = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Running:
-    """The system that runs: its robot, the world of its model, the gains of its controller."""
+    """The running system: its robot, the world of its model, the gains of its controller."""
 
     robot: Robot
     world: World
@@ -51,51 +51,49 @@ class Running:
 
 
 def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
-    """Play the way on the robot of the running system, from where it is; tell how it went."""
+    """Move the robot of the running system along a path from where it is, and print the result."""
     if arguments.start is not None:
-        raise UserError("--from is for offline: the robot that runs begins where it is", BAD_INPUT)
+        raise UserError("--from is only valid offline: with --live the path begins where the robot is", BAD_INPUT)
     with running_system(arguments.endpoint) as running:
-        trm = here(trm, running, arguments.other_world)
+        trm = in_running_world(trm, running, arguments.other_world)
         plant = BusFollower(running.service, running.robot)
         running.service.ready()
-        way = way_of(trm, np.clip(plant.q, *running.robot.limits.T), arguments.to)
-        require_free(trm, way, arguments.anyway)
+        found = find_path(trm, np.clip(plant.q, *running.robot.limits.T), arguments.to)
+        require_free(trm, found, arguments.anyway)
         try:
-            played = _played(plant, running, np.array(way["poses"]), arguments.speed)
+            played = _played(plant, running, np.array(found["poses"]), arguments.speed)
         except ActionInterrupted as interruption:
-            raise UserError(f"the motion was broken off: {interruption}. `mobee status` says how the robot is.", FAILED) from None
+            raise UserError(f"the motion was interrupted: {interruption}. `mobee status` shows the state of the robot.", FAILED) from None
         except KeyboardInterrupt:
             raise UserError("interrupted: the robot stays where it is", INTERRUPTED) from None
         except MobeeError as error:
             raise UserError(str(error), FAILED) from None
         finally:
             plant.let_go()
-    return tell(trm, way, played, running.gains, arguments)
+    return report(trm, found, played, running.gains, arguments)
 
 
 def _played(plant: BusFollower, running: Running, path: Array, speed: float) -> Played:
     parts = moving(running.robot, path)
     if not parts:
-        raise UserError("the robot is there already", BAD_INPUT)
+        raise UserError("the robot is at the goal already", BAD_INPUT)
     wanted = timed(running.robot, path, running.gains, speed)
     plant.take(parts)
     outcomes = plant.follow(parts, list(attractors(running.robot, wanted, running.gains)), PERIOD)
     return watched(Model(running.robot, running.world), wanted, *plant.seen(), all(one.settled for one in outcomes.values()))
 
 
-def here(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
-    """The map in the running system's world; raises UserError where robot or world is another."""
+def in_running_world(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
+    """Return the map in the world of the running system; raises UserError if its robot or world differs from that of the map."""
     made, now = robot_digest(trm.model.robot), robot_digest(running.robot)
     if made != now:
-        raise UserError(
-            f"the map is of robot {made}, and the robot that runs, {running.robot.name}, is {now}: build it for that one", BAD_INPUT
-        )
+        raise UserError(f"the map is of robot {made}, and the running robot {running.robot.name} is {now}: build a map for it", BAD_INPUT)
     made, now = world_digest(trm.model.world), world_digest(running.world)
     if made != now and not other_world:
         there = ", ".join(running.world.objects) or "nothing"
         raise UserError(
-            f"the map is of world {made}, and the world of the model that runs is {now} ({there}): build the map in that, or say "
-            "--other-world: then the way alone is checked there",
+            f"the map is of world {made}, and the world of the running model is {now} ({there}): build a map in it, or use "
+            "--other-world: then only the path is checked there",
             BAD_INPUT,
         )
     return replace(trm, model=Model(running.robot, running.world))
@@ -103,20 +101,20 @@ def here(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
 
 @contextmanager
 def running_system(endpoint: str) -> Iterator[Running]:
-    """The system at `endpoint`; raises UserError where there is none."""
+    """Connect to the system at `endpoint`; raises UserError if there is none."""
     with connected(endpoint) as session:
         try:
             settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=TRIES).config)
             objects = rpc.call(session, WHO, keys.world_rpc("list"), Empty, WorldReply, tries=TRIES).objects
         except rpc.CallFailed as failed:
             raise UserError(
-                f"controller or model do not answer at {endpoint} ({failed}): `mobee status` says what runs", ENVIRONMENT
+                f"controller or model do not answer at {endpoint} ({failed}): `mobee status` shows what runs", ENVIRONMENT
             ) from None
         robot, world = load_robot(settings["robot"]), World()
         for one in objects:
             shape, turn = Geometry(one.geometry.kind, tuple(one.geometry.size)), matrix_from_quaternion(np.array(one.quaternion))
             world.add(one.name, shape, position=one.position, rotation=turn, role=one.role)
         with Service(WHO, ServiceConfig(endpoint=endpoint, robot=settings["robot"]), robot, session=session) as service:
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the motion, and that the verb has to tell
-            logging.getLogger().setLevel(logging.CRITICAL)  # what concerns a person is told by the verb
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # Ctrl-C ends the motion, and the verb reports it
+            logging.getLogger().setLevel(logging.CRITICAL)  # the verb itself prints what the user needs
             yield Running(robot, world, Gains.named(settings["gains"]), service)

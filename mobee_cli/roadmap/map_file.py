@@ -1,46 +1,50 @@
-"""Roadmap files and places in them, on the command line."""
+"""Options for roadmap files and places in them, and descriptions of roadmaps, 80 columns wide."""
 
 from __future__ import annotations
 
 import argparse
+import textwrap
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mobee import Model
 from mobee.arrays import Array
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
+from mobee.robot.robot import Robot
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, world_given
 from services.common.exit_codes import BAD_INPUT
 from services.common.worlds import NO_WORLD
 
-PLACES = """A place is the task's coordinates, in the order of `mobee roadmap show`.
-The way begins at home, or at --from: a place of the map, or all motors in rad."""
+COLUMNS = 80
+PLACES = """A place is given by its task coordinates, in the order of `mobee roadmap show`.
+The path begins at home, or at --from: task coordinates, or all motors in rad."""
 
 
 def add_map(parser: argparse.ArgumentParser) -> None:
-    """The map, and its robot."""
-    parser.add_argument("map", type=Path, metavar="MAP", help="a map's file, as `mobee roadmap build` writes it")
-    add_robot(parser, "default: the one it was made for, if that comes with mobee")
-    text = f"look at it in this world: a shipped one, a .xml file, or {NO_WORLD} (default: the world it was made in)"
+    """Add the map, its robot and its world."""
+    parser.add_argument("map", type=Path, metavar="MAP", help="roadmap file, written by `mobee roadmap build`")
+    add_robot(parser, "default: the robot of the map, if it is a shipped one")
+    text = f"use this world: a shipped one, a .xml file, or {NO_WORLD} (default: the world of the map)"
     parser.add_argument("--world", metavar="FILE", help=text)
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Where to, where from."""
-    parser.add_argument("--to", nargs="+", type=float, required=True, metavar="Y", help="the place: task coordinates")
-    parser.add_argument("--from", nargs="+", type=float, dest="start", metavar="Y", help="where from (default: home)")
+    """Add goal and start."""
+    parser.add_argument("--to", nargs="+", type=float, required=True, metavar="Y", help="goal: task coordinates")
+    parser.add_argument("--from", nargs="+", type=float, dest="start", metavar="Y", help="start (default: home)")
 
 
 def map_given(arguments: argparse.Namespace) -> Roadmap:
-    """The map that is named, in the world it was made in or in the one that is given.
+    """Load the map, in its own world or in the one of the option.
 
-    Raises MobeeError; UserError for options of a robot where none is named.
+    Raises MobeeError; UserError for options of a robot without --robot.
     """
     if arguments.robot is None:
-        require_none(arguments, "it is for the robot of --robot FILE", names=())
+        require_none(arguments, "only valid with --robot FILE", names=())
     trm = load_roadmap(arguments.map, robot=robot_given(arguments) if arguments.robot else None)
     if arguments.world is None:
         return trm
@@ -48,7 +52,7 @@ def map_given(arguments: argparse.Namespace) -> Roadmap:
 
 
 def start_of(trm: Roadmap, given: list[float] | None) -> Array:
-    """The posture (n,) rad where the way begins."""
+    """Return the posture (n,) rad where the path begins."""
     robot = trm.model.robot
     if given is None:
         return robot.home.copy()
@@ -69,3 +73,77 @@ def start_of(trm: Roadmap, given: list[float] | None) -> Array:
         )
     within: Array = np.clip(q, low, high)
     return within
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Return a text as lines of at most COLUMNS characters."""
+    return textwrap.wrap(text, COLUMNS, initial_indent=indent, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
+
+
+def summary(trm: Roadmap, path: Path) -> list[str]:
+    """Describe a roadmap: size, robot and world, settings, coordinates."""
+    settings = trm.settings
+    parts = np.bincount(trm.graph.components) if len(trm.q) else np.empty(0, dtype=int)
+    unfinished = "" if settings.get("finished", True) else ", unfinished: the same build command resumes it"
+    lines = wrapped(f"{path}: {len(trm.q)} poses, {len(trm.edges)} edges{unfinished}.")
+    if len(parts) > 1:
+        sizes = ", ".join(map(str, parts[:5])) + (", ..." if len(parts) > 5 else "")
+        lines += wrapped(f"It has {len(parts)} unconnected parts, of {sizes} poses.")
+    objects = ", ".join(trm.model.world.objects) or "nothing"
+    robot, world = settings.get("robot_digest", "?"), settings.get("world_digest", "?")
+    lines += wrapped(f"Robot {trm.model.robot.name} {robot}, world {world} ({objects}).")
+    lines += wrapped(f"Moves {', '.join(_as_parts(trm.model.robot, trm.motors))}.")
+    if settings.get("costs"):
+        lines += wrapped(f"Costs: {', '.join(settings['costs'])}.")
+    made = [f"{key} {settings[key]}" for key in ("method", "seed", "neighbours", "longest") if settings.get(key) is not None]
+    if settings.get("evaluations") is not None:
+        made.append(f"{settings['evaluations']} evaluations")
+    if settings.get("seconds") is not None:
+        made.append(f"{settings['seconds']:.1f} s")
+    if made:
+        lines += wrapped(f"Made by {', '.join(made)}.")
+    lines.append(f"{'coordinate':<32}{'spacing':>9}{'poses from':>12}{'to':>9}{'box from':>10}{'to':>8}")
+    units, box = settings.get("units") or [""] * len(trm.names), settings.get("box") or [(np.nan, np.nan)] * len(trm.names)
+    for k, name in enumerate(trm.names):
+        low, high = (f"{value:.3f}" for value in (trm.y[:, k].min(), trm.y[:, k].max())) if len(trm.y) else ("-", "-")
+        label = f"{name} [{units[k]}]" if units[k] else name
+        lines.append(f"{label[:32]:<32}{trm.spacing[k]:>9.4g}{low:>12}{high:>9}{_number(box[k][0]):>10}{_number(box[k][1]):>8}")
+    return lines
+
+
+def edge_summary(trm: Roadmap) -> list[str]:
+    """Describe how far motors turn along the edges."""
+    if not len(trm.edges):
+        return []
+    turns = np.abs(trm.q[trm.edges[:, 0]] - trm.q[trm.edges[:, 1]]).max(axis=1)
+    usual, rare = np.quantile(turns, (0.5, 0.95))
+    return wrapped(f"Largest turn of a motor along an edge: {usual:.2f} rad (median), {rare:.2f} (95 %), {turns.max():.2f} (maximum).")
+
+
+def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
+    """Return a description of a roadmap as plain JSON values."""
+    return {
+        "map": str(path),
+        "poses": len(trm.q),
+        "edges": len(trm.edges),
+        "parts": np.bincount(trm.graph.components).tolist() if len(trm.q) else [],
+        "names": list(trm.names),
+        "spacing": trm.spacing.tolist(),
+        "low": trm.y.min(axis=0).tolist() if len(trm.y) else None,
+        "high": trm.y.max(axis=0).tolist() if len(trm.y) else None,
+        "settings": trm.settings,
+    }
+
+
+def _as_parts(robot: Robot, motors: tuple[str, ...]) -> list[str]:
+    """Return the names of whole parts, and of the other motors."""
+    found, left = [], list(motors)
+    for name, part in robot.parts.items():
+        if set(part.motors) <= set(left):
+            found.append(name)
+            left = [motor for motor in left if motor not in part.motors]
+    return [*found, *left]
+
+
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.3g}"

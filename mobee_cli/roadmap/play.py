@@ -1,4 +1,4 @@
-"""Moves the robot to a place of a roadmap under the control law, offline or live."""
+"""Moves the robot along a path of a roadmap under the control law, offline or live."""
 
 from __future__ import annotations
 
@@ -15,80 +15,86 @@ from mobee.roadmap.playback import SPEED, Played, play
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
-from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
-from mobee_cli.roadmap.query import way_of
+from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of, wrapped
+from mobee_cli.roadmap.query import find_path
 from mobee_cli.roadmap.show import marker_of
-from mobee_cli.roadmap.text import wrapped
 from services.common.exit_codes import BAD_INPUT, FAILED
 
+DESCRIPTION = "Move the robot along a path of a roadmap under the control law, offline or live."
 NOTES = (
     PLACES
     + """
-Live, it begins where the robot is, and the goals of all parts that move must be
-free. Ctrl-C ends it: what moved stays where it is then.
-Exit code: 0 arrived, 1 not, or something is in the way, 2 bad input, 3 no system
-is running."""
+With --live the path begins where the robot is, and no agent may own a part that
+moves. Ctrl-C ends the motion: the robot stays where it is.
+Exit code: 0 arrived, 1 not arrived, or the path has contacts, 2 bad input, 3 no
+system is running."""
 )
-_FORCE = 0.5  # rad/s^2: a weaker one moves a motor by a quarter of a degree
-_TOLD = 0.02  # rad
-_NEAR = 0.1  # rad: a motor that ends farther from its place has not arrived
+MIN_FORCE = 0.5  # rad/s^2: a weaker force moves a motor by less than a quarter of a degree
+MIN_ERROR = 0.02  # rad: smaller errors are not explained
+MAX_ERROR = 0.1  # rad: a motor that ends farther from its goal has not arrived
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The map, between what, and how."""
+    """Add the map, goal and start, and the options of the motion."""
     add_map(parser)
     add_places(parser)
-    parser.add_argument("--speed", type=float, default=SPEED, metavar="X", help="share of what the springs can do (default: %(default)g)")
-    parser.add_argument("--gains", default="default", metavar="NAME", help="of the control law, offline: default or published_2014")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the encoders' noise, offline (default: 0)")
+    parser.add_argument(
+        "--speed",
+        type=float,
+        default=SPEED,
+        metavar="X",
+        help="share of the highest speed (default: %(default)g)",
+    )
+    parser.add_argument("--gains", default="default", metavar="NAME", help="gains of the control law, offline: default or published_2014")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the encoders' noise, offline (default: 0)")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the motion as a filmstrip")
-    parser.add_argument("--live", action="store_true", help="on the robot of the running system")
-    parser.add_argument("--anyway", action="store_true", help="play although something is in the way: fields and limits will keep it off")
-    text = "live: play although its world is not the map's, if nothing is in the way there"
+    parser.add_argument("--live", action="store_true", help="move the robot of the running system")
+    parser.add_argument("--anyway", action="store_true", help="move even if the path has contacts; the law's forces keep the robot off")
+    text = "live: move even if the world differs from that of the map, if the path has no contacts there"
     parser.add_argument("--other-world", action="store_true", help=text)
     add_endpoint(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Find the way, play it, tell how it went."""
+    """Find the path, move along it, and print the result."""
     if not 0.0 < arguments.speed <= 1.0:
         raise UserError(f"--speed {arguments.speed:g}: must be above 0 and at most 1", BAD_INPUT)
     if arguments.live and arguments.world is not None:
-        raise UserError(f"--world {arguments.world}: it is for offline; live, the world is that of the running model", BAD_INPUT)
+        raise UserError(f"--world {arguments.world}: only valid offline; with --live the world is that of the running model", BAD_INPUT)
     trm = map_given(arguments)
     if arguments.live:
         from mobee_cli.roadmap.live import play_live
 
         return play_live(trm, arguments)
-    way = way_of(trm, start_of(trm, arguments.start), arguments.to)
-    require_free(trm, way, arguments.anyway)
+    path = find_path(trm, start_of(trm, arguments.start), arguments.to)
+    require_free(trm, path, arguments.anyway)
     gains = Gains.named(arguments.gains)
-    played = play(trm.model, way["poses"], arguments.speed, gains=gains, seed=arguments.seed)
-    return tell(trm, way, played, gains, arguments)
+    played = play(trm.model, path["poses"], arguments.speed, gains=gains, seed=arguments.seed)
+    return report(trm, path, played, gains, arguments)
 
 
-def tell(trm: Roadmap, way: dict[str, Any], played: Played, gains: Gains, arguments: argparse.Namespace) -> int:
-    """Print how it went, draw it if that is asked for; returns the exit code."""
-    found = result_of(trm, way, played) | held_off(trm, way, played, gains)
+def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arguments: argparse.Namespace) -> int:
+    """Print the result, draw the motion if requested, and return the exit code."""
+    found = result_of(trm, path, played) | held_off(trm, path, played, gains)
     if arguments.picture is not None:
         found["picture"] = str(_filmstrip(trm, played, arguments.picture))
     print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(trm, found)))
     return 0 if found["arrived"] else FAILED
 
 
-def require_free(trm: Roadmap, way: dict[str, Any], anyway: bool) -> None:
-    """Raise UserError where something is in the way."""
-    if not way["free"] and not anyway:
-        raise UserError(f"something is in the way: {way['why']} --anyway plays the shortest all the same", FAILED)
+def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
+    """Raise UserError if the path has contacts."""
+    if not path["free"] and not anyway:
+        raise UserError(f"the path has contacts: {path['why']} --anyway moves along the shortest path nevertheless", FAILED)
 
 
-def result_of(trm: Roadmap, way: dict[str, Any], played: Played) -> dict[str, Any]:
-    """As plain JSON values."""
-    pose = trm.model.evaluate(np.array([played.q[-1], way["poses"][-1]]))
+def result_of(trm: Roadmap, path: dict[str, Any], played: Played) -> dict[str, Any]:
+    """Return the result of a motion as plain JSON values."""
+    pose = trm.model.evaluate(np.array([played.q[-1], path["poses"][-1]]))
     markers = {name: float(np.linalg.norm(np.diff(pose.position(name), axis=0))) for name in trm.model.robot.markers}
     return {
-        "place": way["place"],
-        "arrived": played.rested and played.missing <= _NEAR,
+        "place": path["place"],
+        "arrived": played.rested and played.missing <= MAX_ERROR,
         "seconds": float(played.times[-1]),
         "rested": played.rested,
         "lag": played.lag,
@@ -102,27 +108,25 @@ def result_of(trm: Roadmap, way: dict[str, Any], played: Played) -> dict[str, An
     }
 
 
-def held_off(trm: Roadmap, way: dict[str, Any], played: Played, gains: Gains) -> dict[str, Any]:
-    """The motor that ended farthest from its place, and which of the law's forces kept it there, None for none."""
-    off = np.abs(played.q[-1] - way["poses"][-1]) * (np.ptp(way["poses"], axis=0) > 0.0)
+def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -> dict[str, Any]:
+    """Return the motor that ended farthest from its goal, and the force that kept it away; None if no force did."""
+    off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
     motor = int(off.argmax())
     forces = constraint_forces(trm.model.evaluate(played.q[-1]), gains)
-    strengths = {"its limit": forces.limits, "a constraint of the robot": forces.constraints, "a field that touches": forces.collision}
+    strengths = {"its limit": forces.limits, "a constraint of the robot": forces.constraints, "a field in contact": forces.collision}
     why, force = max(((name, abs(float(one[motor]))) for name, one in strengths.items()), key=lambda pair: pair[1])
-    return {"farthest": trm.model.robot.motors[motor], "held_by": why if force > _FORCE else None}
+    return {"farthest": trm.model.robot.motors[motor], "held_by": why if force > MIN_FORCE else None}
 
 
 def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     marker = marker_of(trm)
     verdict = "Arrived" if found["arrived"] else "Did not arrive"
-    rest = "" if found["rested"] else ", still moving"
-    held = f", kept off by {found['held_by']}" if found["held_by"] and found["missing"] > _TOLD else ""
-    away = (
-        f"{marker} {1e3 * found['markers'][marker]:.0f} mm from there, {found['farthest']} {found['missing']:.3f} rad from its place{held}"
-    )
-    lines = wrapped(f"{verdict} at {trm.told(np.array(found['place']))} after {found['seconds']:.1f} s{rest}: {away}.")
-    far = f"farther than {found['off']:.3f} rad from the path, nor than {found['lag']:.3f} rad from where it was to be just then"
-    lines += wrapped(f"On the way no motor came {far}.")
+    moving = "" if found["rested"] else ", still moving"
+    held = f", held off by {found['held_by']}" if found["held_by"] and found["missing"] > MIN_ERROR else ""
+    away = f"{marker} {1e3 * found['markers'][marker]:.0f} mm from it, {found['farthest']} {found['missing']:.3f} rad from its goal{held}"
+    lines = wrapped(f"{verdict} at {trm.told(np.array(found['place']))} after {found['seconds']:.1f} s{moving}: {away}.")
+    off, lag = found["off"], found["lag"]
+    lines += wrapped(f"Largest distance of a motor from the path: {off:.3f} rad; from its planned position at the time: {lag:.3f} rad.")
     if found["solid"] > 0.0:
         lines += wrapped(f"Solids touched, by {1e3 * found['solid']:.1f} mm at most: {', '.join(found['touched'])}.")
     else:
@@ -137,7 +141,7 @@ def _filmstrip(trm: Roadmap, played: Played, path: Path) -> Path:
     from mobee.rendering.sheet import Strip, filmstrip
 
     if path.suffix.lower() != ".png" or not path.resolve().parent.is_dir():
-        raise UserError(f"--picture {path}: give a name that ends in .png, in a folder that is there", BAD_INPUT)
+        raise UserError(f"--picture {path}: give a name that ends in .png, in an existing folder", BAD_INPUT)
     rows = slice(None, None, 10)
     motion = motion_through(trm.model, played.q[rows], played.times[rows].tolist())
     return filmstrip([Strip(motion, marker_of(trm))], path)

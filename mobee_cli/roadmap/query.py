@@ -1,4 +1,4 @@
-"""Prints the path through a roadmap to a place: poses, duration, contacts."""
+"""Finds a path through a roadmap to a place."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.errors import UserError
-from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of
-from mobee_cli.roadmap.text import wrapped
+from mobee_cli.roadmap.map_file import COLUMNS, PLACES, add_map, add_places, map_given, start_of, wrapped
 from services.common.exit_codes import FAILED
 
-NOTES = PLACES + "\nExit code: 0 a free way, 1 none, or something is in the way, 2 bad input."
-_NEAR = 0.25  # rad: the law's own forces keep a motor that far from its place
-_MOST = 12  # poses that are told one by one
+DESCRIPTION = "Find a path through a roadmap to a place, and print its poses and its duration."
+NOTES = PLACES + "\nExit code: 0 a path without contacts, 1 none, or it has contacts, 2 bad input."
+NEAR_TURN = 0.25  # rad: the forces of the control law keep a motor this far from its place
+MAX_LISTED = 12  # poses that are printed one by one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The map, and between what."""
+    """Add the map, goal and start."""
     add_map(parser)
     add_places(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Find it and tell it."""
+    """Find the path and print it."""
     trm = map_given(arguments)
-    found = way_of(trm, start_of(trm, arguments.start), arguments.to)
+    found = find_path(trm, start_of(trm, arguments.start), arguments.to)
     print(
         json.dumps(found | {"names": list(trm.names), "motors": list(trm.model.robot.motors)}, indent=2)
         if arguments.json
-        else "\n".join(told(trm, found))
+        else "\n".join(path_text(trm, found))
     )
     return 0 if found["free"] else FAILED
 
 
-def way_of(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
-    """The shortest free way as plain JSON values; where there is none, the shortest, with why.  UserError where there is none at all.
+def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
+    """Return the shortest path without contacts as plain JSON values; if there is none, the shortest path, and why.
 
-    Motors that the map does not move stay where they are, if they are near their place in it.
+    Motors that the map does not move stay where they are, if they are near their positions in the map.  Raises UserError without any path.
     """
-    shortest = _way(trm, start, goal)
-    stay = np.abs(start - trm.q[shortest[0]]) < _NEAR
+    shortest = _shortest(trm, start, goal)
+    stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN
     stay[[trm.model.robot.motor_index(name) for name in trm.motors]] = False
     trm = replace(trm, q=np.where(stay, start, trm.q))
     why = ""
@@ -77,7 +77,7 @@ def way_of(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     }
 
 
-def _way(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
+def _shortest(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
     try:
         return trm.way(start, goal)
     except InvalidValue:
@@ -86,21 +86,21 @@ def _way(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
         raise UserError(str(error), FAILED) from None
 
 
-def told(trm: Roadmap, found: dict[str, Any]) -> list[str]:
-    """For a person, at most 80 columns wide."""
+def path_text(trm: Roadmap, found: dict[str, Any]) -> list[str]:
+    """Return the path as text, at most 80 columns wide."""
     vertices, place = found["vertices"], np.array(found["place"])
     count = len(vertices)
     lines = wrapped(
-        f"To {trm.told(place)}, {max(found['missing']):.2f} spacings from what was asked: over {count} {'pose' if count == 1 else 'poses'} "
+        f"To {trm.told(place)}, {max(found['missing']):.2f} spacings from the goal: over {count} {'pose' if count == 1 else 'poses'} "
         f"of the map, {found['length']:.2f} rad, no step of a motor above {found['largest_step']:.2f} rad, {found['seconds']:.1f} s."
     )
     if found["entry"] > 0.0:
         lines += wrapped(
-            f"From the start to the map's nearest pose some motor turns by {found['entry']:.2f} rad, which no edge vouches for."
+            f"From the start to the nearest pose of the map a motor turns by {found['entry']:.2f} rad; no edge covers this motion."
         )
-    shown = vertices if count <= _MOST else [*vertices[: _MOST // 2], None, *vertices[-_MOST // 2 :]]
-    lines += [f"  {'...' if one is None else f'{one:>6}  {trm.told(trm.y[one])}'}"[:80] for one in shown]
+    shown = vertices if count <= MAX_LISTED else [*vertices[: MAX_LISTED // 2], None, *vertices[-MAX_LISTED // 2 :]]
+    lines += [f"  {'...' if one is None else f'{one:>6}  {trm.told(trm.y[one])}'}"[:COLUMNS] for one in shown]
     if not found["free"]:
-        return lines + wrapped(f"Something is in the way: {found['why']}")
-    round_it = "" if found["shortest"] else "The shortest way touches something: this one leads round it. "
-    return lines + wrapped(f"{round_it}Nothing is in its way, by a check every millimetre.")
+        return lines + wrapped(f"The path has contacts: {found['why']}")
+    detour = "" if found["shortest"] else "The shortest path has contacts: this one avoids them. "
+    return lines + wrapped(f"{detour}The path has no contacts, checked every millimetre.")

@@ -127,7 +127,7 @@ def test_write_srdf_says_what_it_wrote_and_how_it_is_found(touching: Path, capsy
     words = " ".join(said.split())
     assert "toy.srdf: wrote 1 pair of links that touch at home or in all of 10000 random poses." in words
     assert "base fore Always" in words and "100 %" in words
-    assert "With it toy.urdf does not touch itself at home; load_robot finds toy.srdf by itself." in words
+    assert "With it toy.urdf does not touch itself at home; load_robot finds toy.srdf by its name." in words
     assert "overlap in every pose" not in said  # checked as it is read now
     main(["check", str(touching), "--write-srdf"])
     assert "nothing to add" in " ".join(capsys.readouterr().out.split())

@@ -19,7 +19,7 @@ def test_a_robot_goes_to_urdf_and_back(tmp_path: Path, capsys: pytest.CaptureFix
     said = capsys.readouterr().out
     assert "i.urdf: icub, 41 motors, 63 joints, 110 shapes, 7 markers" in said
     assert "i.srdf: parts as groups, home, pairs that are not tested" in said
-    assert "14 clauses stand in a comment only" in said
+    assert "14 clauses are written as a comment only" in said
     assert main(["convert", str(tmp_path / "i.urdf"), str(tmp_path / "i.xml")]) == 0
     assert_same_robot(load_robot("icub"), load_robot(tmp_path / "i.xml"))
 
@@ -33,7 +33,7 @@ def test_options_of_a_urdf_are_passed_on(tmp_path: Path) -> None:
 def test_files_that_are_there_are_kept_unless_told_otherwise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "k.srdf").write_text("mine")
     assert main(["convert", "katana", str(tmp_path / "k.urdf")]) == BAD_INPUT
-    assert "k.srdf is there already. Choose another name, or write over it with --force" in capsys.readouterr().err
+    assert "k.srdf exists already. Choose another name, or overwrite it with --force" in capsys.readouterr().err
     assert not (tmp_path / "k.urdf").exists()
     assert main(["convert", "katana", str(tmp_path / "k.urdf"), "--force"]) == 0
 
@@ -64,7 +64,7 @@ def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsy
     assert f"{new}: 1 objects" in capsys.readouterr().out
     assert load_world(new).objects["ball"].position.tolist() == [1, 2, 0]
     assert main(["convert", str(old), str(tmp_path / "new.urdf")]) == BAD_INPUT
-    assert "a world is written as .xml: URDF knows robots only" in capsys.readouterr().err
+    assert "a world can only be written as .xml: a URDF holds robots only" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsy
     [
         (["icbu", "x.urdf"], BAD_INPUT, "Did you mean 'icub'?"),
         (["icub", "x.sdf"], BAD_INPUT, "x.sdf: OUT must end in .xml or .urdf"),
-        (["icub", "nowhere/x.urdf"], FAILED, "nowhere: make it, or choose another"),
+        (["icub", "nowhere/x.urdf"], FAILED, "there is no folder"),
         (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for .urdf files"),
         (["mine.urdf", "x.xml"], BAD_INPUT, "mine.urdf: no such file"),
     ],

@@ -89,7 +89,7 @@ def test_a_short_run_is_not_mixed_with_a_whole_one(tmp_path, capsys):
     folder.mkdir()
     (folder / "config.json").write_text(json.dumps({"experiment": "reward-decay", "options": {"seed": 0, "seeds": 1, "quick": False}}))
     assert main(["experiment", "run", "reward-decay", "--resume", str(folder), "--quick"]) == 2
-    assert "was begun without --quick" in capsys.readouterr().err
+    assert "was started without --quick" in capsys.readouterr().err
 
 
 def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):

@@ -133,5 +133,5 @@ def test_what_was_learned_of_reaching_is_a_table_of_its_own(tmp_path: Path, caps
 
 def test_a_run_without_reaches_has_no_table_of_them(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(run), "--reaches"]) == 2
-    assert "nobody has learned to reach" in capsys.readouterr().err
+    assert "no agent has learned to reach" in capsys.readouterr().err
     assert not (run / "reaches.csv").exists()

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import pytest
 
 import services.monitor.view
-from mobee_cli import bench, check, robots, topic, topic_echo, topic_hz, topic_list
+from mobee_cli import bench, check, roadmap, robots, topic
 from mobee_cli.__main__ import VERBS, main
 from tests.services.launcher.launched import mobee
 
@@ -25,12 +25,25 @@ def test_an_unknown_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().err.startswith("mobee: unknown verb 'lanch'. Did you mean 'launch'?")
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+ACTIONS = {
+    "topic": ("list", "echo", "hz"),
+    "roadmap": tuple(roadmap.ACTIONS),
+    "experiment": ("list", "run", "figure", "claims"),
+    "bench": tuple(bench.BENCHES),
+}
+
+
+@pytest.mark.parametrize("words", [[verb, *action] for verb in VERBS for action in [[], *([name] for name in ACTIONS.get(verb, ()))]])
+def test_every_verb_and_action_has_help_that_fits_80_columns(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     with pytest.raises(SystemExit) as ended:
-        main([verb, "--help"])
+        main([*words, "--help"])
     assert ended.value.code == 0
-    assert f"usage: mobee {verb}" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert f"usage: mobee {' '.join(words)}" in text
+    assert [line for line in text.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.parametrize(
@@ -69,12 +82,10 @@ def test_ctrl_c_is_no_success(
     assert capsys.readouterr().err == f"mobee {arguments[0]}: interrupted\n"
 
 
-@pytest.mark.parametrize(
-    ("module", "arguments", "code"), [(topic_echo, ["echo", "clock"], 0), (topic_hz, ["hz", "clock"], 0), (topic_list, ["list"], 130)]
-)
-def test_ctrl_c_is_how_to_end_what_has_no_end(module: Any, arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("arguments", "code"), [(["echo", "clock"], 0), (["hz", "clock"], 0), (["list"], 130)])
+def test_ctrl_c_is_how_to_end_what_has_no_end(arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(topic, "connected", lambda _: contextlib.nullcontext())
-    monkeypatch.setattr(module, "run", interrupt)
+    monkeypatch.setattr(topic, "listen", interrupt)
     assert main(["topic", *arguments]) == code
 
 

@@ -39,10 +39,10 @@ def test_the_path_goes_round_what_never_worked_and_says_so(run: Path, capsys: py
     first, *steps, mean, shortest, failing, avoided = capsys.readouterr().out.splitlines()
     assert first.startswith("torso, by 600 transitions: from state 0 to 2 by 4 actions, all as expected with probability 0.9")
     assert len(steps) == 4 and all("->" in line and "tried" in line for line in steps)
-    assert mean.startswith("Planning anew after each action, 4.")
-    assert shortest.startswith("If every action worked, 2 would do. Expected to fail")
+    assert mean.startswith("With a new plan after each action, 4.")
+    assert shortest.startswith("If every action succeeded, 2 would be enough. Expected to fail")
     assert failing.split()[:3] == ["0", "->", "1"] and float(failing.split()[3]) < 0.1
-    assert avoided.startswith("Avoided (probability of getting through): 1 (0.0")
+    assert avoided.startswith("Avoided states (probability of passing): 1 (0.0")
 
 
 def test_as_json_with_poses(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,9 +74,9 @@ def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys
     [
         (["--to", "27"], "torso has no such state. Valid are 0 to 26"),
         (["--to", "0.1", "0.2"], "give the 3 joints (torso_yaw, torso_roll, torso_pitch)"),
-        (["--to", "there"], "'there' is no place"),
+        (["--to", "there"], "'there' is not valid"),
         (["--to", "nan", "0", "0"], "not finite"),
-        (["--to", "0", "2", "0"], "torso_roll cannot be at 2 rad: valid is -0.524 to 0.524. Of several states give one."),
+        (["--to", "0", "2", "0"], "torso_roll cannot be at 2 rad: valid is -0.524 to 0.524. Give one state only."),
         (["--to", "0", "0", "-0.5"], "torso_pitch cannot be at -0.5 rad"),
         (["--to", "3", "--agent", "tors"], "Did you mean 'torso'?"),
         (["--to", "3", "--robot", "icub_2014"], "of robot 'icub', given 'icub_2014'"),
@@ -107,7 +107,7 @@ def test_a_run_whose_robot_is_not_known_says_how_to_name_it(own: Path, capsys: p
     assert "unknown robot 'chain'" in said and said.endswith("name it with --robot FILE.\n")
     assert planned(own, "--to", "0", "--robot", str(own / "arm.urdf"), capsys=capsys)["path"][-1] == 0
     assert main(["plan", "--run", str(own), "--to", "0", "--field", "0.02"]) == 2
-    assert "--field 0.02: it is for the robot of --robot FILE" in capsys.readouterr().err
+    assert "--field 0.02: only valid with --robot FILE" in capsys.readouterr().err
 
 
 def test_the_settings_of_a_run_name_its_robot(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,7 +115,7 @@ def test_the_settings_of_a_run_name_its_robot(own: Path, capsys: pytest.CaptureF
     assert planned(own, "--to", "0", capsys=capsys)["path"][-1] == 0
     (own / "arm.urdf").rename(own / "moved.urdf")
     assert main(["plan", "--run", str(own), "--to", "0"]) == 2
-    assert "there is no such file: name it with --robot FILE" in capsys.readouterr().err
+    assert "it does not exist: name it with --robot FILE" in capsys.readouterr().err
     (own / "scenario.toml").write_text("title = ")
     assert main(["plan", "--run", str(own / STORE), "--to", "0"]) == 2
     assert "the settings of the run cannot be read" in capsys.readouterr().err

@@ -50,8 +50,8 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest
     np.testing.assert_allclose(np.linalg.norm(np.array(result["nearest"]["position"]) - [-3.0, 0.2, 0.1]), result["nearest"]["distance"])
     assert main(["reach", "--offline", "--target", "-3", "0.2", "0.1"]) == 1
     said = capsys.readouterr().out
-    assert "right_palm did not come to the target at (-3.000, 0.200, 0.100)" in said
-    assert "The nearest that part right_arm can bring it is (" in said
+    assert "right_palm did not reach the target at (-3.000, 0.200, 0.100)" in said
+    assert "The nearest position that part right_arm can reach is (" in said
     assert max(map(len, said.splitlines())) <= 80
 
 
@@ -127,7 +127,7 @@ def test_what_cannot_be_reached_for_is_refused_in_one_line(words: list[str], say
     ("words", "marker", "part", "why"),
     [
         ([], "right_palm", "right_arm", "the palm nearer to the target at home"),
-        (["--marker", "left_palm"], "left_palm", "left_arm", "the part with most motors that move it"),
+        (["--marker", "left_palm"], "left_palm", "left_arm", "the part with the most motors that move it"),
         (["--part", "torso"], "right_palm", "torso", "the marker of torso"),
         (["--part", "right_arm", "--marker", "right_elbow"], "right_elbow", "right_arm", ""),
     ],
@@ -185,7 +185,7 @@ def test_a_robot_or_world_that_cannot_be_used_is_refused_in_one_line(
 def test_the_robot_of_the_running_system_cannot_be_chosen(capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["--robot", "katana"], ["--world", "none"], ["--field", "0.03"]):
         assert main(["reach", "--target", "-0.3", "0.2", "0.1", *words]) == 2
-        assert f"{words[0]} {words[1]}: it is for --offline" in capsys.readouterr().err
+        assert f"{words[0]} {words[1]}: only valid with --offline" in capsys.readouterr().err
 
 
 def test_the_robot_of_a_run_is_that_of_its_settings(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:

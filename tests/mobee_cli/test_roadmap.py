@@ -12,7 +12,7 @@ import pytest
 import mobee
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
-from mobee_cli.roadmap.tour import PLACES, tour
+from mobee_cli.roadmap.show import TOUR_PLACES, tour
 from tests.services.robots import chain
 
 MOTORS = ("r_shoulder_pitch", "r_shoulder_roll")
@@ -81,8 +81,8 @@ def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path
     assert code == 0
     assert "25 poses, 40 edges." in _flat(out) and "r_shoulder_pitch, r_shoulder_roll, r_elbow" in _flat(out)
     assert next(line for line in lines if line.startswith("yaw [rad]")).split()[2:] == ["0.1", "0.000", "0.400", "0", "0.4"]
-    assert "None of the 40 edges touches something" in _flat(out)
-    assert f"right_palm is: {tmp_path}" in _flat(out)
+    assert "None of the 40 edges has contacts" in _flat(out)
+    assert f"right_palm in all poses: {tmp_path}" in _flat(out)
     assert drawn[0][1].shape == (25, 41) and drawn[0][2:] == ("right_palm", tmp_path / "a.png")
 
 
@@ -91,7 +91,7 @@ def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> No
     stretches = tour(trm)
     moves = [trm.model.robot.motor_index(name) for name in MOTORS]
     seen = np.concatenate([one.poses for one in stretches])[:, moves]
-    assert len(stretches) == PLACES - 1 and all("yaw" in one.title and "elbow" in one.title for one in stretches)
+    assert len(stretches) == TOUR_PLACES - 1 and all("yaw" in one.title and "elbow" in one.title for one in stretches)
     assert np.abs(np.diff(seen, axis=0)).max() < 0.05
     np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [[-0.9, 0.6], [-0.1, 1.4]], atol=1e-5)
 
@@ -99,8 +99,8 @@ def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> No
 def test_query_tells_the_way(say: Say, free: Path) -> None:
     code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2)
     assert code == 0
-    assert "To yaw 0.4, elbow 0.2, 0.00 spacings from what was asked: over 7 poses" in _flat(out)
-    assert "Nothing is in its way" in _flat(out)
+    assert "To yaw 0.4, elbow 0.2, 0.00 spacings from the goal: over 7 poses" in _flat(out)
+    assert "The path has no contacts" in _flat(out)
     code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2, "--json")
     found = json.loads(out)
     assert code == 0 and found["free"] and found["vertices"][0] == 0 and found["vertices"][-1] == 22
@@ -117,7 +117,7 @@ def test_a_way_from_home_begins_there(say: Say, free: Path) -> None:
 
 def test_a_way_goes_round_what_is_in_it(say: Say, blocked: Path) -> None:
     code, out, _ = say("query", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
-    assert code == 0 and "The shortest way touches something: this one leads round it." in _flat(out)
+    assert code == 0 and "The shortest path has contacts: this one avoids them." in _flat(out)
 
 
 def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: Path) -> None:
@@ -125,7 +125,7 @@ def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: P
     start = mobee.load_roadmap(blocked).q[12]
     assert mobee.load_roadmap(blocked).model.evaluate(start).count and len(start) == len(robot.motors)
     code, out, _ = say("query", blocked, "--from", *start, "--to", 0.2, 0.3)
-    assert code == 1 and "Something is in the way: no free way: the straight ones" in _flat(out)
+    assert code == 1 and "The path has contacts: no free way: the straight ones" in _flat(out)
     code, out, err = say("play", blocked, "--from", *start, "--to", 0.2, 0.3)
     assert code == 1 and out == "" and "--anyway" in err
 
@@ -170,7 +170,7 @@ def test_without_a_system_live_says_so(say: Say, free: Path) -> None:
     code, _, err = say("play", free, "--to", 0, 0, "--live", "--endpoint", "tcp/127.0.0.1:1")
     assert code == 3 and "mobee launch" in err
     code, _, err = say("play", free, "--to", 0, 0, "--from", 0, 0, "--live", "--endpoint", "tcp/127.0.0.1:1")
-    assert code == 2 and "begins where it is" in _flat(err)
+    assert code == 2 and "begins where the robot is" in _flat(err)
 
 
 def test_tasks_are_listed_with_their_figures(say: Say) -> None:
@@ -244,9 +244,9 @@ def test_a_task_file_is_built_shown_asked_and_played_for_another_robot(
     path, robot = tmp_path / "task.npz", ("--robot", arm)
     assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--neighbours", 4, *robot)[0] == 0
     code, out, _ = say("show", path, *robot)
-    assert code == 0 and "Robot chain" in _flat(out) and "(nothing)" in _flat(out) and "Where link_3 is" in _flat(out)
+    assert code == 0 and "Robot chain" in _flat(out) and "(nothing)" in _flat(out) and "Picture of link_3" in _flat(out)
     code, out, _ = say("query", path, *robot, "--from", 0.6, 0.8, "--to", 0.8, 0.9)
-    assert code == 0 and "Nothing is in its way" in _flat(out)
+    assert code == 0 and "The path has no contacts" in _flat(out)
     assert say("play", path, *robot, "--from", 0.6, 0.8, "--to", 0.8, 0.9)[0] == 0
     code, out, err = say("query", path, "--to", 0.8, 0.9)
     assert code == 2 and out == "" and "--robot FILE" in err
@@ -259,24 +259,24 @@ def test_a_way_is_looked_at_in_another_world(say: Say, arm: Path, tmp_path: Path
     place = " ".join(f'p{axis}="{value:.4f}"' for axis, value in zip("xyz", at, strict=True))
     (tmp_path / "ball.xml").write_text(f'<World name="ball"><sphere name="ball" radius="0.1" {place}/></World>')
     code, out, _ = say("query", path, "--robot", arm, "--world", tmp_path / "ball.xml", *words)
-    assert code == 1 and "Something is in the way" in out
+    assert code == 1 and "The path has contacts" in out
     assert say("query", path, "--robot", arm, "--world", "none", *words)[0] == 0
     code, _, err = say("play", path, "--robot", arm, "--world", "none", "--live", "--to", 0.8, 0.9)
-    assert code == 2 and "--world none: it is for offline" in err
+    assert code == 2 and "--world none: only valid offline" in err
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["build", "palm-down", "--robot", "{arm}"], "the task 'palm-down' is made of the markers and motors of the icub"),
+        (["build", "palm-down", "--robot", "{arm}"], "the task 'palm-down' uses the markers and motors of the icub"),
         (["build", "palm-down", "--world", "none"], "--world none: the task 'palm-down'"),
-        (["build", "{folder}/fixed.py", "--robot", "{arm}"], "fixed.py makes its model itself; write `def example(model)`"),
+        (["build", "{folder}/fixed.py", "--robot", "{arm}"], "fixed.py makes its own model; to use the option, write `def example(model)`"),
         (["build", "{folder}/many.py"], "many.py: example has 2 parameters"),
         (["build", "{folder}/task.py", "--robot", "no.urdf"], "no.urdf: no such file"),
         (["build", "{folder}/task.py", "--robot", "{arm}", "--world", "tabel"], "Did you mean 'table'?"),
         (["build", "{folder}/task.py", "-o", "{folder}/a.npz"], "unknown part or motor 'joint_1'"),
         (["build", "{folder}/wrong.py"], "wrong.py:3: ZeroDivisionError"),
-        (["query", "{map}", "--to", "0", "0", "--field", "0.1"], "--field 0.1: it is for the robot of --robot FILE"),
+        (["query", "{map}", "--to", "0", "0", "--field", "0.1"], "--field 0.1: only valid with --robot FILE"),
     ],
 )
 def test_a_robot_that_does_not_fit_is_refused_in_a_line(say: Say, free: Path, arm: Path, words: list[str], text: str) -> None:
@@ -321,4 +321,4 @@ def test_an_interrupted_build_says_how_to_go_on(say: Say, tmp_path: Path, monkey
     monkeypatch.setattr(mobee, "build_roadmap", interrupted, raising=False)
     code, out, err = say("build", "palm-down", "-o", tmp_path / "map.npz")
     assert code == 130 and out == ""
-    assert "interrupted at 30 vertices, 10 open" in err and "the same command goes on" in _flat(err)
+    assert "interrupted at 30 vertices, 10 open" in err and "the same command resumes" in _flat(err)

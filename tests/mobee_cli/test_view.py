@@ -61,7 +61,7 @@ def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["view", "icubb"]) == 2
     assert "Did you mean 'icub'" in capsys.readouterr().err
     assert main(["view", "katana", "--save", str(tmp_path / "missing" / "out.rrd")]) == 2
-    assert "make it" in capsys.readouterr().err
+    assert "create it" in capsys.readouterr().err
     assert main(["view", "katana", "--save", str(tmp_path / "out.png")]) == 2
     assert "ends in .rrd" in capsys.readouterr().err
 

@@ -91,7 +91,7 @@ def play_a_map(path: Path, endpoint: str) -> dict[str, Any]:
     argv = [sys.executable, "-m", "mobee_cli", "roadmap", "play", str(path), "--to", "1", "--live", "--endpoint", endpoint, "--json"]
     for _ in range(ATTEMPTS):
         done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
-        if "the motion was broken off" not in done.stderr:
+        if "the motion was interrupted" not in done.stderr:
             break
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))
