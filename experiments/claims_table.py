@@ -1,4 +1,4 @@
-"""The table of claims: what experiments state, filled in with what their runs found (experiments/README.md)."""
+"""The table of claims with the measured numbers of runs, written to experiments/README.md."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ RECORD, PAGE = HERE / "claims.json", HERE / "README.md"
 Rows = list[tuple[str, Claim]]  # the name of the experiment, and one of its claims
 Recorded = dict[str, dict[str, Any]]  # by experiment: its claims as dicts, "commit", "seeds"
 
-_INDENT = 11  # of what stands below a verdict
+_INDENT = 11  # of the lines below a verdict
 
 _HEAD = f"""\
 # Experiments
 
-What was published, what this project measured, and whether it holds. `mobee experiment claims --write` writes this page from
-the runs with the most seeds, of those the newest; do not edit it.
+Published claims, the numbers that this project measured, and verdicts. `mobee experiment claims --write` writes this page from
+the runs with the most seeds, and of those from the newest; do not edit it.
 
 An experiment is one module in `claims/`, by chapter of the thesis: its docstring states claim, source, published number and run time.
-`mobee experiment list` names them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
-`mobee experiment run chapter7` does all that the table below needs. Numbers are interquartile means with 95 % bootstrap
-intervals, unless they say otherwise; how many runs they rest on is in the last column.
+`mobee experiment list` lists them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
+`mobee experiment run chapter7 --all` runs those of chapter 7. Numbers are interquartile means with 95 % bootstrap
+intervals, unless stated otherwise; the last column has the number of seeds.
 
-A sweep (`--seeds N`) works on all cores; each finished cell is on disk at once, and `--resume` goes on behind them after Ctrl-C or a
-kill. `--engine ray` (`pip install \"mobee[cluster]\"`) works on the Ray cluster that this machine belongs to, on all its machines, and on
-this machine alone if there is none; MoBeE must be installed on each of them in the same version. `--quick` shows whether it works.
+A sweep (`--seeds N`) uses all cores; each finished cell is written to disk, and `--resume` continues after Ctrl-C or a kill.
+`--engine ray` (`pip install '.[cluster]'`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
+is none; MoBeE must be installed on all of them in the same version. `--quick` runs a short version, to check that it works.
 
-**confirmed**: our number is what was published. **refuted**: it is not. **open**: it was not measured, does not decide, or rests on
+**confirmed**: our number agrees with the publication. **refuted**: it does not. **open**: it was not measured, does not decide, or has
 fewer than {MIN_SEEDS} seeds.
 
 Where states have 16 neighbours, many samples are equally far, and which become neighbours is drawn. In exploration-coverage and
@@ -46,24 +46,24 @@ starts and ties of choice, not the draw of the graph, and what the numbers say m
 
 
 def stated() -> Rows:
-    """The claims that the experiments list, without our numbers; those of chapter 7 first, in its order."""
+    """Return the claims of all experiments without measured numbers; those of chapter 7 first, in its order."""
     names = dict.fromkeys((*CHAPTER7, *BEYOND, *EXPERIMENTS))
     return [(name, claim) for name in names for claim in load_experiment(name).claims]
 
 
 def recorded() -> Recorded:
-    """What the page was last written from."""
+    """Return the record from which the page was last written."""
     return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
 def rows(record: Mapping[str, Mapping[str, Any]]) -> Rows:
-    """Every claim stated, with our number where there is one."""
+    """Return every claim, with its measured number if there is one."""
     measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in record.items() for c in entry["claims"]}
     return [(name, measured.get((name, claim.source, claim.text), claim)) for name, claim in stated()]
 
 
 def found_in(folders: Sequence[Path]) -> Recorded:
-    """The claims of finished runs, of a chapter's parts too; `better` says which of several counts.
+    """Return the measured claims of finished runs, including the parts of a chapter's run; see `better` for several runs.
 
     Raises InvalidValue for a folder without results.
     """
@@ -71,7 +71,7 @@ def found_in(folders: Sequence[Path]) -> Recorded:
     for folder in folders:
         entries = [path.parent for path in (folder / RESULTS, *sorted(folder.glob(f"*/{RESULTS}"))) if path.exists()]
         if not entries:
-            raise InvalidValue(f"{folder} has no results: finish it with `mobee experiment run NAME --resume {folder}`.")
+            raise InvalidValue(f"{folder} has no results: finish the run with `mobee experiment run NAME --resume {folder}`.")
         for entry in entries:
             config = read(entry / CONFIG)
             claims = open_with_few_seeds(read(entry / RESULTS), config["options"]).get("claims")
@@ -83,13 +83,13 @@ def found_in(folders: Sequence[Path]) -> Recorded:
 
 
 def better(before: Recorded, after: Recorded) -> Recorded:
-    """Of each experiment the record with more seeds, and `after` where they have as many."""
+    """Merge two records: of each experiment the one with more seeds, and `after` if both have equally many."""
     more = {name: one for name, one in after.items() if name not in before or (one["seeds"] or 0) >= (before[name]["seeds"] or 0)}
     return {**before, **more}
 
 
 def finished_runs(runs: Path) -> list[Path]:
-    """The runs that are finished, at least in part, and no --quick ones, the oldest first."""
+    """Return the folders of runs with results, without --quick runs, the oldest first."""
     folders = sorted({path.parent for path in runs.glob(f"*/{CONFIG}")}, key=lambda folder: folder.name)
     return [folder for folder in folders if current_name(read(folder / CONFIG).get("experiment", "")) in EXPERIMENTS and _counts(folder)]
 
@@ -100,14 +100,14 @@ def _counts(run: Path) -> bool:
 
 
 def write_page(record: Recorded) -> None:
-    """Keep the numbers, and write the page from them."""
+    """Write the record and the page."""
     kept = {name: record[name] for name in sorted(record) if name in EXPERIMENTS}
     RECORD.write_text(json.dumps(kept, indent=1) + "\n")
     PAGE.write_text(page(kept))
 
 
 def page(record: Recorded) -> str:
-    """The page as Markdown."""
+    """Return the page as Markdown."""
     table = rows(record)
     counts = Counter(claim.verdict for _, claim in table)
     lines = [_HEAD, f"{len(table)} claims: {counts['confirmed']} confirmed, {counts['refuted']} refuted, {counts['open']} open.", ""]
@@ -121,7 +121,7 @@ def page(record: Recorded) -> str:
 
 
 def claims_text(table: Sequence[tuple[str, Claim]], width: int) -> str:
-    """For a terminal: each claim with its verdict, and below it the numbers."""
+    """Return the claims as text for a terminal: each with its verdict, and the numbers below."""
     lines = []
     for _, claim in table:
         parts = (f"{claim.text} ({claim.source})", f"published: {claim.published}", f"ours: {claim.ours or 'not measured'}")

@@ -1,4 +1,4 @@
-"""The experiments that `mobee experiment` knows: one line each."""
+"""The names of the experiments of `mobee experiment`, and the modules that hold them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ FORMER_NAMES = {  # still accepted, and read in the records of older runs
     "wall": "forced-contact",
 }
 
-CHAPTER7 = (  # what `mobee experiment run chapter7` runs, in this order: thesis chapter 7 and section 3 of the paper
+CHAPTER7 = (  # run in this order by `mobee experiment run chapter7`: thesis chapter 7 and section 3 of the paper
     "hypercube-exploration",
     "exploration-coverage",
     "constraint-discovery",
@@ -100,18 +100,18 @@ BEYOND = ("model-accuracy", "neighbour-count", "prm-vs-mdp", "plant-sensitivity"
 
 
 def current_name(name: str) -> str:
-    """The name of an experiment today, given that or a former one; other names are returned as they are."""
+    """Return the current name of an experiment, given its current or a former name; other names are returned unchanged."""
     return FORMER_NAMES.get(name, name)
 
 
 def all_names(name: str) -> tuple[str, ...]:
-    """The current name of an experiment, then its former ones."""
+    """Return the current name of an experiment and its former names."""
     current = current_name(name)
     return (current, *(former for former, new in FORMER_NAMES.items() if new == current))
 
 
 def load_experiment(name: str) -> Experiment:
-    """The experiment of that name, which may be a former one; raises UnknownName with the nearest name."""
+    """Return the experiment of a current or former name; raises UnknownName with the nearest name."""
     name = current_name(name)
     if name not in EXPERIMENTS:
         raise UnknownName("experiment", name, EXPERIMENTS)

@@ -83,7 +83,7 @@ def test_short_and_unfinished_runs_are_not_taken_by_themselves(tmp_path, claim):
 
 
 def test_a_run_without_results_is_refused(tmp_path):
-    with pytest.raises(InvalidValue, match="has no results: finish it"):
+    with pytest.raises(InvalidValue, match="has no results: finish the run"):
         found_in([new_run(tmp_path, "exploration-coverage", {})])
 
 

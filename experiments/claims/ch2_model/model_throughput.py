@@ -1,13 +1,13 @@
-"""Flood: evaluations of the model per second while its world changes without any waiting (thesis Algorithm 1, FLOOD_MODEL).
+"""Model throughput: evaluations per second while a thread edits the world without a pause (thesis Algorithm 1, FLOOD_MODEL).
 
-Claim: every joint moves, one thread removes and creates boxes as fast as it can, ever more of them; the model gives a consistent
-answer hundreds of times a second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4,
+Claim: while every joint moves and one thread removes and creates boxes as fast as it can, in growing numbers, the model gives
+consistent results hundreds of times per second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4,
 figure 2.4.  Published: "hundreds of poses per second for a humanoid with hundreds of obstacles" on a dual-core 2.4 GHz laptop;
 the figure's curves are not given as numbers.  Run time: three to five minutes for the whole algorithm, 1000 numbers of
 objects with 1000 removals and creations each, for both robots.
 
 `--check` runs the endurance instead: several threads add, move, remove, attach, detach and change roles in one world while the
-model evaluates; no evaluation may see a torn world, nothing may raise, memory must stay flat.
+model evaluates; no evaluation may see a half-made edit, nothing may raise, memory must stay constant.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Any, TypedDict
 import numpy as np
 
 from experiments.claims.ch2_model.model_throughput_endurance import ENDURANCE, ENDURANCE_COLUMNS, endure, plot_endurance
-from experiments.claims.ch2_model.model_throughput_threads import MovingModel, Oscillator, quick_hand_over, random_boxes
+from experiments.claims.ch2_model.model_throughput_threads import MovingModel, Oscillator, fast_thread_switching, random_boxes
 from experiments.kit.command_line import Progress, positive_number, positive_whole
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.plots import new_figure
@@ -33,27 +33,27 @@ from mobee.errors import InvalidValue
 
 ROBOTS = ("katana", "icub")
 RECORDS = "flood.csv"
-ENDURANCE_LASTS = 600.0  # s
+ENDURANCE_SECONDS = 600.0  # s
 
-STILL_FOR = 0.5  # s
-POOL = 4000  # boxes made beforehand: the flood shall not wait for random numbers
-NUMBERS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # of objects, at which rates are given
-NEAR = 0.1  # records of so much more or fewer objects count as well: a flood lasts some 20 ms at a number
-SHORTEST = 0.2  # s; in less the threads take turns so seldom that a rate is chance
+STILL_SECONDS = 0.5  # s without edits
+POOL = 4000  # boxes made in advance, so that no time is spent on random numbers
+NUMBERS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # of objects, at which rates are reported
+NEAR = 0.1  # relative difference in the number of objects within which records are pooled: one takes some 20 ms
+MIN_SECONDS = 0.2  # s; over shorter times the threads alternate too rarely for a rate
 
 COLORS = {"katana": "tab:orange", "icub": "tab:blue"}
 LABELS = {"katana": "Katana", "icub": "iCub"}
-BIN = 1.0  # s of flood a point of a curve
+BIN = 1.0  # s of edits per point of a curve
 HUNDREDS = (100.0, 1000.0)
 STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
 
 
 class Record(TypedDict):
-    """Counts while there were so many objects."""
+    """Counts while the world held a number of objects."""
 
     robot: str
     objects: int
-    edits: int  # 0: the world stood still
+    edits: int  # 0: without edits
     seconds: float
     evaluations: int
 
@@ -64,17 +64,17 @@ COLUMNS = tuple(Record.__annotations__)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
     parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=list(ROBOTS), metavar="ROBOT", help=f"of {', '.join(ROBOTS)}")
-    parser.add_argument("--objects", type=positive_whole, default=1000, metavar="N", help="up to so many boxes (default: 1000)")
+    parser.add_argument("--objects", type=positive_whole, default=1000, metavar="N", help="largest number of boxes (default: 1000)")
     parser.add_argument("--edits", type=positive_whole, default=1000, metavar="N", help="replaced boxes at each number (default: 1000)")
-    parser.add_argument("--duration", type=positive_number, metavar="S", help="end after so many seconds (default: never; --check: 600)")
+    parser.add_argument("--duration", type=positive_number, metavar="S", help="end after S seconds (default: never; --check: 600)")
     parser.add_argument("--check", action="store_true", help="endurance: many threads, every evaluation checked")
-    parser.add_argument("--threads", type=positive_whole, default=4, metavar="N", help="that edit, with --check (default: 4)")
+    parser.add_argument("--threads", type=positive_whole, default=4, metavar="N", help="editing threads, with --check (default: 4)")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Flood the model of each robot, or check its endurance."""
     if arguments.check:
-        return endure(folder, threads=arguments.threads, duration=arguments.duration or ENDURANCE_LASTS, seed=arguments.seed)
+        return endure(folder, threads=arguments.threads, duration=arguments.duration or ENDURANCE_SECONDS, seed=arguments.seed)
     give_up = time.monotonic() + arguments.duration if arguments.duration else float("inf")
     path = folder / RECORDS
     done = read_flood(path)
@@ -96,7 +96,7 @@ def _line(record: Record) -> str:
 
 
 class Flood:
-    """Any number of boxes in a world, of which random ones are replaced as fast as possible."""
+    """Boxes in a world, of which random ones are replaced as fast as possible."""
 
     def __init__(self, world: World, robot: str, seed: int) -> None:
         self._world = world
@@ -110,7 +110,7 @@ class Flood:
         self.names.append(self._new())
 
     def replace_objects(self, times: int) -> None:
-        """Remove a random box and create one, so many times."""
+        """Remove a random box and create a new one, `times` times."""
         for _ in range(times):
             place = self._choose(len(self.names))
             self._world.remove(self.names[place])
@@ -123,27 +123,27 @@ class Flood:
 
 
 def flood_model(robot: str, *, first: int, last: int, edits: int, seed: int, is_over: Callable[[], bool]) -> Iterator[Record]:
-    """FLOOD_MODEL from `first` to `last` objects, `edits` removals and creations at each number; a record a number.
+    """Run FLOOD_MODEL from `first` to `last` objects with `edits` replacements at each number, and yield a record for each.
 
-    After the flood at each of NUMBERS comes a record without edits.  Ends early when `is_over`.
+    At each of NUMBERS a second record without edits follows.  Ends early when `is_over()`.
     """
     model = Model(load_robot(robot))
     flood = Flood(model.world, robot, seed)
     while len(flood.names) < first - 1:
         flood.create_object()
     oscillator = Oscillator(model.robot, np.random.default_rng(seed))
-    with quick_hand_over(), MovingModel(model, oscillator) as moving:
+    with fast_thread_switching(), MovingModel(model, oscillator) as moving:
         timer = _Timer(robot, moving)
-        time.sleep(STILL_FOR)  # what is loaded or built at first is not timed
+        time.sleep(STILL_SECONDS)  # loading and building at the start are not timed
         if first == 1:
-            yield timer.record(0, 0, lambda: time.sleep(STILL_FOR))
+            yield timer.record(0, 0, lambda: time.sleep(STILL_SECONDS))
         for objects in range(first, last + 1):
             if is_over():
                 return
             flood.create_object()
             yield timer.record(objects, edits, lambda: flood.replace_objects(edits))
             if objects in NUMBERS:
-                yield timer.record(objects, 0, lambda: time.sleep(STILL_FOR))
+                yield timer.record(objects, 0, lambda: time.sleep(STILL_SECONDS))
 
 
 class _Timer:
@@ -159,7 +159,7 @@ class _Timer:
 
 
 def read_flood(path: Path) -> list[Record]:
-    """The records of a run so far."""
+    """Read the records of a run."""
     return [
         Record(
             robot=row["robot"],
@@ -173,7 +173,7 @@ def read_flood(path: Path) -> list[Record]:
 
 
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:
-    """Evaluations a second near some numbers of objects, flooded and still, and edits a second, for each robot."""
+    """Return evaluations per second near some numbers of objects, with and without edits, and edits per second, for each robot."""
     found: dict[str, Any] = {}
     for robot in arguments.robots:
         mine = [record for record in records if record["robot"] == robot]
@@ -185,16 +185,16 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
             "edits_per_second": round(sum(r["edits"] for r in flooded) / max(seconds, 1e-9)),
             "objects_reached": max((r["objects"] for r in flooded), default=0),
         }
-        if seconds < SHORTEST:
-            found[robot]["note"] = f"flooded for {seconds:.2g} s, too short for a rate: give more --edits or --objects"
+        if seconds < MIN_SECONDS:
+            found[robot]["note"] = f"edited for {seconds:.2g} s, too short for a rate: give more --edits or --objects"
     is_complete = all(found[robot]["objects_reached"] >= arguments.objects for robot in arguments.robots)
     return {"complete": is_complete, **found}
 
 
 def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
-    """Evaluations a second near each of NUMBERS that was reached; none where all records together are shorter than SHORTEST.
+    """Yield evaluations per second near each of NUMBERS that was reached, if all records together last MIN_SECONDS.
 
-    Where the records near a number are too short, the next nearest are pooled with them; the number given is then their mean.
+    If the records near a number are too short, the next nearest are pooled with them, and their mean number is reported.
     """
     known = list(records)
     for number in NUMBERS:
@@ -202,18 +202,18 @@ def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
             continue
         nearest = sorted(known, key=lambda r: abs(r["objects"] - number))
         count = sum(abs(r["objects"] - number) <= NEAR * number for r in nearest)
-        while count < len(nearest) and _seconds(nearest[:count]) < SHORTEST:
+        while count < len(nearest) and _seconds(nearest[:count]) < MIN_SECONDS:
             count += 1
         pool = nearest[:count]
-        if _seconds(pool) >= SHORTEST:
+        if _seconds(pool) >= MIN_SECONDS:
             objects, rate = _point(pool)
             yield number if abs(objects - number) <= NEAR * number else round(objects), round(rate)
 
 
 def binned(records: Iterable[Record], seconds: float) -> Iterator[tuple[float, float]]:
-    """Mean number of objects and evaluations a second of consecutive records that last at least `seconds` together.
+    """Yield mean number of objects and evaluations per second of groups of consecutive records of at least `seconds` each.
 
-    What is left over at the end is dropped.  Where all together are shorter they are one; none if they are below SHORTEST.
+    An incomplete last group is dropped.  If all records together are shorter, they form one group, unless below MIN_SECONDS.
     """
     groups: list[list[Record]] = []
     for record in sorted(records, key=lambda r: r["objects"]):
@@ -223,7 +223,7 @@ def binned(records: Iterable[Record], seconds: float) -> Iterator[tuple[float, f
     if len(groups) > 1 and _seconds(groups[-1]) < seconds:
         groups.pop()
     for group in groups:
-        if _seconds(group) >= SHORTEST:
+        if _seconds(group) >= MIN_SECONDS:
             yield _point(group)
 
 
@@ -232,7 +232,7 @@ def _seconds(records: Iterable[Record]) -> float:
 
 
 def _point(group: Sequence[Record]) -> tuple[float, float]:
-    """Mean number of objects, evaluations a second."""
+    """Return the mean number of objects, and evaluations per second."""
     return sum(r["objects"] for r in group) / len(group), sum(r["evaluations"] for r in group) / _seconds(group)
 
 
@@ -240,14 +240,14 @@ def figure(folder: Path) -> Path:
     """Draw the records of a run, or the course of an endurance run; raises InvalidValue if there are none."""
     endured, records = read_records(folder / ENDURANCE, ENDURANCE_COLUMNS), read_flood(folder / RECORDS)
     if not endured and not records:
-        raise InvalidValue(f"{folder} has no records of a flood: it was stopped before the first.")
+        raise InvalidValue(f"{folder} has no records: the run was stopped before the first.")
     path = folder / "figure.png"
     (plot_endurance(endured) if endured else plot(records)).savefig(path, dpi=150)
     return path
 
 
 def plot(records: Sequence[Record]) -> Any:
-    """Evaluations a second against the number of objects, as thesis figure 2.4."""
+    """Draw evaluations per second against the number of objects, as in thesis figure 2.4."""
     drawing = new_figure(8.0, 5.0)
     axes = drawing.add_subplot()
     most = max(max(record["objects"] for record in records), 1)
@@ -261,7 +261,7 @@ def plot(records: Sequence[Record]) -> Any:
             continue
         flooded = list(binned([record for record in mine if record["edits"]], BIN))
         still = list(binned([record for record in mine if not record["edits"]], 0.0))
-        label = "flooded" if flooded else "flooded: too short for a rate"
+        label = "with edits" if flooded else "with edits: too short for a rate"
         axes.plot(*_columns(flooded), "-s" if len(flooded) == 1 else "-", color=color, label=f"{LABELS[robot]}, {label}")
         axes.plot(*_columns(still), "--o", color=color, markersize=3.0, linewidth=0.8, label=f"{LABELS[robot]}, no edits")
     axes.set(xlabel="objects in the workspace", ylabel="evaluations per second", yscale="log", xlim=(0.0, 1.03 * most))
@@ -277,7 +277,7 @@ def _columns(points: Sequence[tuple[float, float]]) -> tuple[list[float], list[f
 
 EXPERIMENT = Experiment(
     name="model-throughput",
-    claim="the model evaluates hundreds of poses a second while its world is flooded with edits",
+    claim="the model evaluates hundreds of poses per second while its world is edited without a pause",
     source="thesis 2.4, Algorithm 1 and figure 2.4",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

@@ -1,4 +1,4 @@
-"""Endurance of the model: several threads make all kinds of edits in one world while it evaluates, and every evaluation is checked."""
+"""Endurance test of the model: several threads edit one world while the model evaluates, and every evaluation is checked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.claims.ch2_model.model_throughput_threads import Box, MovingModel, Oscillator, quick_hand_over, random_boxes
+from experiments.claims.ch2_model.model_throughput_threads import Box, MovingModel, Oscillator, fast_thread_switching, random_boxes
 from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
 from experiments.kit.records import Records
@@ -31,29 +31,29 @@ from mobee.robot.robot import Robot
 ROBOT = "icub"
 ENDURANCE = "endurance.csv"
 ENDURANCE_COLUMNS = ("seconds", "evaluations", "edits", "objects", "resident_mb", "torn", "exceptions")
-BURST, PAUSE = 20, 1e-2  # edits, then s: the checks, in Python, need their time as well
-SAMPLE = 1.0  # s
-REFERENCE_EVERY = 50  # evaluations
-FLAT = 0.5  # MB/min: one leaked snapshot in a thousand would be hundreds
+BURST, PAUSE = 20, 1e-2  # edits, then s of pause, since the checks in Python need time too
+SAMPLE_PERIOD = 1.0  # s
+REFERENCE_PERIOD = 50  # evaluations between two comparisons with a reference model
+MAX_SLOPE = 0.5  # MB/min; one leaked snapshot in a thousand would be hundreds
 
-OWN = (5, 30)  # objects of a thread, least and most
-CARRIED = 3  # of them attached at a time, at most
-SHARED = ("shared 0", "shared 1", "shared 2")  # that all threads edit
+OWN = (5, 30)  # least and largest number of objects of a thread
+MAX_ATTACHED = 3  # of them at a time
+SHARED = ("shared 0", "shared 1", "shared 2")  # objects that all threads edit
 ROLES: tuple[Role, ...] = ("obstacle", "target", "ghost")
-STEP, STEPS = 1e-3, 1000  # m; the two witnesses of a thread move by so many steps, and begin again
+STEP, STEPS = 1e-3, 1000  # m, size and number of the steps of a thread's two witnesses, which then start again
 POOL = 500
 
 FREE = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
-AGREED = 1e-9  # m, depth of one contact in two evaluations of the same
+DEPTH_TOLERANCE = 1e-9  # m, between two evaluations of the same contact
 
-SETTLING = 0.2  # of the time, until caches and the allocator's arenas are full
-SHORTEST = 60.0  # s that must be left for a slope to mean anything
+WARM_UP = 0.2  # share of the time until caches and the allocator's arenas are full
+MIN_SECONDS = 60.0  # s, shortest time for a slope
 
 
 class Editor:
-    """Edits its own objects, of which it knows the state, so that none of these edits may be refused; and those of all.
+    """Edits its own objects, whose state it knows, so that no such edit may be refused, and objects shared by all threads.
 
-    Two objects of its own are its witnesses: it always moves the first one a step, then the second.
+    Two of its objects are witnesses of the order of edits: it always moves the first one by a step, then the second.
     """
 
     def __init__(self, world: World, robot: Robot, shipped: str, number: int, seed: int) -> None:
@@ -68,7 +68,7 @@ class Editor:
             world.add(name, box(0.05, 0.05, 0.05), position=self._witness_place())
 
     def edit(self) -> None:
-        """One edit, or two of the witnesses."""
+        """Make a random edit, or the two edits of the witnesses."""
         kinds = (self._add, self._remove, self._move, self._role, self._attach, self._detach, self._step_witnesses, self._edit_shared)
         self._random.choices(kinds, weights=(4, 4, 8, 2, 1, 1, 4, 2))[0]()
         self.edits += 1
@@ -98,7 +98,7 @@ class Editor:
             self._world.set_role(self._random.choice(names), self._random.choice(ROLES))
 
     def _attach(self) -> None:
-        if self._free and len(self._attached) < CARRIED:
+        if self._free and len(self._attached) < MAX_ATTACHED:
             name = self._free.pop(self._random.randrange(len(self._free)))
             self._world.attach(name, self._random.choice(self._links))
             self._attached.append(name)
@@ -137,12 +137,12 @@ class Editor:
 
 
 def witnesses(number: int) -> tuple[str, str]:
-    """The two objects that thread `number` moves one after the other."""
+    """Return the names of the two objects that thread `number` moves one after the other."""
     return f"{number}:first", f"{number}:second"
 
 
 def out_of_order(objects: Mapping[str, WorldObject], threads: int) -> str | None:
-    """Which thread's edits are seen in another order than it made them; None if none are."""
+    """Return which thread's edits are seen in another order than they were made; None without such a thread."""
     for number in range(threads):
         first, second = (round(objects[name].position[0] / STEP) for name in witnesses(number))
         if (first - second) % STEPS > 1:
@@ -151,7 +151,7 @@ def out_of_order(objects: Mapping[str, WorldObject], threads: int) -> str | None
 
 
 class WatchedWorld(World):
-    """Remembers the snapshot that was read last: that of the newest evaluation, if only one thread evaluates."""
+    """A world that remembers the last snapshot read: that of the newest evaluation, if only one thread evaluates."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -159,13 +159,13 @@ class WatchedWorld(World):
 
     @property
     def snapshot(self) -> Snapshot:
-        """As World.snapshot."""
+        """See World.snapshot."""
         self.seen = super().snapshot
         return self.seen
 
 
 def torn_table(snapshot: Snapshot) -> str | None:
-    """How names, rows, roles and attached contradict the objects, boxes all; None if they agree to the last bit."""
+    """Return how names, rows, roles or attached differ from the objects, which are boxes; None if they agree to the last bit."""
     things = list(snapshot.objects.values())
     if not snapshot.names == tuple(snapshot.objects) == tuple(thing.name for thing in things):
         return "names are not those of the objects"
@@ -180,7 +180,7 @@ def torn_table(snapshot: Snapshot) -> str | None:
 
 
 def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
-    """The rows (N,), computed apart from the code that is checked."""
+    """Compute the rows (N,) of boxes independently of the checked code."""
     rows = np.zeros(len(boxes), dtype=VOLUME)
     if not boxes:
         return rows
@@ -193,7 +193,7 @@ def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
 
 
 def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
-    """How the objects of an evaluation differ from those of the snapshot that it read; None if they are the same."""
+    """Return how the objects of an evaluation differ from those of its snapshot; None if they are the same."""
     seen = pose.objects
     if tuple(seen) != snapshot.names:
         return "the evaluation has other names than its snapshot"
@@ -202,13 +202,13 @@ def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
 
 
 class Reference:
-    """A model of its own, in whose world one thread alone puts what a snapshot holds."""
+    """A reference model in whose world a single thread rebuilds the objects of a snapshot."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = Model(robot)
 
     def other_contacts(self, pose: Pose, snapshot: Snapshot) -> str | None:
-        """How the contacts of an evaluation differ from those that its snapshot has; None if they are the same."""
+        """Return how the contacts of an evaluation differ from those of its rebuilt snapshot; None if they are the same."""
         world = self._model.world
         for name in world.objects:
             world.remove(name)
@@ -217,7 +217,7 @@ class Reference:
             if thing.link is not None:
                 world.attach(name, thing.link, (thing.position, thing.rotation))
         found, expected = _depths(pose), _depths(self._model.evaluate(pose.q))
-        pairs = sorted(p for p in found.keys() | expected.keys() if not abs(found.get(p, 0.0) - expected.get(p, 0.0)) <= AGREED)
+        pairs = sorted(p for p in found.keys() | expected.keys() if not abs(found.get(p, 0.0) - expected.get(p, 0.0)) <= DEPTH_TOLERANCE)
         return f"{len(pairs)} contacts of the evaluation are not those of its snapshot: {pairs[:3]}" if pairs else None
 
 
@@ -226,7 +226,7 @@ def _depths(pose: Pose) -> dict[tuple[str, str, str], float]:
 
 
 def resident_mb() -> float | None:
-    """Resident memory now in MB; None where the system does not say (it is read from /proc)."""
+    """Return the resident memory in MB; None where /proc is missing."""
     try:
         with open("/proc/self/statm", encoding="ascii") as file:
             pages = int(file.read().split()[1])
@@ -236,16 +236,16 @@ def resident_mb() -> float | None:
 
 
 def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) -> float | None:
-    """Slope of the straight line through the samples after the first fifth of the time; None for less than a minute of them."""
-    settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > SETTLING * seconds[-1]]
-    if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < SHORTEST:
+    """Return the slope of a line through the samples after WARM_UP; None for less than MIN_SECONDS of samples."""
+    settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > WARM_UP * seconds[-1]]
+    if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < MIN_SECONDS:
         return None
     minutes, resident = np.transpose(settled)
     return float(np.polyfit(minutes, resident, 1)[0])
 
 
 class Judge:
-    """Checks every evaluation, in the thread that made it."""
+    """Checks every evaluation in the thread that made it."""
 
     def __init__(self, model: Model, world: WatchedWorld, threads: int) -> None:
         self.torn = Counter[str]()
@@ -255,21 +255,21 @@ class Judge:
         self._evaluations = self._version = 0
 
     def check(self, pose: Pose) -> None:
-        """Count the faults of an evaluation."""
+        """Check an evaluation and count its errors."""
         snapshot = self._world.seen
         self._evaluations += 1
         found = [torn_table(snapshot), other_objects(pose, snapshot), out_of_order(snapshot.objects, self._threads)]
         if snapshot.version < self._version:
             found.append("an evaluation saw an older world than the one before")
         self._version = snapshot.version
-        if self._evaluations % REFERENCE_EVERY == 0:
+        if self._evaluations % REFERENCE_PERIOD == 0:
             self.references += 1
             found.append(self._reference.other_contacts(pose, snapshot))
         self.torn.update(text for text in found if text is not None)
 
 
 class Endurance:
-    """The world, the model, its judge and the editors of one run, and what was counted so far."""
+    """World, model, checks and editors of a run, with their counts."""
 
     def __init__(self, threads: int, seed: int) -> None:
         self.world = WatchedWorld()
@@ -286,10 +286,10 @@ class Endurance:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """While entered, all threads work."""
+        """Run all threads while entered."""
         end = threading.Event()
         crew = [threading.Thread(target=self._edit, args=(editor, end), daemon=True) for editor in self.editors]
-        with quick_hand_over(), self.moving:
+        with fast_thread_switching(), self.moving:
             for thread in crew:
                 thread.start()
             try:
@@ -302,7 +302,7 @@ class Endurance:
             self.exceptions["".join(traceback.format_exception(self.moving.error))] += 1
 
     def sample(self, seconds: float) -> dict[str, Any]:
-        """The counts now, a record."""
+        """Return the current counts as a record."""
         resident = resident_mb()
         if resident is not None:
             self.samples.append((seconds, resident))
@@ -311,11 +311,11 @@ class Endurance:
         return dict(zip(ENDURANCE_COLUMNS, (round(seconds, 3), *counts), strict=True))
 
     def verdict(self) -> dict[str, Any]:
-        """The results; `passed` if nothing was torn, nothing raised and the memory is flat."""
+        """Return the results; `passed` if no evaluation was torn, nothing was raised and memory is constant."""
         slope = slope_mb_per_minute(*zip(*self.samples, strict=True)) if self.samples else None
         is_sound = not self.judge.torn and not self.exceptions and self.moving.evaluations > 0
         return {
-            "passed": is_sound and (slope is None or slope < FLAT),
+            "passed": is_sound and (slope is None or slope < MAX_SLOPE),
             "threads": len(self.editors),
             "evaluations": self.moving.evaluations,
             "compared_with_a_world_built_anew": self.judge.references,
@@ -337,14 +337,14 @@ class Endurance:
 
 
 def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[str, Any]:
-    """Let `threads` threads edit for `duration` s, a record a second in endurance.csv; returns the verdict."""
+    """Let `threads` threads edit for `duration` s with a record per second in endurance.csv; returns the verdict."""
     path = folder / ENDURANCE
-    path.unlink(missing_ok=True)  # an endurance run that was interrupted begins again
+    path.unlink(missing_ok=True)  # an interrupted endurance run starts again
     run = Endurance(threads, seed)
     with Records(path, ENDURANCE_COLUMNS) as records, Progress() as progress, run.running():
         begin, seconds = time.perf_counter(), 0.0
         while seconds < duration and run.moving.error is None:
-            time.sleep(min(SAMPLE, duration - seconds))
+            time.sleep(min(SAMPLE_PERIOD, duration - seconds))
             seconds = time.perf_counter() - begin
             now = run.sample(seconds)
             records.append(now)
@@ -353,7 +353,7 @@ def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[st
 
 
 def plot_endurance(records: Sequence[Mapping[str, str]]) -> Any:
-    """Resident memory, and the edits and evaluations so far, over time."""
+    """Draw resident memory and the total edits and evaluations over time."""
     drawing = new_figure(8.0, 5.0)
     above, below = drawing.subplots(2, 1, sharex=True)
     minutes = [float(record["seconds"]) / 60.0 for record in records]
@@ -362,6 +362,6 @@ def plot_endurance(records: Sequence[Mapping[str, str]]) -> Any:
     above.set_ylim(0.0, 1.2 * above.get_ylim()[1])
     for column in ("edits", "evaluations"):
         below.plot(minutes, [int(record[column]) for record in records], label=column)
-    below.set(xlabel="time [min]", ylabel="so far", yscale="log")
+    below.set(xlabel="time [min]", ylabel="total", yscale="log")
     below.legend()
     return drawing

@@ -19,13 +19,13 @@ from mobee.model.pose import Pose
 from mobee.robot.robot import Robot
 
 CONTROL_PERIOD = 0.01  # s (thesis 2.4)
-FREQUENCIES = (0.1, 0.5)  # Hz, one a motor, so that the whole pose never comes again
-# Python lets a thread wait 5 ms for one that computes in Python, as the flooding one does; that would be measured instead.
-HAND_OVER = 5e-5  # s
+FREQUENCIES = (0.1, 0.5)  # Hz, a different one for each motor, so that the pose never repeats
+# By default a thread waits 5 ms for another that computes in Python, as the editing one does; that would dominate the measurement.
+SWITCH_INTERVAL = 5e-5  # s
 
 SPACE = 1.0  # m, edge of the cube that holds the centres
 EDGES = (0.02, 0.1)  # m
-# Middle of that cube: where the robot reaches.
+# Centre of that cube, in the reach of the robot.
 MIDDLE = {"icub": (-0.5, 0.0, 0.1), "katana": (0.0, 0.0, 0.0)}
 
 
@@ -39,15 +39,15 @@ class Oscillator:
         self._phase = rng.uniform(0.0, 2.0 * np.pi, len(low))
 
     def at(self, t: float) -> Array:
-        """The posture (n,) rad at t [s]."""
+        """Return the posture (n,) rad at t [s]."""
         posture: Array = self._middle + self._amplitude * np.sin(self._rate * t + self._phase)
         return posture
 
 
 class MovingModel:
-    """While entered, the robot moves and the model evaluates, each in its own thread; `check` raises what went wrong there.
+    """Moves the robot and evaluates the model, each in its own thread, while entered; `check` raises their exceptions.
 
-    `watch` is called by the model's thread with every pose.
+    `watch` is called in the model's thread with every pose.
     """
 
     def __init__(self, model: Model, oscillator: Oscillator, watch: Callable[[Pose], None] = lambda _: None) -> None:
@@ -69,7 +69,7 @@ class MovingModel:
             thread.join()
 
     def check(self) -> None:
-        """Raise what has ended a thread."""
+        """Raise the exception that has ended a thread, if any."""
         if self.error is not None:
             raise self.error
 
@@ -95,10 +95,10 @@ class MovingModel:
 
 
 @contextmanager
-def quick_hand_over() -> Iterator[None]:
-    """Threads that compute in Python give way to each other every HAND_OVER seconds."""
+def fast_thread_switching() -> Iterator[None]:
+    """Let threads that compute in Python switch every SWITCH_INTERVAL seconds while entered."""
     before = sys.getswitchinterval()
-    sys.setswitchinterval(HAND_OVER)
+    sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         yield
     finally:
@@ -115,7 +115,7 @@ class Box:
 
 
 def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:
-    """Boxes of random edges, positions in the cube, and orientations."""
+    """Return boxes of random size, position in the cube, and orientation."""
     middle = np.array(MIDDLE[robot])
     boxes = []
     for _ in range(count):

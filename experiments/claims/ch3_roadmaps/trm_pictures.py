@@ -34,13 +34,13 @@ COLUMNS = 4
 
 
 def draw_cloud(example: Example, roadmap: Roadmap, path: Path, height: int = 400) -> Path:
-    """The places of the markers in all poses, beside the robot where its film begins."""
+    """Draw the marker positions of all poses, and the robot in the first pose of its film."""
     shown = roadmap.q[_near(roadmap, example.via[0])]
     return marker_cloud(example.model, roadmap.q, example.markers, path, shown, title=_title(example), height=height)
 
 
 def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
-    """The same in one view, with its title below."""
+    """Draw the cloud of a map in one view with its title below."""
     shown = example.model.evaluate(roadmap.q[_near(roadmap, example.via[0])])
     pose = example.model.evaluate(roadmap.q)
     places = np.concatenate([pose.position(marker) for marker in example.markers])
@@ -48,12 +48,12 @@ def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
 
 
 def draw_film(example: Example, roadmap: Roadmap, path: Path, height: int = 260) -> Path:
-    """The motion through the points of the example."""
+    """Return the motion through the points of the example."""
     return filmstrip([strip_of(example, roadmap)], path, height)
 
 
 def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
-    """The motion as a row of a filmstrip, the task coordinates below each pose."""
+    """Return the motion as a row of a filmstrip, with the task coordinates below each pose."""
 
     def caption(motion: Motion, moment: int) -> str:
         y = example.task.of(example.model.evaluate(motion.poses[moment].q[None]))[0]
@@ -64,7 +64,7 @@ def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
 
 
 def planned(example: Example, roadmap: Roadmap) -> Motion:
-    """The shortest paths in the map through the points of the example, one after the other."""
+    """Return the shortest path in the map through the points of the example in order."""
     q = roadmap.q[roadmap.exit(example.via[0])][None]
     for y in example.via[1:]:
         q = np.concatenate([q, roadmap.path(q[-1], y)[1:]])
@@ -78,7 +78,7 @@ def planned(example: Example, roadmap: Roadmap) -> Motion:
 
 
 def caption_of(coordinates: Sequence[Coordinate], y: Array) -> str:
-    """Task coordinates as text: places in cm, angles in degrees."""
+    """Return task coordinates as text: lengths in cm, angles in degrees."""
     words = []
     for one, value in zip(coordinates, y, strict=True):
         words.append(f"{round(np.rad2deg(value))}°" if one.unit == "rad" else f"{one.name.split()[-1]} {round(100.0 * value)}")
@@ -86,7 +86,7 @@ def caption_of(coordinates: Sequence[Coordinate], y: Array) -> str:
 
 
 def _near(roadmap: Roadmap, y: tuple[float, ...]) -> int:
-    """The vertex nearest to task coordinates, however far."""
+    """Return the vertex nearest to task coordinates, at any distance."""
     return int(np.linalg.norm((roadmap.y - y) / roadmap.spacing, axis=1).argmin())
 
 
@@ -95,13 +95,13 @@ def _title(example: Example) -> str:
 
 
 def _moving_parts(example: Example) -> tuple[str, ...]:
-    """The parts of which some motor may move."""
+    """Return the parts that have moving motors."""
     robot = example.model.robot
     return tuple(name for name, part in robot.parts.items() if {name, *part.motors} & set(example.motors))
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build and draw."""
+    """Build and draw the maps of the command line."""
     parser = argparse.ArgumentParser(description="Build the maps of tasks and draw them.")
     parser.add_argument("tasks", nargs="+", choices=[*EXAMPLES, "all"], metavar="TASK", help=f"all, or of {', '.join(EXAMPLES)}")
     parser.add_argument("--method", choices=METHODS, default=METHODS[0], help="how poses are found (default: %(default)s)")
@@ -116,7 +116,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def draw_all(tasks: Sequence[str], method: Method, seed: int, out: Path) -> None:
-    """Every task's map and pictures, with a line printed for each, and the sheets."""
+    """Build the map of every task, draw it and the sheets, and print a line for each."""
     strips: dict[str, list[Strip]] = {}
     clouds = []
     for task in tasks:

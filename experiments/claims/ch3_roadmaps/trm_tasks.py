@@ -37,17 +37,17 @@ PREGRASP_SPACING = 0.008  # m
 
 
 def held(width: float) -> tuple[Term, Term]:
-    """The palms face each other, that far [m] apart, and neither slips: position and orientation of the one in the frame of the other."""
+    """Return costs that hold the palms face to face at a distance [m]: position and orientation of one in the frame of the other."""
     return costs.relative_position(RIGHT, LEFT, (0.0, 0.0, -width)), costs.relative_orientation(RIGHT, LEFT, np.eye(3))
 
 
 def between_palms(model: Model, shape: Geometry, width: float) -> None:
-    """Show what two hands hold, its z axis from palm to palm, its x axis along the fingers."""
+    """Attach an object between both hands, its z axis from palm to palm, its x axis along the fingers."""
     carry(model, "held", shape, LEFT, 0.5 * width, (0, 0, 1))
 
 
 def both_held() -> Example:
-    """Both hands hold something, and move it up and down, forward and back (thesis fig. 3.1, left).
+    """Both hands hold an object and move it up and down, forward and back (thesis fig. 3.1, left).
 
     Where the hands are to each other is fixed, as by a box between them, and the box stays level and straight before the robot;
     the task space is the height of the hands and how far forward they are.
@@ -133,7 +133,7 @@ def palm_down() -> Example:
 
 
 def raise_glass() -> Example:
-    """Raise a glass: what the hand holds stays upright wherever the hand goes (thesis fig. 3.3).
+    """Raise a glass: the held object stays upright at every position of the hand (thesis fig. 3.3).
 
     The thumb points up, and the hand may turn about that line as a glass may; the task space is the place of the hand.  For picking and
     placing what must not be tipped over.
@@ -155,7 +155,7 @@ def raise_glass() -> Example:
 
 
 def bimanual_inspect() -> Example:
-    """Look at what both hands hold from all sides: the hands stay, the head moves (thesis figs. 3.4; 3.1, centre).
+    """Look at an object in both hands from all sides: the hands stay, the head moves (thesis figs. 3.4; 3.1, centre).
 
     Both hands keep their place and orientation, the face stays turned to what they hold; the task space is where the head is: left and
     right, forward and back.
@@ -187,7 +187,7 @@ def bimanual_inspect() -> Example:
 
 
 def inspect_hand() -> Example:
-    """Turn the hand, and what it holds, before the eyes (thesis fig. 3.5).
+    """Turn the hand with an object in front of the eyes (thesis fig. 3.5).
 
     The hand stays at one place and the face is turned to it; the task space is the angle of the palm's normal to the direction of gaze, in
     the horizontal plane: 0 when the palm faces away, half a turn when it is seen from the front.

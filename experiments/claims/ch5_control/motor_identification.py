@@ -1,4 +1,4 @@
-"""Identify: lag, delay, backlash and friction of the PyBullet robot's motors, fitted to responses to velocities alone.
+"""Motor identification: lag, delay, backlash and friction of the PyBullet robot's motors, fitted to responses to velocities.
 
 Claim: the motor model of `mobee.simulation` with numbers fitted to the encoder readings of the PyBullet robot describes that robot,
 gravity and inertia included: the residual of a response is its noise.  Source: thesis 2.2 (the robot does not follow its
@@ -6,9 +6,9 @@ commands exactly).  Nothing is published to compare with; the fit is compared wi
 Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
 The robot is a black box: velocities go in, encoder positions with their noise come out.  The method is checked first, on
-simulated motors whose numbers are known; held-out signals check the fit; at last an arm makes the same actions with PyBullet and with
-the offline plant.  The raw responses stay in `responses/`, one file a motor; an interrupted run goes on behind them.
-`identified.toml` is what `mobee/simulation/identified/` ships.
+simulated motors with known parameters; held-out signals check the fit; finally an arm makes the same actions with PyBullet and with
+the offline plant.  The raw responses are kept in `responses/`, one file per motor; an interrupted run continues after them.
+`identified.toml` is the file shipped in `mobee/simulation/identified/`.
 """
 
 from __future__ import annotations

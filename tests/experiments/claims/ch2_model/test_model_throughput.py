@@ -235,7 +235,7 @@ def axes_of(tmp_path, rows):
 
 def test_a_curve_of_one_point_has_a_marker_and_the_axis_ends_with_the_data(tmp_path):
     axes = axes_of(tmp_path, "".join(f"icub,{n},200,0.01,10\n" for n in range(1, 61)))
-    (line,) = (line for line in axes.lines if line.get_label() == "iCub, flooded")
+    (line,) = (line for line in axes.lines if line.get_label() == "iCub, with edits")
     assert len(line.get_xdata()) == 1 and line.get_marker() == "s"
     assert 60.0 < axes.get_xlim()[1] < 70.0
     assert not axes.collections, "the thesis speaks of hundreds of objects"
