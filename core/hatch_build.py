@@ -1,6 +1,6 @@
-"""The core as part of a wheel: what hatchling calls before it packs one, or makes the project importable in place.
+"""The build hook of the native core: hatchling calls it before it packs a wheel or makes the project importable in place.
 
-No part of the library: pip reads it by the name in pyproject.toml.
+It is not part of the library; pyproject.toml names this file.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import build as core  # noqa: E402  (the file beside this one)
 
 
 class CoreHook(BuildHookInterface[Any]):
-    """Builds the core into mobee/_core: for a wheel all levels of machines of this kind, in place the one that runs here."""
+    """Builds the core into mobee/_core: for a wheel for every processor level, in place for the level of this machine."""
 
     def dependencies(self) -> list[str]:
-        """What the build needs beyond hatchling: a compiler, where the system has none."""
+        """Return the packages that the build needs beyond hatchling: a compiler, where the system has none."""
         try:
             stale = _stale(core.knowledge().machine_levels())
             return [core.zig_requirement()] if stale and core.compiler_for(stale).zig else []
@@ -29,7 +29,7 @@ class CoreHook(BuildHookInterface[Any]):
             return [core.zig_requirement()]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build, and tell hatchling what to pack and for which machines; ends with the compiler's words if it fails."""
+        """Build the core, and set which files hatchling packs and the tag of the wheel; exits with the compiler's message if it fails."""
         levels = core.knowledge().machine_levels() if version == "standard" else core.level_here()
         try:
             if stale := _stale(levels):
@@ -49,7 +49,7 @@ def _stale(levels: Sequence[str]) -> list[str]:
 
 
 def wheel_platform(libraries: list[Path]) -> str:
-    """The last part of a wheel's tag: the machines on which libraries load, by the symbols that they ask of the C library."""
+    """Return the platform part of a wheel's tag: by the symbols that the libraries need of the C library."""
     if sys.platform == "darwin":
         return f"macosx_{core.macos_version().replace('.', '_')}_{platform.machine()}"
     needed = [core.oldest_glibc(library) for library in libraries]

@@ -1,11 +1,11 @@
-# Sourced by ./launch and ./test: makes .venv from a lock file when it is missing or stale, and builds the native core.
+# ./launch and ./test source this file: it makes .venv from a lock file when .venv is missing or stale, and builds the native core.
 # shellcheck shell=bash
 
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 venv="$root/.venv"
 say() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; }
 
-# Prints the interpreter to use: python3.11 first, because PyBullet has wheels for no later one.
+# Prints the interpreter to use: python3.11 first, because PyBullet has no wheels for later versions.
 find_python() {
   local candidate
   for candidate in python3.11 python3 python3.12 python3.13 python3.14; do
@@ -18,7 +18,7 @@ find_python() {
   return 1
 }
 
-# Prints four words: the Python version, and what the packages to run, those to test and the installed project depend on.
+# Prints four words: the Python version, and a hash of the files that decide which packages are installed to run, which to test, and the project.
 fingerprints() {
   "$1" - "$root" <<'PYTHON'
 import hashlib, pathlib, sys
@@ -50,7 +50,7 @@ make_venv() { # interpreter
   fi
 }
 
-# Byte code is written when a module is first imported: most never are.
+# No byte code is compiled here: most modules are never imported, and Python compiles the others at their first import.
 install_packages() { # lock file, its size in words
   local log="$venv/pip.log" code=0 counter="" locked
   locked="$(grep -c '^[a-z].*==' "$1")"
@@ -67,10 +67,10 @@ install_packages() { # lock file, its size in words
   return "$code"
 }
 
-count_packages() { # what pip says, how many it is told to install
+count_packages() { # pip's log, number of packages to install
   local before all
   before="$(installed_packages)"
-  while kill -0 $$ 2>/dev/null; do # a Ctrl-C does not come here
+  while kill -0 $$ 2>/dev/null; do # Ctrl-C does not reach this process
     all="$(sed -n 's/^Installing collected packages: //p' "$1" | wc -w)"
     if ((all > 0)); then
       printf '\r  unpacking: %d of %d   ' $(($(installed_packages) - before)) "$all" >&2
@@ -85,7 +85,7 @@ installed_packages() { find "$venv" -maxdepth 5 -name '*.dist-info' | wc -l; }
 
 core_is_current() { "$venv/bin/python" "$root/core/build.py" --check "${core[@]}"; }
 
-# Builds the core by the system's compiler; where there is none, by one that is fetched for it and removed again.
+# Builds the core with the system's compiler; where there is none, with one that is downloaded and removed afterwards.
 build_core() { # options of core/build.py
   local code=0 folder="$venv/compiler"
   "$venv/bin/python" "$root/core/build.py" "$@" >/dev/null 2>"$venv/core.log" || code=$?
@@ -101,13 +101,13 @@ build_core() { # options of core/build.py
   return "$code"
 }
 
-# Does what ensure_environment found to be missing; its variables are seen here.
+# Installs what ensure_environment found to be missing; uses the variables of that function.
 install_environment() {
   local start=$SECONDS
   if ! is_current "stamp-$kind" "$packages"; then
     is_current stamp-run "$run" || make_venv "$python" || return 1
     rm -f "$venv/stamp-run" "$venv/stamp-dev"
-    # What was cut down to run is whole again to test.
+    # Packages that scripts/trim.py has cut down are installed whole again for the tests.
     if [[ -s "$venv/trimmed" ]]; then xargs "$venv/bin/python" -m pip uninstall --quiet --quiet --yes <"$venv/trimmed"; fi
     if ! install_packages "$root/$lock" "$size"; then
       say "the installation failed, see above; .venv is marked unfinished and will be made anew by the next call."
@@ -133,7 +133,7 @@ install_environment() {
   say "installed in $((SECONDS - start)) s."
 }
 
-# Leaves a complete .venv behind, with what ./test needs too if told "dev", or returns non-zero with one line that says why.
+# Makes .venv complete, with the argument "dev" also for ./test; returns non-zero, after one line with the reason, if that fails.
 ensure_environment() {
   local kind="${1:-run}" python version run dev project packages lock size core=()
   python="$(find_python)" || return 1
@@ -141,7 +141,7 @@ ensure_environment() {
   if [[ "$version" != 3.11 ]]; then
     say "Python $version: PyBullet has no wheel for it, so the robot runs on its kinematic back-end only; install python3.11 for the physics."
   fi
-  # Sizes are those on Linux with Python 3.11.  Whoever only runs MoBeE may have a compiler whose warnings the project has not seen.
+  # Sizes are those on Linux with Python 3.11.  Warnings of the compiler are errors for the tests only: a user's compiler may be another.
   if [[ "$kind" == dev ]]; then
     packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one to three minutes"
   else

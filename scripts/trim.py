@@ -1,9 +1,9 @@
-"""Take out of an installed PyBullet what no part of the system uses: 290 of its 300 MB.
+"""Remove from an installed PyBullet what no part of the system uses: 290 of its 300 MB.
 
     python scripts/trim.py
 
-Its wheel brings the robots and environments of its examples, and a program that holds sixteen times its own size in debug
-information.  ./test, which reads those robots, puts the whole package back.  Prints the names of the packages that it changed.
+Its wheel holds the robots and environments of its examples, and an extension module whose debug information is sixteen times as large
+as its code.  ./test reads those robots and installs the whole package again.  Prints the names of the packages that it changed.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ def main() -> None:
 
 
 def drop_debug_information(program: Path) -> None:
-    """Keep of an ELF file what is loaded into memory; it stays as it is if it is of another kind, or does not run afterwards."""
+    """Cut an ELF file after its last segment; leave it unchanged if it is of another kind, or cannot be imported afterwards."""
     data = program.read_bytes()
     loaded = end_of_segments(data)
     if loaded is None or loaded >= len(data):
         return
     short = bytearray(data[:loaded])
-    struct.pack_into("<Q", short, 40, 0)  # where the table of sections starts: there is none
-    struct.pack_into("<HHH", short, 58, 0, 0, 0)  # the size of its entries, their number, that of their names
+    struct.pack_into("<Q", short, 40, 0)  # offset of the section table: none
+    struct.pack_into("<HHH", short, 58, 0, 0, 0)  # size of its entries, their number, index of their names
     program.write_bytes(short)
     if subprocess.run([sys.executable, "-c", IMPORT], capture_output=True, check=False).returncode != 0:
         program.write_bytes(data)
 
 
 def end_of_segments(data: bytes) -> int | None:
-    """Where the last segment of a little-endian 64-bit ELF file ends; behind it stand only sections for linkers and debuggers."""
+    """Return where the last segment of a little-endian 64-bit ELF file ends, None for another file; only debuggers read what follows."""
     if data[:6] != b"\x7fELF\x02\x01":
         return None
     table, (size, number) = struct.unpack_from("<Q", data, 32)[0], struct.unpack_from("<HH", data, 54)

@@ -1,7 +1,7 @@
-"""Try an installed MoBeE, outside of a checkout: `python wheel.py`, with the Python it is installed for.
+"""Check an installed MoBeE, outside of a clone: `python wheel.py`, with the Python of that installation.
 
-It needs NumPy and what mobee imports, no test tools: it asks each build of the core that this machine runs for contacts and a step
-of the controller, and ends with an error if they differ.
+It needs only the library and its dependencies.  Each build of the core that this machine can run computes contacts and a step of the
+controller; the program ends with an error if their results differ.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-ASK = """
+PROGRAM = """
 import time
 start = time.perf_counter()
 import numpy as np
@@ -29,14 +29,16 @@ print(f"{time.perf_counter() - start:.2f} s to here", file=sys.stderr)
 
 
 def main() -> None:
-    """Ask all builds."""
+    """Compare all builds."""
     from mobee._core import levels
 
     possible = levels.possible_levels(levels.processor_flags())
     answers = {}
     for level in possible:
         environment = {**os.environ, "MOBEE_CORE": level}
-        answers[level] = subprocess.run([sys.executable, "-c", ASK], env=environment, stdout=subprocess.PIPE, check=True, text=True).stdout
+        answers[level] = subprocess.run(
+            [sys.executable, "-c", PROGRAM], env=environment, stdout=subprocess.PIPE, check=True, text=True
+        ).stdout
     if len(set(answers.values())) != 1:
         sys.exit(f"builds differ: {answers}")
     print(f"Python {sys.version.split()[0]}: {', '.join(possible)} agree: {answers[possible[0]].split()[0]} contacts")
