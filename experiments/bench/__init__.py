@@ -1,1 +1,1 @@
-"""What `mobee bench` will run: own figures beside the peers."""
+"""The benchmarks of `mobee bench`, one module each, and the programs that they compare with."""

@@ -26,18 +26,18 @@ class Comparison:
     """Differences of the two readings; the counts are 0 where they agree."""
 
     poses: int
-    place: float  # m, largest distance between the centres of a volume, or the places of a marker
-    turn: float  # largest difference of a direction: normals of markers, height axes and faces of volumes
+    position_error: float  # m, largest distance between the centres of a volume, or the positions of a marker
+    rotation_error: float  # largest difference of a direction: normals of markers, height axes and faces of volumes
     pairs: int  # of volumes that one side tests and the other does not
     base: int  # volumes that only one side tests against the world
     clauses: int  # answers that differ
     contacts: int  # contacts that only one side finds
-    seen: int  # all contacts
+    all_contacts: int  # all contacts
 
     @property
     def agrees(self) -> bool:
         """Whether the readings are the same."""
-        return self.place < 1e-6 and self.turn < 1e-6 and not (self.pairs or self.base or self.clauses or self.contacts)
+        return self.position_error < 1e-6 and self.rotation_error < 1e-6 and not (self.pairs or self.base or self.clauses or self.contacts)
 
 
 def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
@@ -54,18 +54,18 @@ def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
     }
     theirs = {role: {frozenset((int(order[i]), int(order[j]))) for i, j in pairs[role]} for role in pairs}
     base = {int(order[k]) for k, (node, _, _) in enumerate(volumes) if program.is_base(node)}
-    judge = _Judge(program, robot, volumes, order, pairs)
+    comparison = _PoseComparison(program, robot, volumes, order, pairs)
     for q in drawn:
-        judge.compare(q)
+        comparison.compare(q)
     return Comparison(
         poses,
-        judge.place,
-        judge.turn,
+        comparison.position_error,
+        comparison.rotation_error,
         sum(len(mine[role] ^ theirs[role]) for role in mine),
         len(base ^ set(robot.base_shapes)),
-        judge.clauses,
-        judge.contacts,
-        judge.seen,
+        comparison.clauses,
+        comparison.contacts,
+        comparison.all_contacts,
     )
 
 
@@ -80,8 +80,8 @@ def _degrees(robot: Robot, q: Array) -> dict[str, float]:
 def _placed(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> tuple[Array, Array]:
     """Return centres (v, 3) and orientations (v, 3, 3) of the program's volumes."""
     at = program.poses(_degrees(robot, q))
-    centres = np.array([at[node][:3, :3] @ volume.place + at[node][:3, 3] for node, volume, _ in volumes])
-    return centres.reshape(-1, 3), np.array([at[node][:3, :3] @ volume.turn for node, volume, _ in volumes]).reshape(-1, 3, 3)
+    centres = np.array([at[node][:3, :3] @ volume.position + at[node][:3, 3] for node, volume, _ in volumes])
+    return centres.reshape(-1, 3), np.array([at[node][:3, :3] @ volume.rotation for node, volume, _ in volumes]).reshape(-1, 3, 3)
 
 
 def _shapes(robot: Robot, q: Array) -> tuple[Array, Array]:
@@ -109,9 +109,9 @@ def _matched(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, s
             shape = robot.shapes[i]
             if (shape.kind, shape.role) != (volume.kind, role) or not np.allclose(shape.size, volume.size, atol=1e-12):
                 continue
-            away = max(float(np.abs(a[0][k] - b[0][i]).max()) for a, b in zip(theirs, mine, strict=True))
-            turned = max(_turned(volume, a[1][k], b[1][i]) for a, b in zip(theirs, mine, strict=True))
-            best = min(best, (round(away + turned, 9), i))
+            distance = max(float(np.abs(a[0][k] - b[0][i]).max()) for a, b in zip(theirs, mine, strict=True))
+            rotation_gap = max(_rotation_difference(volume, a[1][k], b[1][i]) for a, b in zip(theirs, mine, strict=True))
+            best = min(best, (round(distance + rotation_gap, 9), i))
         if best[1] < 0:
             raise ValueError(f"no {role} {volume.kind} of size {volume.size} here")
         order[k] = best[1]
@@ -131,7 +131,7 @@ def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str)
     ]
 
 
-class _Judge:
+class _PoseComparison:
     """Compares poses one by one, and keeps the largest differences and the counts."""
 
     def __init__(
@@ -146,18 +146,17 @@ class _Judge:
         self.model = Model(robot)
         self.pairs = {role: np.array(found, dtype=np.intp).reshape(-1, 2) for role, found in pairs.items()}
         self.radii = np.array([_radius(volume) for _, volume, _ in volumes])
-        self.place = self.turn = 0.0
-        self.clauses = self.contacts = self.seen = 0
+        self.position_error = self.rotation_error = 0.0
+        self.clauses = self.contacts = self.all_contacts = 0
 
     def compare(self, q: Array) -> None:
         """Compare one pose (n,) rad."""
         degrees = _degrees(self.robot, q)
         centres, turns = _placed(self.program, self.robot, self.volumes, q)
         mine, mine_turned = (one[self.order] for one in _shapes(self.robot, q))
-        self.place = max([self.place, *np.linalg.norm(centres - mine, axis=1)])
-        self.turn = max(
-            [self.turn, *(_turned(volume, a, b) for (_, volume, _), a, b in zip(self.volumes, turns, mine_turned, strict=True))]
-        )
+        self.position_error = max([self.position_error, *np.linalg.norm(centres - mine, axis=1)])
+        for (_, volume, _), theirs, ours in zip(self.volumes, turns, mine_turned, strict=True):
+            self.rotation_error = max(self.rotation_error, _rotation_difference(volume, theirs, ours))
         self._markers(degrees, q)
         for clause, ours in zip(self.program.clauses, self.robot.clauses, strict=True):
             self.clauses += self.program.obeys(clause, degrees) != bool((ours.a @ q + ours.b > 0).any())
@@ -166,9 +165,9 @@ class _Judge:
     def _markers(self, degrees: dict[str, float], q: Array) -> None:
         at, pose = self.program.poses(degrees), self.model.evaluate(q)
         for (_, node, normal), (name, marker) in zip(self.program.markers, self.robot.markers.items(), strict=True):
-            self.place = max(self.place, float(np.linalg.norm(pose.position(name) - at[node][:3, 3])))
+            self.position_error = max(self.position_error, float(np.linalg.norm(pose.position(name) - at[node][:3, 3])))
             here = pose.rotation(name) @ marker.rotation.T @ marker.normal
-            self.turn = max(self.turn, float(np.abs(here - at[node][:3, :3] @ normal).max()))
+            self.rotation_error = max(self.rotation_error, float(np.abs(here - at[node][:3, :3] @ normal).max()))
 
     def _contacts(self, centres: Array, turns: Array, q: Array) -> None:
         found = {frozenset((contact.first, contact.second)): contact.depth for contact in self.model.evaluate(q).contacts}
@@ -180,7 +179,7 @@ class _Judge:
             for i, j in pairs[near].tolist():
                 if _touch(objects[i], objects[j]):
                     theirs.add(frozenset((names[i], names[j])))
-        self.seen += len(theirs | found.keys())
+        self.all_contacts += len(theirs | found.keys())
         self.contacts += sum(found[pair] > MIN_DEPTH for pair in found.keys() - theirs)
         self.contacts += sum(self._remains(pair, names, centres, turns) for pair in theirs - found.keys())
 
@@ -204,7 +203,7 @@ def _radius(volume: Volume) -> float:
     return float(np.linalg.norm(half))
 
 
-def _turned(volume: Volume, theirs: Array, mine: Array) -> float:
+def _rotation_difference(volume: Volume, theirs: Array, mine: Array) -> float:
     """Return the difference of two orientations of a volume, apart from its symmetries."""
     if volume.kind == "sphere":
         return 0.0

@@ -8,7 +8,7 @@ The files are not part of this project.  Fetch the two repositories, and give th
 
     mobee experiment run originals --checkouts FOLDER
 
-`--poses 2000 --only icub_928d` compares one file in many poses.  Contacts are judged by coal, which comes with the extra `dev`.
+`--poses 2000 --only icub_928d` compares one file in many poses.  Contacts are computed by coal, which comes with the extra `dev`.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ VIEW = (-40.0, 20.0)  # deg
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument(
-        "--checkouts", nargs="+", type=Path, required=True, metavar="FOLDER", help="with the repositories, or with the files"
+        "--checkouts", nargs="+", type=Path, required=True, metavar="FOLDER", help="folders with the repositories, or with the files"
     )
     parser.add_argument("--poses", type=positive_whole, default=20, metavar="N", help="random poses a robot (default: 20)")
-    parser.add_argument("--only", default="", metavar="TEXT", help="only files whose name holds this, such as 2014-11 or icub_928d")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only files whose names contain this, such as 2014-11 or icub_928d")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
@@ -119,14 +119,14 @@ def _row_of(original: Original, path: Path, poses: int, seed: int) -> dict[str, 
         except ValueError as error:  # the volumes differ
             return row | {"poses": "0", "contacts": "0", "agrees": f"no: {error}"}
     agrees = "yes" if found.agrees else f"no: {found}"
-    return row | {"poses": str(poses), "contacts": str(found.seen), "place": f"{found.place:.1e}", "agrees": agrees}
+    return row | {"poses": str(poses), "contacts": str(found.all_contacts), "place": f"{found.position_error:.1e}", "agrees": agrees}
 
 
 def _compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
     try:
         from experiments.claims.robot_files.original_comparison import compare
     except ImportError:
-        raise InvalidValue('coal, which judges contacts, is not installed: pip install "mobee[dev]".') from None
+        raise InvalidValue('coal, which computes the contacts, is not installed: pip install "mobee[dev]".') from None
     return compare(path, robot, poses, seed)
 
 

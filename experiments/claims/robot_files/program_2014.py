@@ -25,8 +25,8 @@ class Volume:
 
     kind: str
     size: tuple[float, ...]
-    place: Array
-    turn: Array
+    position: Array
+    rotation: Array
 
 
 @dataclass(eq=False)
