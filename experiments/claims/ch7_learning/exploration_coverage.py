@@ -293,37 +293,37 @@ def plot(found: Cells) -> Any:
     return drawing
 
 
-def _untried(axes: Any, mine: Mapping[str, Runs]) -> None:
+def _untried(axes: Any, group: Mapping[str, Runs]) -> None:
     """Draw median and range over the seeds; the axis ends shortly after the least-tried agent, before the random one."""
-    ends = [covered(mine[name]) for name in ("least_tried", "curious") if name in mine]
+    ends = [covered(group[name]) for name in ("least_tried", "curious") if name in group]
     last = 1.15 * max((float(end.max()) for end in ends), default=1000.0)
     times = np.linspace(0.0, last, 600)
-    for name in [name for name in COLORS if name in mine]:
-        left = np.array([run["state_actions"] - np.searchsorted(run["new_actions"], times, side="right") for run in mine[name]])
+    for name in [name for name in COLORS if name in group]:
+        left = np.array([run["state_actions"] - np.searchsorted(run["new_actions"], times, side="right") for run in group[name]])
         axes.plot(times, np.median(left, axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
         axes.fill_between(times, left.min(axis=0), left.max(axis=0), color=COLORS[name], alpha=0.15, linewidth=0.0)
-    floor = np.median([run["floor"] for runs in mine.values() for run in runs])
+    floor = np.median([run["floor"] for runs in group.values() for run in runs])
     axes.axvline(floor, color="k", linestyle=":", linewidth=0.8, label="shortest walk")
     axes.set(xlabel="transitions", ylabel="state-actions never tried", xlim=(0.0, last), ylim=(0.0, None))
     axes.grid(alpha=0.2)
 
 
-def _states(axes: Any, mine: Mapping[str, Runs]) -> None:
+def _states(axes: Any, group: Mapping[str, Runs]) -> None:
     times = np.arange(0, 2 * EARLY)
-    for name in [name for name in COLORS if name in mine]:
-        seen = np.array([np.searchsorted(run["new_states"], times, side="right") for run in mine[name]])
+    for name in [name for name in COLORS if name in group]:
+        seen = np.array([np.searchsorted(run["new_states"], times, side="right") for run in group[name]])
         axes.plot(times, seen.mean(axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
     axes.axvline(EARLY, color="k", linestyle=":", linewidth=0.8)
     axes.set(xlabel="transitions", ylabel="states visited, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
     axes.grid(alpha=0.2)
 
 
-def _detours(axes: Any, mine: Mapping[tuple[str, ...], Runs]) -> None:
+def _detours(axes: Any, group: Mapping[tuple[str, ...], Runs]) -> None:
     """Draw a dot for each run: how much longer it was than the shortest walk."""
-    names = [name for name in COLORS if any(key[1] == name for key in mine)]
+    names = [name for name in COLORS if any(key[1] == name for key in group)]
     for shift, (world, marker) in zip((-0.12, 0.12), (("constrained", "o"), ("free", "^")), strict=True):
         for place, name in enumerate(names):
-            runs = mine.get((world, name), [])
+            runs = group.get((world, name), [])
             detours = 100.0 * np.maximum(covered(runs) / [run["floor"] for run in runs] - 1.0, MIN_DETOUR)
             label = world if place == 0 else None
             axes.plot(np.full(len(detours), place + shift), detours, marker, color=COLORS[name], markersize=4.0, alpha=0.6, label=label)

@@ -222,7 +222,7 @@ def plot(found: Cells) -> Any:
     lengths = [[length(run) for run in runs] for runs in grouped.values()]
     draw_points(middle, names, lengths, label=f"after {budgets[-1]} transitions", **style)
     middle.set(ylabel="actions per solved task", xlabel="neighbours per state")
-    times = {name: mine for name, runs in zip(names, grouped.values(), strict=True) if (mine := learning_times(runs))}
+    times = {name: group for name, runs in zip(names, grouped.values(), strict=True) if (group := learning_times(runs))}
     draw_points(right, list(times), list(times.values()), label="until every action was tried once", **style)
     right.set(ylabel="transitions", xlabel="neighbours per state")
     for axes in (left, middle, right):

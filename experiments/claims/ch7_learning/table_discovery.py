@@ -279,7 +279,7 @@ def _detects(runs: Runs) -> Claim:
     for learner in LEARNERS:
         hits = {explorer: judged(runs, explorer, learner, "beside_ghost") for explorer in EXPLORERS}
         if not all(hits.values()):
-            alone = len({run.seed for mine in runs.values() for run in mine}) == 1
+            alone = len({run.seed for group in runs.values() for run in group}) == 1
             return DETECTOR.measured("two seeds are needed" if alone else f"{learner}: no action depends on other parts", None)
         values = {explorer: [one.at_all for one in group] for explorer, group in hits.items()}
         chance = interquartile_mean([one.chance for one in hits["curious"]])

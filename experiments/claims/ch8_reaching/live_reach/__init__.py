@@ -1,1 +1,1 @@
-"""Live reach: the learned reacher on the live PyBullet robot, beside the planner; `claim` is the experiment."""
+"""The learned reacher and a planner on the live PyBullet robot; `claim` is the experiment."""

@@ -1,19 +1,21 @@
-"""Live reach: the learned reacher on the live PyBullet robot, in lockstep, beside the planner.
+"""Compare the learned reacher with a planner on the live PyBullet robot, in lockstep.
 
-Claim: trained offline and refined live, it brings the palm to within 2 cm of the surface of at least 95 % of the thesis' 27 targets that
-can be reached, and of 90 % of fresh random ones, from random poses, without a solid contact deeper than 2 mm.
-Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes a start on 2 cores.
+Claim: trained offline and refined live, the learned reacher brings the palm to within 2 cm of the surface of at least 95 % of those of the
+thesis' 27 targets that can be reached, and of 90 % of new random targets, from random poses, without a solid contact deeper than 2 mm.
+Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
-The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet, with gravity.  A start: a
-learner (gp, ucb, alike) of 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified motors, then
-54 live tries in the same record; then, without learning, each of the 27 and 50 fresh targets from a pose of its own, up to three
-reaches a try.  The planner peer (inverse kinematics and RRT-Connect, planned anew on every change) has the same targets, poses and
-robot, and the true model; the target repels nothing while it moves, for it plans around it.  Besides, 8 targets that move to and fro over
-15 cm at 3 cm/s, and 8 with a ball of 8 cm, in model and simulator, that crosses the hand's path as fast.
-A target can be reached if inverse kinematics finds a pose that holds limits and cables, with the palm within 2 cm of the surface, and in
-which no solid touches anything but the hand the target (experiments/kit/reaching/README.md has which grid it is).  Fresh targets are such.
-Judged by the simulator's joints, not by encoders: where the palm was when the force ended, or the planner held that it was there.
-First motion is measured with ticks of 2 ms: from the tick of the request to the first in which another command is in force.
+The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet, with gravity.  In each start a
+learner (predictor gp, strategy ucb, failures alike) makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant
+with the identified motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new targets, each from another pose,
+with up to three reaches per try.  The planner peer (inverse kinematics and RRT-Connect, replanned after every change) has the same targets,
+poses and robot, and the true model; the target exerts no force while the planner moves, because the planner avoids it.  In addition there
+are 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 at rest with a ball of 8 cm, in model and simulator, that crosses the
+hand's path at the same speed.
+
+A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
+only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.
+The judge uses the simulator's joints, not the encoders: the position of the palm when the force ended, or when the planner had finished.
+The time to the first motion is measured with ticks of 2 ms, from the tick of the request to the first tick with another command.
 """
 
 from __future__ import annotations
@@ -59,32 +61,45 @@ from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl
 from mobee.store import STORE
 
-TRIES, LIVE, FRESH_TARGETS, MOVING_THINGS = 800, 54, 50, 8
-PIECE = 27  # tries of a launch
-FAST, FIRST = 500.0, 10  # Hz; reaches whose first motion is timed
+TRIES, LIVE_TRIES, FRESH_TARGETS, MOVING_OBJECTS = 800, 54, 50, 8
+TRIES_PER_LAUNCH = 27
+FAST_RATE, TIMED_REACHES = 500.0, 10  # Hz of the launch in which first motions are timed, and their number
 CONTESTANTS, MOVING = ("learner", "peer"), "moving"
 NAMES = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
-LEAST = {GRID: 0.95, FRESH: 0.9}
-SOON = 5e-3  # s
-FEW = 20  # tries: of fewer no verdict is made
+MIN_SUCCESS = {GRID: 0.95, FRESH: 0.9}
+MAX_FIRST_MOTION = 5e-3  # s
+MIN_TRIES = 20  # from which there is a verdict
 CLAIMS = (
     Claim(
         "aim of this reproduction",
-        "live, refined live: palm within 2 cm of the surface of those of the 27 targets that can be reached, from random poses",
+        "on the live robot the learned reacher brings the palm within 2 cm of the surface of those of the thesis' 27 targets that can be "
+        "reached, from random poses: share of tries",
         "at least 0.95",
     ),
-    Claim("aim of this reproduction", "live: palm within 2 cm of the surface of fresh random targets, from random poses", "at least 0.90"),
-    Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while it reaches for what rests", "0"),
-    Claim("aim of this reproduction", "a reach moves within 5 ms of the request, on robot_sim's clock", "at most 5 ms"),
-    Claim("aim of this reproduction", "live, the learned reacher is no worse than inverse kinematics and RRT-Connect", "-"),
+    Claim(
+        "aim of this reproduction",
+        "on the live robot the learned reacher brings the palm within 2 cm of the surface of new random targets: share of tries",
+        "at least 0.90",
+    ),
+    Claim(
+        "aim of this reproduction",
+        "on the live robot the learned reacher causes no contact of solids deeper than 2 mm while it reaches for targets at rest",
+        "0",
+    ),
+    Claim(
+        "aim of this reproduction",
+        "on the live robot a reach begins to move within 5 ms of the request, on robot_sim's clock",
+        "at most 5 ms",
+    ),
+    Claim("aim of this reproduction", "on the live robot the learned reacher is no worse than inverse kinematics and RRT-Connect", "-"),
 )
 
 COLORS = {"learner": "tab:red", "peer": "tab:blue"}
-TITLES = {GRID: "of the 27, those that can be reached", FRESH: "fresh random targets"}
+TITLES = {GRID: "those of the 27 targets that can be reached", FRESH: "new random targets"}
 
 WITH_OBSTACLE = Path(__file__).with_name("obstacle.xml")
-LONGEST = 120.0  # s of robot time for a try, on average over a block
-PATIENCE = 60.0  # s for a tick: a plan is made in one
+MAX_TRY = 120.0  # s of robot time for a try, on average over a block
+PATIENCE = 60.0  # s for a tick, in which a plan may be made
 
 _SCENARIO = """# Written by the experiment `live-reach`.
 title = "Reaching with PyBullet: {kind}"
@@ -105,44 +120,45 @@ record = "{folder}"
 [services.controller]
 
 [services.performer]
-module = "experiments.claims.ch8_reaching.live_reach.performer"
+module = "experiments.kit.live.performer"
+perform = "experiments.claims.ch8_reaching.live_reach.contestants:perform"
 run_dir = "{folder}"
 """
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """The sizes of a start's parts."""
+    """The sizes of a start: transitions, offline and live tries, and targets of each kind."""
 
     transitions: int = TRANSITIONS
     tries: int = TRIES
-    live: int = LIVE
+    live: int = LIVE_TRIES
     grid: int = 27
     fresh: int = FRESH_TARGETS
-    moving: int = MOVING_THINGS
-    first: int = FIRST
+    moving: int = MOVING_OBJECTS
+    timed: int = TIMED_REACHES
 
 
 QUICK = Sizes(500, 30, 2, 2, 2, 1, 2)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the experiment."""
+    """Add --starts and --quick."""
     parser.add_argument(
-        "--starts", type=positive_whole, default=3, metavar="N", help="learners, with poses and fresh targets of their own (default: 3)"
+        "--starts", type=positive_whole, default=3, metavar="N", help="learners, each with other poses and new targets (default: 3)"
     )
     parser.add_argument("--quick", action="store_true", help="a short version that shows whether it works")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Train, refine and evaluate; finished blocks are not repeated.  Raises OmplMissing before anything is begun."""
+    """Train, refine and evaluate; finished blocks are not repeated.  Raises OmplMissing before the first."""
     require_ompl()
     sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts
     with Progress() as progress:
         for number in range(starts):
             seed, place = arguments.seed + number, folder / f"start-{number}"
             place.mkdir(exist_ok=True)
-            progress.show(number / starts, f"start {number + 1} of {starts}: learns offline")
+            progress.show(number / starts, f"start {number + 1} of {starts}: learning offline")
             train(place / STORE, seed, sizes.transitions, sizes.tries)
             jobs = list(_jobs(place, seed, sizes))
             for done, (name, job, rate) in enumerate(jobs):
@@ -155,24 +171,24 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         "claims": [claim.record() for claim in measured(blocks, known, left)],
         "tries": table(blocks, known),
         "missed": misses(blocks, known, _why),
-        "reachable": sorted(known),
-        "held off by the robot's own fields": sorted(known - left),
-        "repeatable": all(block.repeatable for block in blocks if block.kind != "moving"),  # what is moved is moved from outside
+        "targets that can be reached": sorted(known),
+        "targets that the robot's own fields keep the palm from": sorted(known - left),
+        "repeatable": all(block.repeatable for block in blocks if block.kind != "moving"),  # objects are moved from outside the lockstep
     }
 
 
 def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, float]]:
-    """The blocks of a start in their order: name, what is done, ticks a second."""
+    """Yield the blocks of a start in their order: name, job, ticks per second."""
     store = str((place / STORE).resolve())
     grid, fresh = grid_problems(seed)[: sizes.grid], fresh_problems(seed, sizes.fresh)
-    for made in range(0, sizes.live, PIECE):
-        yield f"refine-{made:03}", Job("refine", seed, store, tries=sizes.tries + min(made + PIECE, sizes.live)), RATE
-    pieces = [grid, *(fresh[i : i + PIECE] for i in range(0, len(fresh), PIECE))]
+    for first in range(0, sizes.live, TRIES_PER_LAUNCH):
+        yield f"refine-{first:03}", Job("refine", seed, store, tries=sizes.tries + min(first + TRIES_PER_LAUNCH, sizes.live)), RATE
+    pieces = [grid, *(fresh[i : i + TRIES_PER_LAUNCH] for i in range(0, len(fresh), TRIES_PER_LAUNCH))]
     for contestant in ("learner", "peer"):
         for number, piece in enumerate(pieces):
             yield f"{contestant}-{number}", Job(contestant, seed, store, piece), RATE
     yield "moving", Job("moving", seed, store, moving_problems(seed, sizes.moving)), RATE
-    yield "first", Job("first motion", seed, store, fresh[: sizes.first]), FAST
+    yield "first", Job("first motion", seed, store, fresh[: sizes.timed]), FAST_RATE
 
 
 def _do(folder: Path, job: Job, seed: int, rate: float) -> None:
@@ -184,30 +200,31 @@ def _do(folder: Path, job: Job, seed: int, rate: float) -> None:
 
 @cache
 def _nearest(place: tuple[float, float, float]) -> tuple[float, str]:
-    """The least remaining error of a reach from any state, offline, and the contacts there."""
+    """Return the smallest remaining error of a reach from any state, offline, and the contacts there."""
     return nearest_reach(offline_plant(0), ReachTarget(np.array(place), aim=AIM))
 
 
 def _why(place: tuple[float, float, float]) -> str:
-    off, felt = _nearest(place)
-    return f"offline the nearest reach from any state ends {1e3 * off:.0f} mm off" + (f", kept by {felt} mm" if off > GOOD else "")
+    off, contacts = _nearest(place)
+    text = f"offline the best reach from any state ends {1e3 * off:.0f} mm from the surface"
+    return text + (f", with the contacts {contacts} mm" if off > GOOD else "")
 
 
 def _blocks(folder: Path) -> list[Block]:
     blocks = [read_block(path.parent) for path in sorted(folder.glob(f"start-*/*/{BLOCK}"))]
     if not blocks:
-        raise InvalidValue(f"{folder} has no finished block: it was stopped before the first was over.")
+        raise InvalidValue(f"{folder} has no finished block: continue the run with --resume.")
     return blocks
 
 
 def _touchable() -> frozenset[int]:
-    """The numbers of those of the 27 targets that can be reached."""
+    """Return the numbers of those of the 27 targets that can be reached."""
     known = belief()
     return frozenset(number for number, target in enumerate(grid_targets()) if touchable(known, target))
 
 
 def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
-    """Launch a system with one job, which leaves a record of every tick in the folder; returns whether the run is repeatable.
+    """Launch a system with one job, which records every tick in the folder; returns whether the run is repeatable.
 
     `seed`: of the simulated robot.  Raises LaunchFailed.
     """
@@ -219,18 +236,18 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
     scenario = folder / "scenario.toml"
     scenario.write_text(text)
     tries = max(1, len(job.problems) + job.tries)
-    summary = summary_of(str(scenario), ticks=round(LONGEST * rate * tries), runs=folder / "launches")
+    summary = summary_of(str(scenario), ticks=round(MAX_TRY * rate * tries), runs=folder / "launches")
     return bool(summary["lockstep"]["repeatable"])
 
 
 def tries_of(blocks: Sequence[Block], contestant: str, kind: str, numbers: frozenset[int] | None = None) -> list[Judged]:
-    """All tries of a contestant on one set of targets, or on those numbers of it."""
+    """Return all tries of a contestant on one kind of targets, or only those with the given numbers."""
     found = [tried for block in blocks if block.kind == contestant for tried in block.tries if tried.kind == kind]
     return [tried for tried in found if numbers is None or tried.number in numbers]
 
 
 def share(tries: Sequence[Judged]) -> str:
-    """Successes of tries, and the 95 % interval of their share (Wilson)."""
+    """Format the number of successes, and the 95 % interval of their share (Wilson)."""
     made = sum(tried.success for tried in tries)
     if not tries:
         return "none"
@@ -239,8 +256,8 @@ def share(tries: Sequence[Judged]) -> str:
 
 
 def enough(tries: Sequence[Judged], least: float) -> bool | None:
-    """Whether their share of successes is as large as that; None: less, but by chance perhaps."""
-    if len(tries) < FEW:
+    """Return whether the share of successes is at least `least`; None if it is smaller, but perhaps by chance."""
+    if len(tries) < MIN_TRIES:
         return None
     made = sum(tried.success for tried in tries)
     if made >= least * len(tries):
@@ -249,7 +266,10 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 
 
 def measured(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset[int]) -> list[Claim]:
-    """The claims with our numbers; `touchable`: those of the 27, `left`: those of them that MoBeE's fields let a palm come to."""
+    """Return the claims with our numbers.
+
+    `touchable`: those of the 27 targets that can be reached; `left`: those of them from which MoBeE's fields do not keep the palm.
+    """
     grid, fresh = tries_of(blocks, "learner", GRID, touchable), tries_of(blocks, "learner", FRESH)
     deep = [touch for block in blocks if block.kind in ("refine", "learner") for touch in block.deep]
     hours = sum(block.seconds for block in blocks if block.kind in ("refine", "learner")) / 3600.0
@@ -258,37 +278,39 @@ def measured(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset
     rivals = {contestant: tries_of(blocks, contestant, GRID, touchable) + tries_of(blocks, contestant, FRESH) for contestant in CONTESTANTS}
     worst = f"deepest {1e3 * max(touch.depth for touch in deep):.1f} mm ({max(deep, key=lambda t: t.depth).pair}), " if deep else ""
     apart = (
-        f"of the {len(left)} that the robot's own fields let a palm come to {share(tries_of(blocks, 'learner', GRID, left))}; "
-        f"of all 27 {share(tries_of(blocks, 'learner', GRID))}"
+        f"for the {len(left)} from which the robot's own fields do not keep the palm {share(tries_of(blocks, 'learner', GRID, left))}; "
+        f"for all 27 {share(tries_of(blocks, 'learner', GRID))}"
     )
     return [
-        CLAIMS[0].measured(f"{share(grid)} of {len(touchable)}; {apart}", enough(grid, LEAST[GRID])),
-        CLAIMS[1].measured(share(fresh), enough(fresh, LEAST[FRESH])),
-        CLAIMS[2].measured(f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if len(grid) + len(fresh) >= FEW else None),
+        CLAIMS[0].measured(f"{share(grid)} for {len(touchable)} targets; {apart}", enough(grid, MIN_SUCCESS[GRID])),
+        CLAIMS[1].measured(share(fresh), enough(fresh, MIN_SUCCESS[FRESH])),
+        CLAIMS[2].measured(
+            f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if len(grid) + len(fresh) >= MIN_TRIES else None
+        ),
         CLAIMS[3].measured(
-            f"{max(first):g} ms at most to the first command that moves ({len(first)} reaches, ticks of {ticks[0]:g} ms)"
+            f"at most {max(first):g} ms to the first command that moves ({len(first)} reaches, ticks of {ticks[0]:g} ms)"
             if first
             else "none",
-            max(first) <= 1e3 * SOON if first else None,
+            max(first) <= 1e3 * MAX_FIRST_MOTION if first else None,
         ),
         CLAIMS[4].measured("; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items()), _no_worse(rivals)),
     ]
 
 
 def _no_worse(rivals: Mapping[str, Sequence[Judged]]) -> bool | None:
-    """Whether the learner succeeds at least as often in the tries, which are the same for both."""
+    """Return whether the learner succeeds at least as often in the tries, which are the same for both."""
     learner, peer = (np.array([tried.success for tried in rivals[contestant]]) for contestant in CONTESTANTS)
-    if len(learner) < FEW or len(learner) != len(peer):
+    if len(learner) < MIN_TRIES or len(learner) != len(peer):
         return None
     return bool(learner.mean() >= peer.mean()) or None
 
 
 def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:
-    """A row a contestant and set of targets."""
+    """Return a row per contestant and set of targets."""
     sets = {
-        f"{len(touchable)} of the 27": (GRID, touchable),
+        f"{len(touchable)} of the 27 that can be reached": (GRID, touchable),
         f"the {27 - len(touchable)} others": (GRID, frozenset(range(27)) - touchable),
-        "fresh": (FRESH, None),
+        "new random targets": (FRESH, None),
     }
     sets |= {TARGET_MOVES: (TARGET_MOVES, None), OBSTACLE_MOVES: (OBSTACLE_MOVES, None)}
     rows = []
@@ -296,28 +318,30 @@ def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, 
         for name, (kind, numbers) in sets.items():
             tries = tries_of(blocks, contestant, kind, numbers)
             if tries:
-                rows.append({"who": NAMES.get(contestant, NAMES["learner"]), "targets": name, "success": share(tries), **_spent(tries)})
+                rows.append(
+                    {"contestant": NAMES.get(contestant, NAMES["learner"]), "targets": name, "success": share(tries), **_spent(tries)}
+                )
     return rows
 
 
 def _spent(tries: Sequence[Judged]) -> dict[str, Any]:
     ended = [tried for tried in tries if not tried.why]
     return {
-        "off, median [mm]": round(1e3 * float(np.median([min(tried.off, 9.0) for tried in tries])), 1),
+        "distance from the surface, median [mm]": round(1e3 * float(np.median([min(tried.off, 9.0) for tried in tries])), 1),
         "robot time, median [s]": round(float(np.median([tried.seconds for tried in ended])), 1) if ended else None,
-        "actions": round(float(np.mean([tried.actions for tried in ended])), 1) if ended else None,
-        "planning, mean [ms]": round(1e3 * float(np.mean([tried.thinking for tried in ended])), 1) if ended else None,
+        "actions per try": round(float(np.mean([tried.actions for tried in ended])), 1) if ended else None,
+        "planning per try, mean [ms]": round(1e3 * float(np.mean([tried.thinking for tried in ended])), 1) if ended else None,
         "solid contacts > 2 mm": sum(len(tried.deep) for tried in tries),
     }
 
 
 def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tuple[float, float, float]], str]) -> list[dict[str, Any]]:
-    """The touchable targets that were missed, by whom and by how much; `why` explains those that the learner missed."""
+    """Return the missed tries of targets that can be reached; `why` explains those of the learner."""
     return [
         {
-            "who": block.kind,
+            "contestant": NAMES[block.kind],
             "target": f"{tried.kind} {tried.number} at {tuple(round(x, 2) for x in tried.position)}",
-            "off [mm]": None if np.isinf(tried.off) else round(1e3 * tried.off),
+            "distance from the surface [mm]": None if np.isinf(tried.off) else round(1e3 * tried.off),
             "reaches": tried.reaches,
             "why": tried.why or (why((tried.position[0], tried.position[1], tried.position[2])) if block.kind == CONTESTANTS[0] else ""),
         }
@@ -329,7 +353,7 @@ def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tu
 
 
 def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
-    """Distances of the palm from the target's surface by contestant, two panels, and robot times, one."""
+    """Draw distances of the palm from the target's surface in two panels, and robot times in one."""
     drawing = new_figure(14.0, 4.2)
     *distances, times = drawing.subplots(1, 3)
     for axes, kind in zip(distances, (GRID, FRESH), strict=True):
@@ -344,7 +368,7 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
                     label=NAMES[contestant],
                 )
         axes.axvline(1e3 * GOOD, color="0.5", linestyle="--", linewidth=0.8)
-        axes.set(title=TITLES[kind], xlabel="palm to surface at the end, in truth [mm]", ylabel="share of tries", ylim=(0.0, 1.02))
+        axes.set(title=TITLES[kind], xlabel="true distance of palm and surface at the end [mm]", ylabel="share of tries", ylim=(0.0, 1.02))
         axes.set_xlim(-1.0, 100.0)
         axes.grid(alpha=0.2)
         axes.legend(fontsize=8, loc="lower right")
@@ -352,7 +376,7 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
         took = np.sort([t.seconds for kind in (GRID, FRESH) for t in tries_of(blocks, contestant, kind) if t.success])
         if len(took):
             times.step(took, np.arange(1, len(took) + 1) / len(took), where="post", color=COLORS[contestant], label=NAMES[contestant])
-    times.set(title="those that succeeded", xlabel="robot time to the target [s]", ylabel="share", ylim=(0.0, 1.02))
+    times.set(title="tries that succeeded", xlabel="robot time to the target [s]", ylabel="share of these tries", ylim=(0.0, 1.02))
     times.grid(alpha=0.2)
     return drawing
 
@@ -366,7 +390,7 @@ def figure(folder: Path) -> Path:
 
 EXPERIMENT = Experiment(
     name="live-reach",
-    claim="the learned reacher puts the palm on what can be reached, live, and touches nothing else",
+    claim="on the live robot the learned reacher brings the palm to the targets that can be reached, without other contacts",
     source="aim of this reproduction; thesis 8, 9.3",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),

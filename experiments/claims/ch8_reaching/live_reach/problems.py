@@ -1,7 +1,7 @@
-"""The live arm and its problems: robot, law and states, targets, poses to begin in, and the learner that is trained offline.
+"""The live arm and its problems: robot, law and states, targets, first poses, and the learner that is trained offline.
 
-The problems are the thesis' 27 targets and fresh ones between them, each with a random pose to begin in, at rest or with a target or an
-obstacle that moves.
+The problems are the thesis' 27 targets and new ones between them, each with a random first pose, at rest or with a target or an obstacle
+that moves.
 """
 
 from __future__ import annotations
@@ -27,65 +27,65 @@ from mobee.robot.robot import Robot
 from mobee.store import TransitionStore
 
 ROBOT, GAINS, RATE = "icub", "default", 50  # Hz
-JOINTS, WRIST = 4, 7  # of the lattice; those of a reach, and of the planner
+JOINTS, WRIST = 4, 7  # joints of the lattice; of a reach, and of the planner
 LEVELS, NEIGHBOURS = (0.25, 0.5, 0.75), 16
 PREDICTOR, STRATEGY, FAILURES = "gp", "ucb", "alike"
 GOOD = 0.02  # m from the target's surface
 DEEP = 2e-3  # m, of a solid contact
-REACHES = 3  # a try, each from another pre-reach state
-APART = 0.25  # of the ranges: states no farther from one that missed are not reached from again in a try; one step of the lattice
+REACHES = 3  # per try, each from another state
+APART = 0.25  # of the ranges, one step of the lattice: states at most this far from one that missed are not used again in a try
 AIM: Aim = "surface"
-TRANSITIONS = 3000  # curious ones, before the first target (thesis 7.2.2: 2987)
-POSES = 256  # in which inverse kinematics begins
+TRANSITIONS = 3000  # curious transitions before the first target (thesis 7.2.2: 2987)
+POSES = 256  # first poses of inverse kinematics
 CLOSE = 5e-3  # m, margin of inverse kinematics
-DRAWS = 1000
+DRAWS = 1000  # of a target or a first pose
 AWAY = ReachTarget(np.array([0.0, 0.0, 10.0]))
 GRID, FRESH, TARGET_MOVES, OBSTACLE_MOVES = "grid", "fresh", "target moves", "obstacle moves"
-SPEED = 0.03  # m/s, of what moves
+SPEED = 0.03  # m/s, of a moving target or obstacle
 FAR = 0.15  # m that a target moves, and an obstacle to either side
-OBSTACLE, CLEAR = 0.04, 0.05  # m, its radius, and how far its surface stays from that of the target
-SPARE = 6  # fresh targets a problem
-PATHS = 8  # across, that are drawn
+OBSTACLE, CLEAR = 0.04, 0.05  # m, radius of the obstacle, and distance of its surface from that of the target
+SPARE = 6  # new targets that are drawn per moving problem
+PATHS = 8  # of an obstacle, that are drawn
 
 
 @cache
 def robot() -> Robot:
-    """The robot of the live system."""
+    """Return the robot of the live system."""
     return load_robot(ROBOT)
 
 
 def world(path: Path = TABLE) -> World:
-    """The world with the table."""
+    """Return the world with the table."""
     return load_world(str(path))
 
 
 @cache
 def space() -> Lattice:
-    """81 states of shoulder and elbow."""
+    """Return the lattice of 81 states of shoulder and elbow."""
     return Lattice(robot(), robot().parts[PART].motors[:JOINTS], LEVELS, NEIGHBOURS)
 
 
 def offline_plant(seed: int) -> OfflinePlant:
-    """The arm with its wrist, at the table, with the motors that were identified on PyBullet."""
+    """Return a plant of the arm with its wrist, at the table, with the motors that were identified on PyBullet."""
     motors = MotorParameters.identified(ROBOT)
     return OfflinePlant(Model(robot(), world()), seed, Gains.named(GAINS), motors, 1.0 / RATE, active=robot().parts[PART].motors[:WRIST])
 
 
 def belief() -> PeerBelief:
-    """The belief of a planner: everything that MoBeE's model knows."""
+    """Return a planner's model: everything that MoBeE's model contains."""
     clauses = [clause for clause in robot().clauses if clause.part == PART]
     return PeerBelief(Model(robot(), world()), robot().parts[PART].motors[:WRIST], MARKER, clauses, Gains.named(GAINS))
 
 
 class Problem(Struct, frozen=True):
-    """A target and the posture of the part to begin in."""
+    """A target and the first posture of the part."""
 
     kind: str
     number: int
     position: list[float]  # m, root frame
     start: list[float]  # rad
     path: list[list[float]] | None = None
-    """Between which places, m, the target or an obstacle moves to and fro; None: nothing moves."""
+    """Positions, m, between which the target or an obstacle moves back and forth; None: nothing moves."""
 
     @property
     def target(self) -> ReachTarget:
@@ -94,14 +94,14 @@ class Problem(Struct, frozen=True):
 
 
 def grid_targets() -> list[ReachTarget]:
-    """The 27 targets of the thesis."""
+    """Return the 27 targets of the thesis."""
     return [ReachTarget(place, aim=AIM) for place in grid()]
 
 
 def touchable(known: PeerBelief, target: ReachTarget) -> bool:
-    """Whether inverse kinematics finds a sound pose with the palm within 2 cm of the target's surface.
+    """Return whether inverse kinematics finds a valid pose with the palm within 2 cm of the target's surface.
 
-    Limits and cables hold in it, and no solid touches anything but the hand the target.
+    The pose is within limits and cables, and its only contact of solids is that of hand and target.
     """
     known.present(target)
     low, high = known.range.T
@@ -112,13 +112,13 @@ def touchable(known: PeerBelief, target: ReachTarget) -> bool:
 
 
 def grid_problems(seed: int) -> list[Problem]:
-    """Problems of the 27 targets, reachable or not, each with its own pose to begin in."""
+    """Return problems of the 27 targets, reachable or not, each with its own first pose."""
     rng, known = np.random.default_rng([seed, 271]), belief()
     return [_begun(known, GRID, number, target, rng) for number, target in enumerate(grid_targets())]
 
 
 def fresh_problems(seed: int, count: int) -> list[Problem]:
-    """Problems of touchable targets drawn in the box around the 27."""
+    """Return problems of touchable targets drawn in the box around the 27."""
     rng, known, places = np.random.default_rng([seed, 50]), belief(), grid()
     found: list[Problem] = []
     for _ in range(DRAWS):
@@ -127,11 +127,11 @@ def fresh_problems(seed: int, count: int) -> list[Problem]:
             found.append(_begun(known, FRESH, len(found), target, rng))
         if len(found) == count:
             return found
-    raise InvalidValue(f"only {len(found)} of {count} targets in {DRAWS} draws: take another seed.")
+    raise InvalidValue(f"only {len(found)} of {count} targets were found in {DRAWS} draws: use another seed.")
 
 
 def moving_problems(seed: int, count: int) -> list[Problem]:
-    """Problems of fresh targets that move, and as many with an obstacle that crosses the path of the hand."""
+    """Return problems of new targets that move, and as many with an obstacle that crosses the path of the hand."""
     rng, known, found = np.random.default_rng([seed, 51]), belief(), list[Problem]()
     for problem in fresh_problems(seed + 1000, SPARE * count):
         if len(found) < count:
@@ -147,7 +147,7 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
 
 
 def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> list[list[float]] | None:
-    """Ends of a path across the middle between hand and target, which stays clear of the target and ends clear of the arm."""
+    """Return the ends of an obstacle's path across the middle between hand and target, clear of the target and, at its ends, of the arm."""
     start = np.array(problem.start)[: len(known.columns)]
     target, hand = problem.target, known.model.evaluate(known.whole(start)).position(known.marker)
     out = target.position - hand
@@ -163,13 +163,13 @@ def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> li
 
 
 def _is_clear(known: PeerBelief, start: Array, place: Array) -> bool:
-    """Whether an obstacle there touches nothing of the robot in that pose."""
+    """Return whether an obstacle at `place` does not touch the robot in the pose `start`."""
     known.present(ReachTarget(place, OBSTACLE + CLEAR))
     return bool(known.sound(start[None])[0])
 
 
 def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: np.random.Generator) -> Problem:
-    """A problem with a random pose in which no field feels anything, not even the target unless it lies in the body."""
+    """Return a problem with a random first pose in which no field has a contact, also not with the target unless that lies in the body."""
     low, high = known.limits.T
     for there in (target, AWAY):
         known.present(there)
@@ -177,17 +177,17 @@ def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: 
             q: Array = rng.uniform(low, high)
             if known.sound(q[None], "fields")[0] and known.sound(q[None])[0]:
                 return Problem(kind, number, target.position.tolist(), posture(known, q).tolist())
-    raise InvalidValue(f"no pose to begin in was found in {DRAWS} draws: take another seed.")
+    raise InvalidValue(f"no first pose was found in {DRAWS} draws: use another seed.")
 
 
 def posture(known: PeerBelief, q: Array) -> Array:
-    """The angles of the whole part, rad, from those of the planned motors (d,); the others at home."""
+    """Return the angles of the whole part, rad, from those of the planned motors (d,); the other motors are at home."""
     found: Array = known.whole(q)[robot().parts[PART].slice]
     return found
 
 
 def train(file: Path, seed: int, transitions: int, tries: int) -> None:
-    """Learn the transitions, and then the 27 targets, on the offline plant; goes on where an earlier call was broken off."""
+    """Learn the transitions, and then the 27 targets, on the offline plant; continues where an earlier call was interrupted."""
     plant = offline_plant(seed)
     with TransitionStore(file, PART) as store:
         agent = CuriousAgent(space(), plant, seed=seed, store=store)
@@ -197,7 +197,7 @@ def train(file: Path, seed: int, transitions: int, tries: int) -> None:
 
 
 def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
-    """The learner that continues its record, or begins one."""
+    """Return the learner that continues a record, or begins one."""
     known = load_learned(file, PART, plant.robot)
     return ReachAgent(
         known.space,

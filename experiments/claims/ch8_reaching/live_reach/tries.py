@@ -1,8 +1,8 @@
-"""Tries on the live robot: the job of a launch, its record, their judgement by the simulator's joints, and why targets were missed.
+"""Tries on the live robot: the job of a launch, its record, its judgement by the simulator's joints, and the reasons of misses.
 
     python -m experiments.claims.ch8_reaching.live_reach.tries
 
-prints, in some minutes, how near reaches from all states come to those of the 27 targets that can be reached, offline.
+prints, within minutes, the smallest distance of offline reaches from each of the 27 targets that can be reached.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from mobee.arrays import Array
 from mobee.reach import RADIUS, ReachTarget
 
 BLOCK = "block.json"
-STILL = 20  # ticks before a request, in which the motion of joints at rest is measured
-MOVED = 1e-5  # rad beyond the motion at rest: a joint moves
-FELT = 2  # contacts that are named, the deepest
+STILL = 20  # ticks before a request in which the motion of joints at rest is measured
+MOVED = 1e-5  # rad beyond the motion at rest, from which a joint moves
+NAMED_CONTACTS = 2  # the deepest contacts, which a miss names
 
 Kind = Literal["refine", "learner", "peer", "moving", "first motion"]
 
@@ -51,45 +51,45 @@ class Job(Struct, frozen=True):
     """File of the learned transitions and reaches."""
     problems: list[Problem] = []
     tries: int = 0
-    """Their total number after the learner was refined."""
+    """Total number of tries after the learner was refined."""
 
 
 class Tried(Struct, frozen=True):
-    """A try; ticks are robot_sim's."""
+    """The record of a try; ticks are robot_sim's."""
 
     kind: str
     number: int
-    out: int  # tick at which the arm set out for where it begins
-    begin: int  # at which the target was presented
-    ends: list[int]  # ticks at which the hand was to be there
-    over: int  # tick at which the arm rested again
-    off: float  # rad, from the posture to begin in
+    out: int  # tick at which the arm started towards its first posture
+    begin: int  # tick at which the target was presented
+    ends: list[int]  # ticks at which a reach ended, or the planner had finished
+    over: int  # tick at which the arm was at rest again
+    off: float  # rad, error of the first posture
     actions: int
-    believed: float  # m, that were missing by the encoders, in the end
-    thinking: float  # s of processor time spent on plans
-    why: str = ""  # it ended without a reach
+    believed: float  # m, remaining error at the end, by the encoders
+    thinking: float  # s of processor time for plans
+    why: str = ""  # reason if it ended without a reach
     asked: int = 0  # tick of the last request
-    there: list[float] | None = None  # m, where a target that moves was at the last of the ends
-    first: int = -1  # ticks from the last request to the first command that moves, where it was timed
+    there: list[float] | None = None  # m, position of a moving target at the last of the ends
+    first: int = -1  # ticks from the last request to the first command that moves; -1: not timed
 
 
 class Judged(Struct, frozen=True):
-    """A try as judged by the simulator."""
+    """A try, judged by the simulator's joints."""
 
     kind: str
     number: int
     position: list[float]  # m
-    off: float  # m, from the target's surface, when the hand was to be there for the last time
+    off: float  # m, distance from the target's surface at the last end
     success: bool
     seconds: float  # robot time from the presentation to that moment
     actions: int
     reaches: int
-    thinking: float  # s of processor time spent on plans
-    deep: list[Touch]  # solid contacts deeper than 2 mm from when the arm set out from home to its rest
-    begun_off: float  # rad, from the posture to begin in
-    why: str  # it came to no end
-    first: int  # ticks from request to the first command that moves, -1: not timed
-    first_motion: int  # ticks from request to where a joint first truly moves, -1: not timed
+    thinking: float  # s of processor time for plans
+    deep: list[Touch]  # contacts of solids deeper than 2 mm, from the start at home until the arm is at rest again
+    begun_off: float  # rad, error of the first posture
+    why: str  # reason if it ended without a reach
+    first: int  # ticks from the request to the first command that moves; -1: not timed
+    first_motion: int  # ticks from the request to the first motion of a joint; -1: not timed
 
 
 class Block(Struct, frozen=True):
@@ -104,7 +104,7 @@ class Block(Struct, frozen=True):
 
 
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
-    """Judge the tries of a launch by the record in its folder."""
+    """Judge the tries of a launch by the records in its folder."""
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > DEEP]
     done = read_done(folder, Tried)
@@ -139,7 +139,7 @@ def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Mod
 
 
 def _first_motion(q: Array, asked: int) -> int:
-    """Ticks from a request to the first in which a joint of the arm has gone further than it does at rest."""
+    """Return the ticks from a request to the first in which a joint of the arm has moved farther than at rest."""
     arm = q[:, robot().parts[PART].slice]
     before, after = arm[asked - STILL : asked], arm[asked:]
     bound = MOVED + np.ptp(before, axis=0).max()
@@ -148,21 +148,21 @@ def _first_motion(q: Array, asked: int) -> int:
 
 
 def write_block(folder: Path, block: Block) -> None:
-    """Write it whole or not at all."""
+    """Write a block to its folder, completely or not at all."""
     new = (folder / BLOCK).with_suffix(".new")
     new.write_bytes(msgspec.json.format(msgspec.json.encode(block), indent=1))
     new.replace(folder / BLOCK)
 
 
 def read_block(folder: Path) -> Block:
-    """Read what `write_block` wrote."""
+    """Read a block written by `write_block`."""
     return msgspec.json.decode((folder / BLOCK).read_bytes(), type=Block)
 
 
 def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]:
-    """The least remaining error of a reach from a state, m, and the deepest contacts at its end, as pairs with depths in mm.
+    """Return the smallest remaining error of a reach from any state, m, and the deepest contacts at its end with depths in mm.
 
-    The search stops at the first that succeeds.
+    The search stops at the first reach that succeeds.
     """
     best, ending = np.inf, plant.robot.home
     arm = plant.robot.part(PART).slice
@@ -178,24 +178,24 @@ def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]
             ending[arm] = made.q
         if best <= GOOD:
             break
-    return best, _felt(plant, ending)
+    return best, _contacts(plant, ending)
 
 
-def _felt(plant: OfflinePlant, q: Array) -> str:
-    """The deepest contacts of a pose (n,) rad while the hand reaches."""
+def _contacts(plant: OfflinePlant, q: Array) -> str:
+    """Format the deepest contacts of a pose (n,) rad while the hand reaches."""
     contacts = sorted(plant.model.evaluate(q, reaching=MARKER).contacts, key=lambda contact: -contact.depth)
-    return ", ".join(f"{one.first} {one.second} {1e3 * one.depth:.0f}" for one in contacts[:FELT])
+    return ", ".join(f"{one.first} {one.second} {1e3 * one.depth:.0f}" for one in contacts[:NAMED_CONTACTS])
 
 
 def main() -> None:
     """Print the table."""
     known, plant = belief(), offline_plant(0)
-    lines = ["| target | x | y | z | nearest reach [mm] | felt there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
+    lines = ["| target | x | y | z | best reach [mm] | contacts there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
     for number, target in enumerate(grid_targets()):
         if touchable(known, target):
-            off, felt = nearest_reach(plant, target)
+            off, contacts = nearest_reach(plant, target)
             where = " | ".join(f"{x:.1f}" for x in target.position)
-            lines.append(f"| {number} | {where} | {1e3 * off:.0f} | {felt if off > GOOD else ''} |")
+            lines.append(f"| {number} | {where} | {1e3 * off:.0f} | {contacts if off > GOOD else ''} |")
     sys.stdout.write("\n".join(lines) + "\n")
 
 

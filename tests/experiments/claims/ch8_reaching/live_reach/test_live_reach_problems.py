@@ -1,4 +1,4 @@
-"""What is reached for on the live robot, and from where."""
+"""Targets and first poses of the live tries."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 )
 
 
-def test_of_the_27_targets_21_can_be_touched_and_no_other_solid_is_in_the_way() -> None:
+def test_21_of_the_27_targets_can_be_touched() -> None:
     known = belief()
-    missing = [number for number, target in enumerate(grid_targets()) if not touchable(known, target)]
-    assert missing == [6, 8, 11, 18, 19, 20]  # two beyond the stretched arm, four in front of face, chest and belly
+    others = [number for number, target in enumerate(grid_targets()) if not touchable(known, target)]
+    assert others == [6, 8, 11, 18, 19, 20]  # two beyond the stretched arm, four in front of face, chest and belly
 
 
-def test_tries_begin_where_nothing_is_felt_and_a_seed_draws_the_same() -> None:
+def test_tries_begin_without_contacts_and_are_those_of_their_seed() -> None:
     known = belief()
     for problem in fresh_problems(3, 2):
         known.present(problem.target)
@@ -34,13 +34,13 @@ def test_tries_begin_where_nothing_is_felt_and_a_seed_draws_the_same() -> None:
     assert fresh_problems(3, 2) == fresh_problems(3, 2) != fresh_problems(4, 2)
 
 
-def test_the_grid_has_all_27_each_with_a_start_of_its_own() -> None:
+def test_the_grid_has_all_27_targets_with_different_first_poses() -> None:
     problems = grid_problems(0)
     assert [(one.kind, one.number) for one in problems] == [(GRID, number) for number in range(27)]
     assert len({tuple(one.start) for one in problems}) == 27
 
 
-def test_an_obstacle_crosses_the_way_of_the_hand_clear_of_target_and_arm() -> None:
+def test_an_obstacle_crosses_the_path_of_the_hand_in_the_middle() -> None:
     known, problems = belief(), moving_problems(0, 2)
     assert [one.kind for one in problems] == [TARGET_MOVES] * 2 + [OBSTACLE_MOVES] * 2
     for one in problems[2:]:

@@ -1,4 +1,4 @@
-"""A live try is judged by the simulator's joints, at the tick at which the hand was to be there."""
+"""A live try is judged by the simulator's joints, at the tick at which its last reach ended."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def tried(number: int, ends: list[int], **how: object) -> Tried:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """The arm bends its elbow by 0.3 rad in one tick, the 60th, and touches something before that."""
+    """The arm bends its elbow by 0.3 rad in one tick, the 60th, and has contacts before and after that."""
     q = np.tile(robot().home, (T, 1))
     q[END - 2 :, ARM.start + 3] += 0.3
     q.tofile(tmp_path / POSITIONS)
@@ -40,7 +40,7 @@ def palm(bent: float) -> np.ndarray:
 
 
 def problem(number: int, off: float) -> Problem:
-    """The sphere's surface so far above where the palm is in the end."""
+    """A sphere whose surface is `off` above the palm at the end."""
     return Problem(FRESH, number, (palm(0.3) + [0.0, 0.0, RADIUS + off]).tolist(), [])
 
 
@@ -55,31 +55,31 @@ def test_success_is_the_palm_within_two_centimetres_of_the_surface_when_the_forc
     assert not none.success and none.off == np.inf
 
 
-def test_the_row_before_the_tick_is_what_its_encoders_saw(folder: Path) -> None:
+def test_the_pose_of_a_tick_is_that_which_its_encoders_measured(folder: Path) -> None:
     append_done(folder, tried(0, [END - 1]))
     before = measure(folder, Job("learner", 0, "", [problem(0, 0.0)]), RATE, True).tries[0]
     assert before.off > 0.03
 
 
-def test_a_target_that_moved_counts_where_it_was_then(folder: Path) -> None:
+def test_a_moving_target_is_judged_at_its_position_at_the_end(folder: Path) -> None:
     append_done(folder, tried(0, [END], there=problem(0, 0.005).position))
     assert measure(folder, Job("moving", 0, "", [problem(0, 0.2)]), RATE, True).tries[0].off == pytest.approx(0.005)
 
 
-def test_deep_contacts_are_told_of_the_block_and_of_the_try_in_whose_time_they_began(folder: Path) -> None:
+def test_deep_contacts_belong_to_the_block_and_to_the_try_in_which_they_began(folder: Path) -> None:
     append_done(folder, tried(0, [END]))
     block = measure(folder, Job("learner", 0, "", [problem(0, 0.0)]), RATE, True)
     assert [touch.depth for touch in block.deep] == [0.003, 0.004]
     assert [touch.depth for touch in block.tries[0].deep] == [0.003]
 
 
-def test_a_joint_that_truly_moves_is_seen_in_ticks_from_the_request(folder: Path) -> None:
+def test_the_first_motion_is_counted_in_ticks_from_the_request(folder: Path) -> None:
     append_done(folder, tried(0, [END], asked=50, first=2))
     found = measure(folder, Job("first motion", 0, "", [problem(0, 0.0)]), RATE, True).tries[0]
     assert (found.first, found.first_motion) == (2, END - 1 - 50)
 
 
-def test_jobs_tries_and_blocks_come_back_from_disk_as_they_were(folder: Path) -> None:
+def test_jobs_tries_and_blocks_are_read_as_they_were_written(folder: Path) -> None:
     job = Job("learner", 3, "run.sqlite", [problem(0, 0.0)], 5)
     write_job(folder, job)
     assert read_job(folder, Job) == job and read_done(folder, Tried) == []

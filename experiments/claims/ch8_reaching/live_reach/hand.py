@@ -16,15 +16,15 @@ from services.common.bus_plant import BusPlant
 from services.common.lockstep import Participant
 from services.common.service import Service
 
-MOVES = 5e-3  # rad/s by which a command that moves differs from the last before the request
-THING, OBSTACLE = "thing", "obstacle"  # the target that moves; the world file's obstacle
-EVERY = 5  # ticks, after which it is moved on
-AWAY = np.array([0.6, 0.9, 0.6])  # m, where an obstacle disturbs nothing
+MIN_CHANGE = 5e-3  # rad/s, difference of a command that moves from the last one before the request
+MOVING_TARGET, OBSTACLE = "moving_target", "obstacle"  # names in the world; the obstacle is that of obstacle.xml
+MOVE_PERIOD = 5  # ticks between two positions of a moving object
+AWAY = np.array([0.6, 0.9, 0.6])  # m, position of an obstacle that is not used
 UPRIGHT, SPHERE = [1.0, 0.0, 0.0, 0.0], Geometry(kind="sphere", size=[RADIUS])
 
 
 class Hand(BusPlant):
-    """A BusPlant that records the ticks at which its reaches were asked for, moved it, and ended."""
+    """A BusPlant that records the ticks at which its reaches were requested, began to move, and ended."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, (PART,))
@@ -40,12 +40,12 @@ class Hand(BusPlant):
 
     @property
     def tick(self) -> int:
-        """The tick now: in lockstep a service without a turn receives messages of its part alone."""
+        """The present tick; in lockstep a service without a turn receives only messages of its part."""
         motion = self._motion.get(PART)
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
 
     def watch_commands(self) -> None:
-        """Time the first motion of reaches from now on; costs time in every tick."""
+        """Time the first motion of reaches from now on; takes time in every tick."""
         self._link.on_each(Commands, self._note_commands)
 
     def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
@@ -57,16 +57,16 @@ class Hand(BusPlant):
         self.end = reach.end_k
 
     def _note_commands(self, commands: Commands) -> None:
-        """Those formed of tick k act from tick k + 1 on; what is asked for in tick k is known to those of the next."""
+        """Find the first command that moves: commands of tick k act from tick k + 1 on, and those of the tick after a request know it."""
         reference = np.array(commands.ref[self._where])
         if commands.re_k <= self.asked:
             self._before = reference
-        elif self.first < 0 and self._before is not None and np.abs(reference - self._before).max() > MOVES:
+        elif self.first < 0 and self._before is not None and np.abs(reference - self._before).max() > MIN_CHANGE:
             self.first = commands.re_k + 1 - self.asked
 
 
 class Mover:
-    """Moves one thing to and fro, in the model's world and, for an obstacle, in the simulator's; a service of its own in every tick."""
+    """Moves one object back and forth, in the model's world and, for an obstacle, in the simulator's; a participant of every tick."""
 
     def __init__(self, service: Service, tick: float) -> None:
         """`tick`: s."""
@@ -78,9 +78,9 @@ class Mover:
         service.on_clock(self._tick)
 
     def start(self, name: str, ends: list[list[float]]) -> None:
-        """Move a thing between two places from now on, beginning at the first."""
+        """Move an object between two positions from now on, beginning at the first."""
         self._ends, self._begin = np.array(ends), self._k
-        if name == THING:
+        if name == MOVING_TARGET:
             self._service.call(
                 keys.world_rpc("add"), AddObject, Done, name=name, geometry=SPHERE, position=ends[0], quaternion=UPRIGHT, role="target"
             )
@@ -88,38 +88,38 @@ class Mover:
         self._put(self.at(self._k))
 
     def stop(self) -> None:
-        """Take it away."""
+        """Remove the target, or move the obstacle away."""
         name, self._name = self._name, ""
-        if name == THING:
+        if name == MOVING_TARGET:
             self._service.call(keys.world_rpc("remove"), OneName, Done, name=name)
         elif name:
             self._place(name, AWAY)
 
     def at(self, k: int) -> Array:
-        """Where it is at a tick, (3,) m."""
+        """Return the position of the object at a tick, (3,) m."""
         path = self._ends[1] - self._ends[0]
-        gone = SPEED * self._dt * ((k - self._begin) // EVERY * EVERY) / max(float(np.linalg.norm(path)), 1e-9)
+        gone = SPEED * self._dt * ((k - self._begin) // MOVE_PERIOD * MOVE_PERIOD) / max(float(np.linalg.norm(path)), 1e-9)
         found: Array = self._ends[0] + (1.0 - abs(1.0 - gone % 2.0)) * path
         return found
 
     def now(self) -> Array:
-        """Where it is."""
+        """Return the present position of the object."""
         return self.at(self._k)
 
     def leave(self) -> None:
-        """End its part in the lockstep."""
+        """Leave the lockstep."""
         self._name = ""
         self._step.done(self._k, last=True)
 
     def _tick(self, clock: Clock) -> None:
         self._k = clock.k
-        if self._name and (clock.k - self._begin) % EVERY == 0:
+        if self._name and (clock.k - self._begin) % MOVE_PERIOD == 0:
             self._put(self.at(clock.k))
         self._step.done(clock.k)
 
     def _put(self, position: Array) -> None:
-        if self._name == THING:
-            self._move(THING, position)
+        if self._name == MOVING_TARGET:
+            self._move(MOVING_TARGET, position)
         else:
             self._place(self._name, position)
 

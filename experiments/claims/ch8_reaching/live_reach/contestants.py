@@ -1,0 +1,216 @@
+"""A block of tries on the live robot, by the learner, which may go on learning, the planner, or the reach alone.
+
+The launched performer calls `perform` (experiments/kit/live/performer).  It reads {part}/motion, {part}/reach and commands, and calls
+{part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from experiments.claims.ch8_reaching.live_reach.hand import MOVING_TARGET, OBSTACLE, Hand, Mover
+from experiments.claims.ch8_reaching.live_reach.problems import (
+    AIM,
+    APART,
+    GOOD,
+    RATE,
+    REACHES,
+    TARGET_MOVES,
+    WRIST,
+    Problem,
+    belief,
+    grid_targets,
+    learner,
+)
+from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried
+from experiments.kit.live.launch import append_done, read_job
+from experiments.kit.reaching.arm import MARKER, PART
+from experiments.kit.reaching.learning import Course
+from experiments.kit.reaching.planner_peer import PlannerPeer
+from mobee import ActionInterrupted, Model, load_robot
+from mobee.arrays import Array
+from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.record import load_reaches
+from mobee.plant import Outcome
+from mobee.reach import ReachTarget
+from services.common.service import Service
+
+
+def perform(service: Service, folder: Path) -> None:
+    """Do the job that is in the folder, and append the record of each try to it."""
+    job, robot = read_job(folder, Job), load_robot(service.config.robot)
+    with ExitStack() as stack:
+        mover = None
+        if job.kind == "moving":
+            other = stack.enter_context(Service("mover", service.config, robot, inbox=service.inbox))
+            mover = Mover(other, 1.0 / RATE)
+            other.ready()
+        hand = Hand(service, robot)
+        attempt = contestant(hand, job, mover)
+        agent = learner(hand, job.seed, Path(job.store)) if job.kind == "refine" else None
+        service.ready()
+        hand.measure(PART)
+        if agent is not None:
+            agent.learn(grid_targets(), max(0, job.tries - agent.tries))
+        for problem in job.problems:
+            append_done(folder, _tried(hand, problem, attempt))
+        hand.leave()
+        if mover is not None:
+            mover.leave()
+
+
+def _tried(hand: Hand, problem: Problem, attempt: Callable[[Problem], Ended]) -> Tried:
+    """Make one try from the first posture, to which the arm moves from home; returns its record."""
+    start, off, why = np.array(problem.start), np.inf, ""
+    out = begin = hand.tick
+    try:
+        hand.present(None)
+        hand.act(PART, hand.robot.home[hand.robot.part(PART).slice])
+        off = float(np.abs(hand.act(PART, start).q - start)[:WRIST].max())
+        begin = hand.tick
+        made = attempt(problem)
+    except ActionInterrupted as error:
+        hand.measure(PART)
+        made, why = Ended([], 0, np.inf), str(error)
+    return Tried(
+        kind=problem.kind,
+        number=problem.number,
+        out=out,
+        begin=begin,
+        ends=made.ends,
+        over=hand.tick,
+        off=off,
+        actions=made.actions,
+        believed=made.believed,
+        thinking=made.thinking,
+        asked=hand.asked,
+        first=made.first,
+        why=why,
+        there=made.there,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The result of an attempt.
+
+    `ends`: ticks at which a reach ended, or the planner had finished.  `actions`: their number, with reaches.  `believed`: remaining error
+    at the end by the encoders, m.  `thinking`: processor time for plans, s.  `first`: ticks from the request of the last reach to the first
+    command that moves; -1: not timed.
+    """
+
+    ends: list[int]
+    actions: int
+    believed: float
+    thinking: float = 0.0
+    first: int = -1
+    there: list[float] | None = None
+    """Position of a moving target at the last of the ends, m."""
+
+
+def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem], Ended]:
+    """Return the contestant of a job as a function of a problem, with everything loaded that it needs."""
+    if job.kind == "peer":
+        return partial(planned, hand, job.seed)
+    if job.kind in ("learner", "moving"):
+        agent = load_reaches(job.store, hand, PART)
+        for problem in job.problems:
+            agent.predictor.mean(problem.target.position)  # before the try, because the first prediction for a target is slow
+        return partial(learned, hand, agent, job.seed, mover)
+    if job.kind == "first motion":
+        hand.watch_commands()
+    return partial(at_once, hand)
+
+
+def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, problem: Problem) -> Ended:
+    """Go to the state with the highest expected reward, and reach; after a miss, repeat from another state."""
+    where = _present(hand, mover, problem)
+    course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), APART)
+    ends: list[int] = []
+    missing = np.inf
+    while len(ends) < REACHES and missing > GOOD:
+        course.go()
+        missing = hand.reach(PART, MARKER).missing
+        ends.append(hand.end)
+        course.missed()
+    there = None
+    if mover is not None:
+        there = mover.at(ends[-1]).tolist() if problem.kind == TARGET_MOVES else None
+        mover.stop()
+    return Ended(ends, course.actions + len(ends), missing, course.thinking, there=there)
+
+
+def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], Array]:
+    """Present the target, and start the moving object; returns a function that returns the target's present position, (3,) m."""
+    target = problem.target
+    if mover is not None and problem.path is not None:
+        mover.start(MOVING_TARGET if problem.kind == TARGET_MOVES else OBSTACLE, problem.path)
+        if problem.kind == TARGET_MOVES:
+            hand.present_object(MOVING_TARGET, AIM)
+            return mover.now
+    hand.present(target)
+    return lambda: target.position
+
+
+def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
+    """Plan by inverse kinematics and RRT-Connect, and replan after every unexpected outcome."""
+    plant = PeerPlant(hand, 1.0 / RATE)
+    peer = PlannerPeer(plant, belief(), PART, "none", seed + problem.number)
+    made = peer.try_problem(problem.target)
+    return Ended(plant.ends, made.actions, made.missing, made.planning)
+
+
+def at_once(hand: Hand, problem: Problem) -> Ended:
+    """Reach from the present posture."""
+    hand.present(problem.target)
+    missing = hand.reach(PART, MARKER).missing
+    return Ended([hand.end], 1, missing, first=hand.first)
+
+
+class PeerPlant:
+    """The live arm as a plant of the planner peer; the target exerts no force during motions, because the planner avoids it."""
+
+    def __init__(self, hand: Hand, tick: float) -> None:
+        """`tick`: s."""
+        self.robot, self.ends = hand.robot, list[int]()
+        """Ticks at which the peer had finished."""
+        self._hand, self._model, self._dt = hand, Model(hand.robot), tick
+        self._target: ReachTarget | None = None
+
+    @property
+    def time(self) -> float:
+        """Robot time, s."""
+        return self._hand.tick * self._dt
+
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._hand.q
+
+    def measure(self, part: str) -> Array:
+        """See Plant."""
+        return self._hand.measure(part)
+
+    def go(self, part: str, target: Array, marker: str) -> Outcome:
+        """See JudgedPlant."""
+        self._hand.present(None)
+        return self._hand.act(part, target)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """See ReachPlant."""
+        self._target = target
+        self._hand.present(target)
+
+    def missing(self, marker: str) -> float:
+        """Return the present distance of the marker from the target by the encoders, m."""
+        self.ends.append(self._hand.tick)
+        whole = self.robot.home.copy()
+        whole[self.robot.part(PART).slice] = self.measure(PART)
+        target = self._target
+        return np.inf if target is None else target.missing(self._model.evaluate(whole).position(marker))
