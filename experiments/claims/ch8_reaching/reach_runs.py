@@ -12,7 +12,7 @@ from experiments.kit.cells import CellResult
 from experiments.kit.reaching.arm import MARKER, reach_space
 from experiments.kit.reaching.targets import grid
 from mobee.arrays import Array, Ints
-from mobee.learning.reaching.evaluation import NOWHERE
+from mobee.learning.reaching.evaluation import NO_STATE
 from mobee.learning.reaching.reaches import hands_of
 
 STRATEGIES = ("intrinsic", "greedy", "random")
@@ -104,7 +104,7 @@ def runs_of(found: Mapping[str, CellResult]) -> dict[str, Runs]:
 
 
 def _shares(states: Ints) -> Array:
-    counts = np.bincount(states[states != NOWHERE], minlength=len(reach_space())).astype(np.float64)
+    counts = np.bincount(states[states != NO_STATE], minlength=len(reach_space())).astype(np.float64)
     shares: Array = counts / max(counts.sum(), 1.0)
     return shares
 
@@ -112,6 +112,6 @@ def _shares(states: Ints) -> Array:
 def _tried(one: Mapping[str, Any], part: slice) -> Ints:
     tried = np.zeros((len(grid()), len(reach_space())), dtype=np.intp)
     state, problem = one["reach_state"][part], one["problem"][part]
-    reached = state != NOWHERE
+    reached = state != NO_STATE
     np.add.at(tried, (problem[reached], state[reached]), 1)
     return tried

@@ -11,7 +11,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.evaluation import NOWHERE, Evaluation, move
+from mobee.learning.reaching.evaluation import NO_STATE, Evaluation, move
 from mobee.learning.reaching.failures import has_failed
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Try
@@ -99,7 +99,7 @@ def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
         for state, action, _, failed in one.path:
             failures[state, action] += failed
     return {
-        "reach_state": np.array([NOWHERE if one.reach_state is None else one.reach_state for one in tries], dtype=np.int16),
+        "reach_state": np.array([NO_STATE if one.reach_state is None else one.reach_state for one in tries], dtype=np.int16),
         "reward": np.array([one.reward for one in tries], dtype=np.float32),
         "actions": np.array([len(one.path) + (one.reach_state is not None) for one in tries], dtype=np.int16),
         "duration": np.array([one.duration for one in tries], dtype=np.float32),

@@ -20,27 +20,26 @@ if TYPE_CHECKING:
 
 
 def move(plant: Plant, space: Space, state: int, action: int) -> tuple[Outcome, int]:
-    """Make a transition: how it ended, and in which state."""
+    """Make a transition; returns its outcome and state."""
     outcome = plant.act(space.part, space.target(space.goal(state, action)))
     return outcome, space.state_of(outcome.q)
 
 
 def reach(plant: ReachPlant, space: Space, marker: str) -> tuple[ReachOutcome, int]:
-    """Reach for what is presented: how it ended, and the state in which the part came to rest afterwards."""
+    """Reach for the presented target; returns the outcome, and the state in which the part came to rest afterwards."""
     outcome = plant.reach(space.part, marker)
     return outcome, space.state_of(outcome.after.q)
 
 
-NOWHERE = -1  # instead of a state
+NO_STATE = -1  # instead of a state, where no reach was made
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """What came of the problems, R repetitions of P.
+    """Results of P problems in R repetitions.
 
-    `rewards`: (R, P), 0 where no reach came about.  `states`: (R, P) from which it reached, -1 where it did not.  `missing`: (R, P) m,
-    NaN where it did not.  `failures`: (R, P) failed transitions.  `actions`: (R, P), the reach included.
-    `duration`: (R, P) s of plant time.
+    `rewards`: (R, P), 0 if no reach was made.  `states`: (R, P) from which the reach was made, -1 if none.  `missing`: (R, P) m, remaining
+    error, NaN if none.  `failures`: (R, P) failed transitions.  `actions`: (R, P), the reach included.  `duration`: (R, P) s of plant time.
     """
 
     rewards: Array
@@ -52,20 +51,20 @@ class Evaluation:
 
     @property
     def scores(self) -> Array:
-        """The cumulative reward over the problems, shape (R,): what thesis figure 8.2 shows."""
+        """Sum of the rewards over the problems, shape (R,), as in thesis figure 8.2."""
         total: Array = self.rewards.sum(axis=1)
         return total
 
 
 def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: int) -> Evaluation:
-    """Reach for every problem in random order, from a random state at first; as often as asked for.
+    """Reach for every problem in random order, starting from a random state, in each repetition.
 
-    The agent expects as it does then, and does not learn from its reaches; failed transitions it remembers until the end of a repetition.
+    The agent does not learn from these reaches; failed transitions are remembered until the end of a repetition.
     """
     shape = repetitions, len(problems)
     found = Evaluation(
         np.zeros(shape),
-        np.full(shape, NOWHERE),
+        np.full(shape, NO_STATE),
         np.full(shape, np.nan),
         np.zeros(shape, np.intp),
         np.zeros(shape, np.intp),
@@ -81,14 +80,14 @@ def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: in
 
 
 class _Trial:
-    """One repetition: where the part is, and which transitions failed in it."""
+    """One repetition, with the state of the part and the transitions that failed in it."""
 
     def __init__(self, agent: ReachAgent, rng: np.random.Generator) -> None:
         self.agent, self.rng, self.failures = agent, rng, agent.failures.copy()
         self.state = agent.space.state_of(agent.plant.measure(agent.part))
 
     def go_to(self, goal: int) -> None:
-        """Go to a state with nothing presented, or as far as the limit of actions allows."""
+        """Go to a state without a presented target, or as far as the limit of actions allows."""
         agent = self.agent
         agent.plant.present(None)
         arrived = np.full(len(agent.space), -np.inf)
@@ -101,7 +100,7 @@ class _Trial:
             _, self.state = move(agent.plant, agent.space, self.state, action)
 
     def reach_for(self, target: ReachTarget, found: Evaluation, at: tuple[int, int]) -> None:
-        """One problem-try by what is expected now."""
+        """Make one problem-try with the expected rewards of now."""
         agent, position = self.agent, target.position
         agent.plant.present(target)
         expected = np.maximum(agent.predictor.mean(position), 0.0)

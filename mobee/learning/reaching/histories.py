@@ -14,27 +14,27 @@ from mobee.errors import InvalidValue
 from mobee.learning.transitions import Scalar
 
 
-def room_for(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
-    """The array, or a copy twice as long where it has no such index."""
+def grown(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
+    """Return the array, or a copy twice as long if it has no such index."""
     return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
 
 
 def forget(found: dict[bytes, Any], most: int) -> None:
-    """Delete the entries that were put in first, so that there are fewer than `most`; who puts back what is used keeps the newest."""
+    """Delete the oldest entries until there are fewer than `most`; a caller that inserts a used entry again keeps the newest."""
     while len(found) >= most:
         del found[next(iter(found))]
 
 
 class Histories:
-    """Histories of so many actions: targets and values.
+    """The values of each action with their targets.
 
-    Repeats on one target are kept as their sum and number, so that there is one entry for an action and a target, and a
-    weighted sum over all of them is one pass of microseconds.
+    Repeats on one target are stored as their sum and number: one entry for an action and a target, so that a weighted sum over all
+    entries takes microseconds.
 
     Args:
-        actions: how many.
-        scale: m, the unit of the distances.
-        near: m, how far from a target others count at all.
+        actions: their number.
+        scale: m, unit of the distances.
+        near: m, distance from a target beyond which other targets are ignored.
     """
 
     def __init__(self, actions: int, scale: float, near: float = np.inf) -> None:
@@ -53,12 +53,12 @@ class Histories:
         entry = self._entries.get(key)
         if entry is None:
             entry = self._entries[key] = len(self._entries)
-            self._keys, self._sums = room_for(self._keys, entry), room_for(self._sums, entry)
+            self._keys, self._sums = grown(self._keys, entry), grown(self._sums, entry)
             self._keys[entry] = key
         self._sums[entry] += value, 1.0
 
     def average(self, target: Array, prior: float) -> Array:
-        """The average of each action's history with one value of `prior` at no distance, shape (actions,).
+        """Return the weighted average of each action's history and one value `prior` at distance 0, shape (actions,).
 
         Weights are 1 / (1 + |x - x_i|).  A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
         """
@@ -71,7 +71,7 @@ class Histories:
         return found
 
     def copy(self) -> Histories:
-        """One that goes its own way from here."""
+        """Return an independent copy."""
         other = Histories(self._actions, self._scale, self._near)
         other._targets, other._known = self._targets.copy(), self._known.copy()
         other._entries, other._keys, other._sums = self._entries.copy(), self._keys.copy(), self._sums.copy()
@@ -82,14 +82,14 @@ class Histories:
         index = self._known.get(key)
         if index is None:
             index = self._known[key] = len(self._known)
-            self._targets = room_for(self._targets, index)
+            self._targets = grown(self._targets, index)
             self._targets[index] = target
         return index
 
 
 @cache
 def _core() -> ModuleType:
-    """Loaded when it is first needed."""
+    """Import the native functions when they are first needed."""
     from mobee._core import learning
 
     return learning

@@ -22,22 +22,22 @@ from mobee.store import TransitionStore
 def load_reaches(
     file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None, jacobians: Array | None = None
 ) -> ReachAgent:
-    """Rebuild what was learned of reaching from a run's file, to be used: it is greedy, and writes nothing.
+    """Rebuild a reach agent from a run's file for use: its strategy is greedy, and it stores nothing.
 
-    Where transitions lead it believes as the transitions of the part in the same file say, if there are any.
+    Its beliefs come from the transitions of the part in the same file, if there are any.
 
     Args:
         file: of the run.
-        plant: through which to reach.
-        part: whose reaches; needed where the file holds those of several.
-        hands: as of the ReachAgent.
-        jacobians: as of the ReachAgent.
+        plant: the robot it acts on.
+        part: of the agent; may be None if the file holds the reaches of one part.
+        hands: see ReachAgent.
+        jacobians: see ReachAgent.
 
     Raises:
-        MobeeError, UnknownName: no such file or part, nobody has learned to reach in it, or by a predictor of one's own.
+        MobeeError, UnknownName: no such file or part, no reaches in it, or a predictor that is not in `PREDICTORS`.
     """
     if not Path(file).is_file():
-        raise MobeeError(f"{file}: there is no such file; runs of `mobee launch` keep what they learn so.")
+        raise MobeeError(f"{file}: there is no such file; runs of `mobee launch` write such files.")
     with ReachStore(file, _part_of(file, part), read_only=True) as store:
         bound, learners, targets, steps = store.settings(), store.learners(), store.problems(), store.load()
     learner = learners[-1][1]

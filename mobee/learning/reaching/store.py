@@ -28,7 +28,7 @@ CREATE TABLE IF NOT EXISTS reach_steps (
     s_next INTEGER NOT NULL, failed INTEGER NOT NULL, reward REAL NOT NULL, expected REAL NOT NULL, missing REAL NOT NULL,
     settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
 """
-_SUFFIX = " reaching"  # of the name under which they are kept
+_SUFFIX = " reaching"  # of the agent's name in the file
 COLUMNS = tuple(column.name for column in fields(Step))
 
 
@@ -37,7 +37,7 @@ class ReachStore(AgentFile):
 
     Args:
         path, read_only: of the AgentFile.
-        part: whose reaches they are; they are kept under its name and "reaching", beside the part's transitions.
+        part: of the learner; its reaches are stored under its name and "reaching", beside the part's transitions.
     """
 
     def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
@@ -58,7 +58,7 @@ class ReachStore(AgentFile):
             )
 
     def learner(self, settings: dict[str, Any]) -> None:
-        """Record who learns from here on (plain JSON values), if it is another than before."""
+        """Record the learner's settings (plain JSON values) for the following steps, if they differ from the last ones."""
         given = json.dumps(settings, sort_keys=True)
         with explained(self.path), transaction(self._db):
             newest = self._db.execute(
@@ -68,13 +68,13 @@ class ReachStore(AgentFile):
                 self._db.execute("INSERT OR REPLACE INTO reach_learners VALUES (?, ?, ?)", (self.agent, self._last, given))
 
     def learners(self) -> list[tuple[int, dict[str, Any]]]:
-        """Who learned, each with the number of steps that were on record before."""
+        """Return the settings of all learners, each with the number of steps recorded before."""
         with explained(self.path):
             rows = self._db.execute("SELECT n, settings FROM reach_learners WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [(n, json.loads(settings)) for n, settings in rows]
 
     def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
-        """Commit one step, and the targets of problems that are new; all is on disk when this returns."""
+        """Commit one step and the targets of new problems; all is on disk when this returns."""
         if step.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} steps: append number {self._last + 1}, not {step.n}.")
         values = (self.agent, *_row(step), time.time())
@@ -85,19 +85,19 @@ class ReachStore(AgentFile):
         self._last, self._problems = step.n, self._problems + len(new)
 
     def times(self) -> list[float]:
-        """When each step was committed: s since 1970, in order."""
+        """Return the times at which the steps were committed: s since 1970, in order."""
         with explained(self.path):
             rows = self._db.execute("SELECT t FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [t for (t,) in rows]
 
     def problems(self) -> list[ReachTarget]:
-        """The target of each problem, in order."""
+        """Return the target of each problem, in order."""
         with explained(self.path):
             rows = self._db.execute("SELECT target FROM reach_problems WHERE agent = ? ORDER BY problem", (self.agent,)).fetchall()
         return [_read(target) for (target,) in rows]
 
     def load(self) -> list[Step]:
-        """All steps, in order."""
+        """Return all steps, in order; raises MobeeError if one is absent."""
         with explained(self.path):
             rows = self._db.execute(f"SELECT {', '.join(COLUMNS)} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         for expected, row in enumerate(rows, start=1):
@@ -107,7 +107,7 @@ class ReachStore(AgentFile):
 
 
 def reaching_parts(file: str | Path) -> tuple[str, ...]:
-    """The parts that have reached for something in a run's file."""
+    """Return the parts with reaches in a run's file."""
     path = Path(file)
     with explained(path), closing(opened(path, read_only=True)) as database:
         if not _has_reaches(database):

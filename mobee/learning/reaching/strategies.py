@@ -1,4 +1,4 @@
-"""Strategies value a reach from each state: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
+"""Strategies compute the reward of a reach from each state: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mobee.learning.reaching.histories import Histories
 from mobee.learning.reaching.predictors.predictor import RewardPredictor
 from mobee.learning.reaching.reaches import Reaches
 
-WINDOW = 8  # reaches of a state that are compared, the newer half with the older
-AT_RANDOM = 0.2  # share of problem-tries that reach from a random state
+WINDOW = 8  # last reaches of a state, of which the newer half is compared with the older
+RANDOM_SHARE = 0.2  # of the problem-tries, which reach from a random state
 
 
 class Progress:
@@ -25,7 +25,7 @@ class Progress:
         self._interest: Array = np.ones(len(reaches))
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append a reward to the state's last ones."""
+        """Append a reward to the last ones of the state."""
         lately = self._lately[state]
         lately.append(reward)
         if len(lately) > 1:
@@ -33,34 +33,34 @@ class Progress:
             self._interest[state] = abs(rewards[-half:].mean() - rewards[:half].mean())
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """The changes, shape (S,); in one problem-try of five 1 for one state and 0 for all others."""
-        if rng.random() >= AT_RANDOM:
+        """Return the changes, shape (S,); in one of five problem-tries, 1 for a random state and 0 for all others."""
+        if rng.random() >= RANDOM_SHARE:
             return self._interest.copy()
         worth = np.zeros(len(self._interest))
         worth[rng.integers(len(worth))] = 1.0
         return worth
 
 
-OPTIMISM = 2.0  # standard deviations that `ucb` hopes for
+OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
 class Strategy(Protocol):
-    """What a learner pursues: its plan treats these as the rewards of the reach actions.
+    """Computes the rewards of the reach actions that a learner plans with.
 
-    It follows from the reaches learned from and the generator alone; asking changes nothing.
+    They must follow from the reaches added and the generator alone; `rewards` changes nothing.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went, as the predictor does."""
+        """Learn from a reach, as the predictor does."""
         ...
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """What reaching from each state is worth, shape (S,); the generator is the same throughout a problem-try."""
+        """Return the reward of reaching from each state, shape (S,); the generator is the same throughout a problem-try."""
         ...
 
 
 class Random:
-    """One state drawn a problem-try is worth 1, all others nothing (thesis 8.3.2)."""
+    """Reward 1 for one state drawn for the problem-try, 0 for all others (thesis 8.3.2)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._states = len(reaches)
@@ -69,7 +69,7 @@ class Random:
         """Learn nothing."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """1 for one state, shape (S,)."""
+        """Return 1 for one state and 0 for the others, shape (S,)."""
         worth = np.zeros(self._states)
         worth[rng.integers(self._states)] = 1.0
         return worth
@@ -85,7 +85,7 @@ class Greedy:
         """Learn nothing: the predictor does."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """The expected rewards, shape (S,)."""
+        """Return the expected rewards, shape (S,)."""
         return self._predictor.mean(target)
 
 
@@ -96,27 +96,27 @@ class Intrinsic:
         self._errors = Histories(len(reaches), reaches.scale)
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append the error, expected less actual reward, to the history of the state."""
+        """Append the error, expected minus actual reward, to the history of the state."""
         self._errors.add(state, target, expected - reward)
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """The expected errors, shape (S,): 1 where nothing was tried."""
+        """Return the expected errors, shape (S,): 1 for a state that was never tried."""
         return self._errors.average(target, 1.0)
 
 
 class UpperBound(Greedy):
-    """The expected reward and two standard deviations more; needs a predictor that has them."""
+    """The expected reward plus two standard deviations; needs a predictor that has a deviation."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """The upper confidence bounds, shape (S,)."""
+        """Return the upper confidence bounds, shape (S,)."""
         return self._predictor.mean(target) + OPTIMISM * self._predictor.deviation(target)
 
 
 class Thompson(Greedy):
-    """One draw of the reward function a problem-try; needs a predictor that has one."""
+    """One draw of the reward function for the problem-try; needs a predictor that can be sampled."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """The drawn rewards, shape (S,)."""
+        """Return the drawn rewards, shape (S,)."""
         return self._predictor.sample(target, rng)
 
 

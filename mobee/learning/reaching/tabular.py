@@ -1,4 +1,4 @@
-"""A tabular plant with reaches, for tests and for worlds whose truth is known."""
+"""A tabular plant with reaches, for tests and for worlds with known ground truth."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ World = Callable[[Array], tuple[Array, Array]]
 
 
 class ReachTable(TabularPlant):
-    """A TabularPlant on which a part can reach and the presented target is in the way of transitions.
+    """A TabularPlant on which a part can reach, and the presented target may block transitions.
 
-    What action number n draws follows from the seed and n alone, as there.
+    The draw of action number n depends on the seed and n alone.
 
     Args:
         space, outcomes, probabilities, seed, start: of the TabularPlant.
-        world: of a target (3,) m: how far from it a reach from each state ends on average, (S,) m, and the probability that it
-            blocks each transition, (S, A), which then ends where it began.  Asked once a place.
-        noise: m, standard deviation of where a reach ends.
+        world: function of a target (3,) m that returns the mean remaining error of a reach from each state, (S,) m, and the probability
+            that the target blocks each transition, (S, A), which then ends in its start.  Called once for each position.
+        noise: m, standard deviation of the remaining error.
     """
 
     def __init__(
@@ -49,11 +49,11 @@ class ReachTable(TabularPlant):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A digest of the table of transitions and the noise, as plain JSON values; the world's function cannot tell what it is."""
+        """A digest of the table of transitions and the noise, as plain JSON values; the function `world` is not recorded."""
         return super().settings | {"noise": self._noise}
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world; None takes it away."""
+        """Put the target into the world; None removes it."""
         if target is None:
             self._presented = None
             return
@@ -63,7 +63,7 @@ class ReachTable(TabularPlant):
         self._presented = self._seen[key]
 
     def act(self, part: str, target: Array) -> Outcome:
-        """As of the TabularPlant, if the presented target does not block it; each takes 1 s."""
+        """Act as the TabularPlant does, unless the presented target blocks the transition; each takes 1 s."""
         if self._presented is not None:
             action = self._action[self.state].get(self.space.state_of(target))
             if action is not None and self._chance() < self._presented[1].item(self.state, action):
@@ -72,7 +72,7 @@ class ReachTable(TabularPlant):
         return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """End at the distance of the table, then where it began; takes 2 s.  There is no body: the marker and its place are made up."""
+        """Reach with the remaining error of the table and return to the start; takes 2 s.  The marker's position is always 0."""
         if self._presented is None:
             raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")
         q = self.measure(part)

@@ -13,20 +13,20 @@ from mobee.reach import ReachTarget
 
 
 class Problems:
-    """Targets by number, in the order in which they were first met, and how often each was tried."""
+    """Targets by number, in the order of their first problem-tries, and how often each was tried."""
 
     def __init__(self) -> None:
         self.targets: list[ReachTarget] = []
-        """The target of each problem, as it was first met."""
+        """The first target given for each problem."""
         self.tries: list[int] = []
-        """How many problem-tries of each have ended."""
+        """Number of ended problem-tries of each problem."""
         self._known: dict[bytes, int] = {}
 
     def __len__(self) -> int:
         return len(self.targets)
 
     def index(self, target: ReachTarget) -> int:
-        """The number of the problem at the target's place; a new place is a new problem."""
+        """Return the number of the problem at the target's position; a new position is a new problem."""
         number = self._known.setdefault(place(target), len(self.targets))
         if number == len(self.targets):
             self.targets.append(target)
@@ -34,7 +34,7 @@ class Problems:
         return number
 
     def least_tried(self, targets: Sequence[ReachTarget], rng: np.random.Generator) -> ReachTarget:
-        """The target tried least often, drawn among equals (thesis 8.3.2); raises InvalidValue if there is none."""
+        """Return the target tried least often, drawn among equals (thesis 8.3.2); raises InvalidValue if there is none."""
         if not targets:
             raise InvalidValue("there are no problems to choose from: give at least one target.")
         tries = [self.tries[n] if (n := self._known.get(place(target))) is not None else 0 for target in targets]
@@ -44,8 +44,8 @@ class Problems:
 
 
 def place(target: ReachTarget) -> bytes:
-    """What tells one problem from another: where it is."""
-    return (target.position + 0.0).tobytes()  # -0 and 0 are one place
+    """Return the key of a problem: its position."""
+    return (target.position + 0.0).tobytes()  # -0 and 0 are one position
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Step:
 
     `n`: 1, 2, ... of this learner.  `number`: 1, 2, ... of the problem-try, `problem`: 0, 1, ... of its target.
     `a`: a transition's action, or REACH.  `failed`: the value did not rise.  `reward`: of a transition 0 or the penalty; of a
-    reach that of thesis eq. 8.4, then `expected` is what was predicted just before, and `missing` m what eq. 8.4 was taken of.
+    reach that of thesis eq. 8.4; `expected` is then the reward predicted just before, and `missing` the remaining error, m.
     `q`: rad, all motors of the part, of a reach at the end of its force.  `touched`: world objects.  `duration`: s of plant time.
     """
 
@@ -78,9 +78,9 @@ class Step:
 class Try:
     """A problem-try that has ended.
 
-    `path`: its transitions, as (s, a, s', failed).  `reach_state`: from which it reached; None: it did not come to that in time, and
-    the four that follow are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected less actual reward (thesis eq. 8.6).
-    `missing`: m, from where the marker was to be.  `timeouts`: actions that did not settle.  `duration`: s of plant time.
+    `path`: its transitions, as (s, a, s', failed).  `reach_state`: from which it reached; None: no reach within the limit, and the next
+    four are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected minus actual reward (thesis eq. 8.6).
+    `missing`: m, remaining error.  `timeouts`: actions that did not settle.  `duration`: s of plant time.
     """
 
     number: int
@@ -96,12 +96,12 @@ class Try:
 
     @property
     def failures(self) -> int:
-        """How many of its transitions failed."""
+        """Number of its transitions that failed."""
         return sum(failed for _, _, _, failed in self.path)
 
 
 def made_of(steps: Sequence[Step]) -> Try:
-    """The problem-try that consists of these steps, at least one."""
+    """Return the problem-try of these steps, at least one."""
     moves, last = [step for step in steps if step.a != REACH], steps[-1]
     reached = last.a == REACH
     return Try(

@@ -210,7 +210,7 @@ def reaching(world: World | None = None) -> OfflinePlant:
 def test_what_cannot_go_together_is_refused_before_anything_moves(together: Any) -> None:
     good, world = katanas(2), World()
     for given, message in (
-        ([*good, good[0]], r"plants\[2\] is plants\[0\] once more"),
+        ([*good, good[0]], r"plants\[2\] is plants\[0\] again"),
         ([*good, "katana"], r"plants\[2\] is 'katana'; it must be an OfflinePlant"),
         ([*good, *katanas(2, world)[:1], calling(katanas(1, world)[0])], r"plants\[3\].*give each a Model of its own"),
         ([*good, *katanas(2, world)[:1], reaching(world)], r"plants\[3\].*give each a Model of its own"),

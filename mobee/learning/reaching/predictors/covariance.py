@@ -1,7 +1,7 @@
 """The covariance of the Gaussian process over reaches, and the parameters of highest evidence.
 
-Reaches are alike from similar poses for near targets ("place"), from similar poses over a similar way from the hand to the target
-("approach"), with a similar distance left whatever the pose ("distance"), and a little in any case.
+Rewards are correlated for reaches from similar poses for near targets ("place"), from similar poses with similar vectors from hand to
+target ("approach"), with similar remaining errors in any pose ("distance"), and slightly for all reaches ("offset").
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
 from mobee.learning.reaching.reaches import Reaches
 
-OFFSET = 0.3**2  # variance of what all rewards have in common
-USUAL = {  # variances of rewards, which are in [0, 1], and lengths in m
+OFFSET = 0.3**2  # variance of the common part of all rewards
+DEFAULTS = {  # variances of rewards, which are in [0, 1], and lengths in m
     "noise": 0.05**2,
     "place": 0.2**2,
     "place length": 0.15,
@@ -27,7 +27,7 @@ USUAL = {  # variances of rewards, which are in [0, 1], and lengths in m
     "distance": 0.2**2,
     "distance length": 0.10,
 }
-USUAL_JOINT = 0.5  # length of each joint, in units of the spread of the samples
+DEFAULT_JOINT = 0.5  # length scale of each joint, in units of the spread of the samples
 Slopes = Callable[[Array], Array]
 _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTANCE_L, _JOINTS = range(9)
 
@@ -36,29 +36,29 @@ _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTA
 class Points:
     """Reaches: from `state` (n,) for `target` (n, 3) m.
 
-    `way`: (n, 3) m, from the hand to the target.  `left`: (n,) m, how much of it a linear arm would leave.
+    `vector`: (n, 3) m, from the hand to the target.  `remaining`: (n,) m, error that a linear arm would leave.
     """
 
     state: Ints
     target: Array
-    way: Array
-    left: Array
+    vector: Array
+    remaining: Array
 
 
 def points(arm: LinearArm, state: Ints, target: Array) -> Points:
-    """Reaches from states (n,) for targets (n, 3) m, or for one (3,) m."""
-    where = np.broadcast_to(target, (len(state), 3))
-    way = where - arm.reaches.hands[state]
-    return Points(state, where, way, arm.left(state, way))
+    """Return the reaches from states (n,) for targets (n, 3) m, or for one (3,) m."""
+    targets = np.broadcast_to(target, (len(state), 3))
+    vector = targets - arm.reaches.hands[state]
+    return Points(state, targets, vector, arm.remaining(state, vector))
 
 
-def usual(reaches: Reaches) -> Array:
-    """The logarithms of the parameters before anything is known, shape (8 + d,): those of `USUAL` and one length a joint."""
-    return np.log([*USUAL.values(), *[USUAL_JOINT] * reaches.samples.shape[1]])
+def default_parameters(reaches: Reaches) -> Array:
+    """Return the logarithms of the parameters before the first fit, shape (8 + d,): `DEFAULTS` and one length for each joint."""
+    return np.log([*DEFAULTS.values(), *[DEFAULT_JOINT] * reaches.samples.shape[1]])
 
 
 def joint_squares(reaches: Reaches) -> Array:
-    """Squared differences of the samples, in units of their spread, shape (d, S, S)."""
+    """Return squared differences of the samples, in units of their spread, shape (d, S, S)."""
     scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
     squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
     return squares
@@ -69,7 +69,7 @@ class Covariance:
 
     Args:
         squares: of the differences of the samples, see `joint_squares`.
-        logs: logarithms of the parameters, see `usual`.
+        logs: logarithms of the parameters, see `default_parameters`.
     """
 
     def __init__(self, squares: Array, logs: Array) -> None:
@@ -88,30 +88,30 @@ class Covariance:
 
     @property
     def prior(self) -> float:
-        """Variance of a mean reward of which nothing is known."""
+        """Variance of a mean reward before any reach."""
         return float(OFFSET + self._value[[_PLACE, _APPROACH, _DISTANCE]].sum())
 
     def between(self, a: Points, b: Points) -> Array:
-        """Covariances of the mean rewards of reaches, shape (a, b)."""
+        """Return the covariances of the mean rewards of reaches, shape (a, b)."""
         pair = np.ix_(a.state, b.state)
         place = self._by_place[pair] * np.exp(_squared(a.target, b.target) * (-0.5 / self._value[_PLACE_L] ** 2))
-        approach = self._by_approach[pair] * np.exp(_squared(a.way, b.way) * (-0.5 / self._value[_APPROACH_L] ** 2))
-        distance = np.exp((a.left[:, None] - b.left) ** 2 * (-0.5 / self._value[_DISTANCE_L] ** 2))
+        approach = self._by_approach[pair] * np.exp(_squared(a.vector, b.vector) * (-0.5 / self._value[_APPROACH_L] ** 2))
+        distance = np.exp((a.remaining[:, None] - b.remaining) ** 2 * (-0.5 / self._value[_DISTANCE_L] ** 2))
         total: Array = place + approach + self._value[_DISTANCE] * distance + OFFSET
         return total
 
     def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
-        """Covariance of average rewards of `count` (n,) tries each, shape (n, n), and what gives its derivatives."""
+        """Return the covariance of average rewards of `count` (n,) tries each, shape (n, n), and a function of its derivatives."""
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
-        approach_far = _squared(a.way, a.way) / value[_APPROACH_L] ** 2
-        distance_far = (a.left[:, None] - a.left) ** 2 / value[_DISTANCE_L] ** 2
+        approach_far = _squared(a.vector, a.vector) / value[_APPROACH_L] ** 2
+        distance_far = (a.remaining[:, None] - a.remaining) ** 2 / value[_DISTANCE_L] ** 2
         place, approach = self._by_place[pair] * np.exp(-0.5 * place_far), self._by_approach[pair] * np.exp(-0.5 * approach_far)
         distance = value[_DISTANCE] * np.exp(-0.5 * distance_far)
         joints = [squares[pair] / length**2 for squares, length in zip(self._squares, value[_JOINTS:], strict=True)]
 
         def slopes(weights: Array) -> Array:
-            """Derivatives of the sum of weights (n, n) times the covariance by the logarithms of the parameters."""
+            """Return the derivatives of the sum of weights (n, n) times the covariance by the logarithms of the parameters."""
             by_place, by_approach, by_distance = weights * place, weights * approach, weights * distance
             narrower = by_approach / value[_APPROACH_J] ** 2
             by_joint = [float((by_place * far).sum()) for far in joints]
@@ -134,7 +134,7 @@ class Covariance:
 
 
 def _squared(a: Array, b: Array) -> Array:
-    """Squared distances between rows, shape (a, b); exactly 0 for the same row."""
+    """Return squared distances between rows, shape (a, b); exactly 0 for the same row."""
     gap: Array = a[:, 0, None] - b[:, 0]
     total = gap * gap
     for axis in range(1, a.shape[1]):
@@ -143,20 +143,19 @@ def _squared(a: Array, b: Array) -> Array:
     return total
 
 
-MOST = 500  # pairs that are looked at: time grows with their cube
-DOUBT = 1.0  # standard deviation of the logarithm of a parameter around its usual value
-STEPS = 40  # of the search at most
+MAX_FITTED = 500  # pairs used in the fit: time grows with their cube
+PRIOR_DEVIATION = 1.0  # of the logarithm of a parameter around its default
+MAX_STEPS = 40  # of the search
 
 
-def surprise(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> tuple[float, Array]:
-    """Minus the logarithm of the evidence and of how usual the parameters are, but for a constant, and its derivatives (P,).
+def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> tuple[float, Array]:
+    """Return the negative logarithm of evidence times prior of the parameters, up to a constant, and its derivatives (P,).
 
-    `expected`: (n,), what the pairs were to bring before anything was seen.  Their rewards enter by their average and their scatter,
-    which is the same as each of them.
+    `expected`: (n,), prior rewards of the pairs.  The rewards enter by their average and their scatter, which is equivalent to using each.
     """
     from scipy.linalg import cho_factor, cho_solve
 
-    chosen = np.unique(np.linspace(0, len(reached) - 1, min(len(reached), MOST)).round().astype(np.intp))
+    chosen = np.unique(np.linspace(0, len(reached) - 1, min(len(reached), MAX_FITTED)).round().astype(np.intp))
     seen = points(arm, reached.state[chosen], reached.places[reached.target[chosen]])
     covariance = Covariance(squares, logs)
     matrix, slopes = covariance.with_slopes(seen, reached.count[chosen])
@@ -165,21 +164,27 @@ def surprise(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expe
     weight = cho_solve(factor, residual, check_finite=False)
     inverse = cho_solve(factor, np.eye(len(chosen)), check_finite=False)
     repeats, scatter, noise = reached.tries - len(reached), reached.scatter, covariance.noise
-    unusual = (logs - usual(arm.reaches)) / DOUBT
+    deviation = (logs - default_parameters(arm.reaches)) / PRIOR_DEVIATION
     value = 0.5 * residual @ weight + np.log(factor[0].diagonal()).sum()
-    value += 0.5 * (repeats * np.log(noise) + scatter / noise) + 0.5 * unusual @ unusual
-    slope = 0.5 * slopes(inverse - weight[:, None] * weight) + unusual / DOUBT
+    value += 0.5 * (repeats * np.log(noise) + scatter / noise) + 0.5 * deviation @ deviation
+    slope = 0.5 * slopes(inverse - weight[:, None] * weight) + deviation / PRIOR_DEVIATION
     slope[0] += 0.5 * (repeats - scatter / noise)
     return float(value), slope
 
 
-def most_likely(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
-    """Logarithms of the parameters, searched from `logs` (P,)."""
+def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
+    """Return the logarithms of the best parameters, searched from `logs` (P,)."""
     from scipy.optimize import minimize
 
-    bounds = [(middle - 4.0 * DOUBT, middle + 4.0 * DOUBT) for middle in usual(arm.reaches)]
+    bounds = [(middle - 4.0 * PRIOR_DEVIATION, middle + 4.0 * PRIOR_DEVIATION) for middle in default_parameters(arm.reaches)]
     found = minimize(
-        surprise, logs, (arm, squares, reached, expected), jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS}
+        negative_log_posterior,
+        logs,
+        (arm, squares, reached, expected),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": MAX_STEPS},
     )
     best: Array = found.x
     return best

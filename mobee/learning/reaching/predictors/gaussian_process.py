@@ -1,7 +1,7 @@
 """Gaussian process regression of the rewards over poses and targets: the best predictor here.
 
-A lower triangular factor grows by a row a reach.  For every target asked about, the rows of its states are kept and continued when
-it is asked about again, by whole blocks: so what is said depends on the reaches alone, not on what was asked before.
+A lower triangular factor grows by a row for each reach.  For every queried target, the rows of its states are cached and continued at
+the next query, in whole blocks: so predictions depend on the reaches alone, not on earlier queries.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
-from mobee.learning.reaching.predictors.covariance import Covariance, Points, joint_squares, most_likely, points, usual
+from mobee.learning.reaching.predictors.covariance import Covariance, Points, default_parameters, fitted_parameters, joint_squares, points
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 BLOCK = 32  # rows
-KEPT = 300e6  # bytes of rows and covariances of targets in memory, but those of one at least: of 256 states 31 targets, at the fullest
+MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one target at least; with 256 states 31 targets or more
 
 
-class Asked:
-    """What is known of a target asked about: rows (n, S), of which the first `done` will not change, and their sums."""
+class Query:
+    """The cached rows (n, S) of a queried target, of which the first `done` are final, and their sums."""
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
         self.at, self.done, self.upto = at, 0, 0
@@ -32,13 +32,13 @@ class Asked:
 
 
 class Posterior:
-    """Mean and covariance of the rewards from all states, a target.
+    """Mean and covariance of the rewards of all states for a target.
 
     Args:
-        arm: whose reaches they are.
-        covariance: of their mean rewards.
-        state: (n,) of the reaches to begin with, for `target` (n, 3) m.
-        residual: (n,) rewards less the prior mean, or averages of `count` (n,) rewards.
+        arm: gives the prior mean.
+        covariance: of the mean rewards.
+        state: (n,) of the first reaches, for `target` (n, 3) m.
+        residual: (n,) averages of `count` (n,) rewards, minus the prior mean.
     """
 
     def __init__(self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
@@ -47,10 +47,10 @@ class Posterior:
         self._arm, self._covariance, self._solve = arm, covariance, solve_triangular
         self._all = np.arange(len(arm.reaches))
         self._used = len(state)
-        room = -(-self._used // BLOCK) * BLOCK + 8 * BLOCK
-        self._state, self._target = np.zeros(room, dtype=np.intp), np.zeros((room, 3))
-        self._factor, self._score = np.zeros((room, room)), np.zeros(room)
-        self._asked: dict[bytes, Asked] = {}
+        size = -(-self._used // BLOCK) * BLOCK + 8 * BLOCK
+        self._state, self._target = np.zeros(size, dtype=np.intp), np.zeros((size, 3))
+        self._factor, self._score = np.zeros((size, size)), np.zeros(size)
+        self._queries: dict[bytes, Query] = {}
         if self._used:
             self._state[: self._used], self._target[: self._used] = state, target
             seen = points(arm, state, target)
@@ -63,13 +63,13 @@ class Posterior:
         return self._used
 
     def about(self, target: Array) -> tuple[Array, Array]:
-        """Mean (S,) without the prior mean, and covariance (S, S), of the mean rewards for a target (3,) m."""
-        known = self._brought_up(target)
+        """Return mean (S,) without the prior mean, and covariance (S, S), of the mean rewards for a target (3,) m."""
+        known = self._updated(target)
         return known.mean, known.covariance
 
     def append(self, state: int, target: Array, residual: float) -> None:
-        """Take one more reach."""
-        known = self._brought_up(target)
+        """Add one reach."""
+        known = self._updated(target)
         row = self._used
         if row == len(self._score):
             self._grow()
@@ -81,20 +81,20 @@ class Posterior:
         self._used += 1
 
     @property
-    def _most(self) -> int:
-        """Targets that there is memory for: each with its rows, and its covariance twice."""
+    def _max_queries(self) -> int:
+        """Number of targets in the cache: each with its rows, and its covariance twice."""
         states = len(self._all)
-        return max(1, int(KEPT // (8 * states * (len(self._score) + 2 * states))))
+        return max(1, int(MAX_CACHE // (8 * states * (len(self._score) + 2 * states))))
 
-    def _brought_up(self, target: Array) -> Asked:
-        """The rows of a target, to the last."""
+    def _updated(self, target: Array) -> Query:
+        """Return the query of a target with all rows computed."""
         key = target.tobytes()
-        known = self._asked.pop(key, None)
+        known = self._queries.pop(key, None)
         if known is None:
             at = points(self._arm, self._all, target)
-            known = Asked(at, self._covariance.between(at, at), len(self._score))
-        forget(self._asked, self._most)
-        self._asked[key] = known
+            known = Query(at, self._covariance.between(at, at), len(self._score))
+        forget(self._queries, self._max_queries)
+        self._queries[key] = known
         if known.upto < self._used:
             if len(known.rows) < self._used:
                 known.rows = np.concatenate([known.rows, np.empty((len(self._score) - len(known.rows), len(self._all)))])
@@ -106,8 +106,8 @@ class Posterior:
             known.upto = self._used
         return known
 
-    def _continued(self, known: Asked, first: int, end: int) -> tuple[Array, Array]:
-        """Rows first to end of a target; returns mean and covariance with them."""
+    def _continued(self, known: Query, first: int, end: int) -> tuple[Array, Array]:
+        """Compute the rows `first` to `end` of a target; returns mean and covariance with them."""
         new = slice(first, end)
         seen = points(self._arm, self._state[new], self._target[new])
         rows = self._covariance.between(seen, known.at)
@@ -118,38 +118,37 @@ class Posterior:
         return mean + rows.T @ self._score[new], covariance - rows.T @ rows
 
     def _grow(self) -> None:
-        room = len(self._score) * 3 // 2 // BLOCK * BLOCK
-        self._state, self._score = np.resize(self._state, room), np.resize(self._score, room)
-        self._target = np.resize(self._target, (room, 3))
-        factor = np.zeros((room, room))
+        size = len(self._score) * 3 // 2 // BLOCK * BLOCK
+        self._state, self._score = np.resize(self._state, size), np.resize(self._score, size)
+        self._target = np.resize(self._target, (size, 3))
+        factor = np.zeros((size, size))
         factor[: self._used, : self._used] = self._factor
         self._factor = factor
 
 
-REFITS = (30, 60, 120, 250, 500, 1000)  # reaches after which the parameters of the covariance are fitted anew
-MOST = 2500  # pairs of state and target: 50 MB
-REPEATS = 768  # reaches that repeat others, or pairs beyond the most, after which they are merged
-RASTER = 0.01, 1.25  # m: how near targets are merged first, and how much farther each next time
-COARSEST = 10.0  # m: then all targets of a state are one
-JITTER = 1e-9  # of the variance: what rounding may cost
+REFITS = (30, 60, 120, 250, 500, 1000)  # reaches after which the parameters of the covariance are fitted again
+MAX_PAIRS = 2500  # of state and target: 50 MB
+REPEATS = 768  # repeated reaches, or pairs beyond MAX_PAIRS, after which they are merged
+RASTER = 0.01, 1.25  # m, cell size within which targets are merged first, and its factor for each next attempt
+MAX_RASTER = 10.0  # m, at which all targets of a state are merged
+JITTER = 1e-9  # of the prior variance, added to the diagonal against rounding errors
 
 
 class GaussianProcess:
-    """Exact up to 2500 pairs of a state and a target, or a little more; then targets of a state that are near each other are merged.
+    """Exact for about 2500 pairs of a state and a target; beyond that, targets of a state that are near each other are merged.
 
     For spaces of some hundred states: time and memory grow with their square.
-
-    A target asked about again costs well under a millisecond; a new one up to 30, the more reaches there were.
+    A repeated query of a target takes less than a millisecond, the first query up to 30 ms after many reaches.
 
     Args:
         reaches: the reach actions.
-        refits: after how many reaches the parameters are fitted to the evidence.
+        refits: numbers of reaches after which the parameters are fitted to the evidence.
     """
 
     def __init__(self, reaches: Reaches, refits: tuple[int, ...] = REFITS) -> None:
         self._reaches, self._refits = reaches, refits
         self._squares = joint_squares(reaches)
-        self._covariance = Covariance(self._squares, usual(reaches))
+        self._covariance = Covariance(self._squares, default_parameters(reaches))
         self._arm, self._reached = LinearArm(reaches), Reached()
         self._repeats = 0
         self._rebuild()
@@ -160,67 +159,67 @@ class GaussianProcess:
         return {"name": "gp", "before": "linear arm", "refits": list(self._refits)}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went."""
+        """Learn from a reach."""
         if self._reached.pair(state, target) is not None:
             self._repeats += 1
-        self._waiting.append((state, target.copy(), reward - self._arm.rewards(np.array([state]), target).item()))
+        self._pending.append((state, target.copy(), reward - self._arm.rewards(np.array([state]), target).item()))
         self._reached.add(state, target, reward)
         if self._reached.tries in self._refits:
             self._fit()
-        elif self._repeats >= REPEATS or len(self._posterior) + len(self._waiting) >= self._room:
+        elif self._repeats >= REPEATS or len(self._posterior) + len(self._pending) >= self._size:
             self._rebuild()
 
     def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,)."""
-        return self._before(target) + self._about(target)[0]
+        """Return the expected reward of reaching from each state, shape (S,)."""
+        return self._prior_mean(target) + self._about(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Standard deviation of the mean rewards, shape (S,)."""
+        """Return the standard deviations of the mean rewards, shape (S,)."""
         deviation: Array = np.sqrt(np.maximum(self._about(target)[1].diagonal(), 0.0))
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """One draw of the mean rewards of all states together, shape (S,)."""
+        """Return one joint draw of the mean rewards of all states, shape (S,)."""
         mean, covariance = self._about(target)
-        spare = JITTER * self._covariance.prior * np.eye(len(mean))
-        drawn: Array = self._before(target) + mean + np.linalg.cholesky(covariance + spare) @ rng.standard_normal(len(mean))
+        jitter = JITTER * self._covariance.prior * np.eye(len(mean))
+        drawn: Array = self._prior_mean(target) + mean + np.linalg.cholesky(covariance + jitter) @ rng.standard_normal(len(mean))
         return drawn
 
     def _about(self, target: Array) -> tuple[Array, Array]:
-        """The posterior of a target, given all reaches: those that wait are taken in now, as few of a long record ever need to be."""
-        for state, place, residual in self._waiting:
+        """Return the posterior of a target given all reaches; pending ones are added only now, since a long record rarely needs them."""
+        for state, place, residual in self._pending:
             self._posterior.append(state, place, residual)
-        self._waiting.clear()
+        self._pending.clear()
         return self._posterior.about(target)
 
-    def _before(self, target: Array) -> Array:
-        """What is expected of each state before anything was seen, shape (S,)."""
+    def _prior_mean(self, target: Array) -> Array:
+        """Return the prior mean of each state, shape (S,)."""
         return self._arm.rewards(np.arange(len(self._reaches)), target)
 
     def _fit(self) -> None:
         known = self._reached
         self._arm = self._arm.fitted(known)
         expected = self._arm.rewards(known.state, known.places[known.target])
-        self._covariance = Covariance(self._squares, most_likely(self._covariance.logs, self._arm, self._squares, known, expected))
+        self._covariance = Covariance(self._squares, fitted_parameters(self._covariance.logs, self._arm, self._squares, known, expected))
         self._rebuild()
 
     def _rebuild(self) -> None:
-        """Begin again from the averages of all pairs."""
-        state, target, mean, count = thinned(self._reached, MOST)
+        """Make the posterior again from the averages of all pairs."""
+        state, target, mean, count = thinned(self._reached, MAX_PAIRS)
         residual = mean - self._arm.rewards(state, target)
         self._posterior = Posterior(self._arm, self._covariance, state, target, residual, count)
-        self._waiting: list[tuple[int, Array, float]] = []  # reaches since then that nobody has asked after yet
-        self._repeats, self._room = 0, max(len(state), MOST) + REPEATS
+        self._pending: list[tuple[int, Array, float]] = []  # reaches that no query has needed yet
+        self._repeats, self._size = 0, max(len(state), MAX_PAIRS) + REPEATS
 
 
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array]:
-    """State, target (n, 3), average reward and number of tries of pairs; those near each other are one where there are too many.
+    """Return state, target (n, 3), average reward and number of tries of pairs; near targets are merged if there are more than `most`.
 
-    There is at least one for each state that was reached from.
+    At least one pair of each state remains.
     """
     state, raster, step = known.state, *RASTER
     which = np.arange(len(known))
-    while len(state) > most and raster <= COARSEST:
+    while len(state) > most and raster <= MAX_RASTER:
         cell = np.column_stack([known.state, np.round(known.places[known.target] / raster)])
         _, first, which = np.unique(cell, axis=0, return_index=True, return_inverse=True)
         state, raster = known.state[first], raster * step

@@ -14,17 +14,17 @@ from mobee.learning.reaching.reaches import Reaches
 
 JOINTS = (0.05, 0.15, 0.3, 0.5, 0.8)  # scales of the poses, in units of the spread of the samples
 PLACES = (0.03, 0.06, 0.1, 0.15, 0.25)  # of the targets, m
-IMAGINED = 0.2  # reaches that brought what the prior says, at every pose and target
-REFIT = 1.2  # scales and prior are fitted anew when there are so many times as many reaches
-LEFT_OUT = 400  # pairs at most that are predicted from all others
+PRIOR_WEIGHT = 0.2  # of the prior at every pose and target, in reaches
+REFIT = 1.2  # factor of the number of reaches at which scales and prior are fitted again
+MAX_LEFT_OUT = 400  # pairs that are predicted from all others
 
 
 class Kernel(Independent):
-    """Gaussian weights over poses and targets, drawn to the average, or to a prior from the distance, where there are few reaches.
+    """Gaussian weights over poses and targets, shrunk towards the average, or towards a prior by distance, where there are few reaches.
 
     Args:
         reaches: the reach actions.
-        prior: whether it is drawn to the rewards expected from the distance of hand and target.
+        prior: whether the prior is the reward expected from the distance of hand and target.
     """
 
     def __init__(self, reaches: Reaches, prior: bool = False) -> None:
@@ -43,24 +43,24 @@ class Kernel(Independent):
 
     @property
     def scales(self) -> tuple[float, float]:
-        """Of the poses, in units of the spread of the samples, and of the targets, in m."""
+        """Kernel widths of the poses, in units of the spread of the samples, and of the targets, in m."""
         return self._scales
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went."""
+        """Learn from a reach."""
         super().add(state, target, reward, expected)
         if self._reached.tries >= self._next:
             self._refit()
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """The deviation is how far mean rewards are from what is expected with no reach near, less with the weight of those that are."""
+        """The deviation is that of mean rewards from the prior, reduced by the weight of near reaches."""
         known, (by_joints, by_place) = self._reached, self._scales
         near = np.exp(-0.5 * ((known.places - target) ** 2).sum(axis=1) / by_place**2)[known.target] * known.count
         residual = known.mean - self._at_places(known)
         sums = np.stack([np.bincount(known.state, one, len(self._reaches)) for one in (near * residual, near)], axis=1)
         total, weight = (self._alike[JOINTS.index(by_joints)] @ sums).T
         expected = self._expected.mean(target) if self._prior else self._middle
-        return expected + total / (weight + IMAGINED), self._spread * np.sqrt(IMAGINED / (weight + IMAGINED))
+        return expected + total / (weight + PRIOR_WEIGHT), self._spread * np.sqrt(PRIOR_WEIGHT / (weight + PRIOR_WEIGHT))
 
     def _refit(self) -> None:
         """Fit the prior and choose the scales."""
@@ -75,7 +75,7 @@ class Kernel(Independent):
             self._scales = self._best(residual)
 
     def _at_places(self, known: Reached) -> Array:
-        """What the prior says of each pair, shape (n,)."""
+        """Return the prior reward of each pair, shape (n,)."""
         if not self._prior:
             return np.full(len(known), self._middle)
         for place in known.places[self._at_place.shape[1] :]:
@@ -83,9 +83,9 @@ class Kernel(Independent):
         return self._at_place[known.state, known.target]
 
     def _best(self, residual: Array) -> tuple[float, float]:
-        """The scales with the least squared error of reaches, each predicted from all others."""
+        """Return the scales with the least squared error of reaches, each predicted from all others."""
         known = self._reached
-        chosen = np.unique(np.linspace(0, len(known) - 1, min(len(known), LEFT_OUT)).round().astype(np.intp))
+        chosen = np.unique(np.linspace(0, len(known) - 1, min(len(known), MAX_LEFT_OUT)).round().astype(np.intp))
         far = ((known.places[known.target[chosen], None] - known.places) ** 2).sum(axis=-1)
         itself = np.arange(len(chosen)), chosen
         found = {}
@@ -94,6 +94,6 @@ class Kernel(Independent):
             near[itself] = known.count[chosen] - 1.0
             for by_joints, alike in zip(JOINTS, self._alike, strict=True):
                 weight = near * alike[np.ix_(known.state[chosen], known.state)]
-                error = residual[chosen] - weight @ residual / (weight.sum(axis=1) + IMAGINED)
+                error = residual[chosen] - weight @ residual / (weight.sum(axis=1) + PRIOR_WEIGHT)
                 found[by_joints, by_place] = float(known.count[chosen] @ error**2)
         return min(found, key=lambda scales: found[scales])

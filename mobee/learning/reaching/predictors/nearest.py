@@ -13,17 +13,17 @@ from mobee.learning.reaching.predictors.observed import Independent, around
 from mobee.learning.reaching.reaches import Reaches
 
 NEIGHBOURS = 5
-WAY = 0.1  # m: as far apart as one joint at both ends of its samples, divided by:
-JOINT = 2.0
-CLOSE = 0.05  # squared distance at which a neighbour counts half as much as at none
-ONCE = 0.02  # a reach tried once is as unsure as one that its like at this squared distance foretells
-STRANGEST = 1e6
-IMAGINED = 0.5  # weight of what is expected of all, in neighbours at a squared distance of 1
-KEPT = 256  # targets whose neighbours are in memory
+LENGTH_SCALE = 0.1  # m, of vectors from hand to target, for a distance of 1
+JOINT_WEIGHT = 2.0  # distance between the two ends of a joint's samples
+HALF_WEIGHT = 0.05  # squared distance at which a neighbour has half the weight of one at distance 0
+SINGLE_TRY = 0.02  # squared distance of equal uncertainty to a pair that was tried once
+MAX_SQUARED = 1e6  # squared distance, for uncertainty
+PRIOR_WEIGHT = 0.5  # of the average of all rewards, in neighbours at a squared distance of 1
+MAX_CACHED = 256  # targets whose neighbours are in memory
 
 
 class Nearest(Independent):
-    """Averages of the five nearest reaches, repeats merged, by their inverse squared distance, drawn to the average of all.
+    """Averages of the five nearest reaches, repeats merged, weighted by their inverse squared distance, shrunk towards the average of all.
 
     Args:
         reaches: the reach actions.
@@ -32,7 +32,7 @@ class Nearest(Independent):
     def __init__(self, reaches: Reaches) -> None:
         super().__init__()
         self._reaches = reaches
-        self._joints = joint_squares(reaches).sum(axis=0) * JOINT**2
+        self._joints = joint_squares(reaches).sum(axis=0) * JOINT_WEIGHT**2
         self._found: dict[bytes, tuple[int, Array, Ints]] = {}
 
     @property
@@ -41,32 +41,32 @@ class Nearest(Independent):
         return {"name": "nearest"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """The deviation is the spread of all mean rewards, less the nearer the neighbours are."""
+        """The deviation is that of all mean rewards, reduced the nearer the neighbours are."""
         middle, variance = around(self._reached)
         far, which = self._neighbours(target)
-        weight = 1.0 / (far + CLOSE)
+        weight = 1.0 / (far + HALF_WEIGHT)
         rewards = np.append(self._reached.mean, middle)[which]
-        mean = (IMAGINED * middle + (weight * rewards).sum(axis=1)) / (IMAGINED + weight.sum(axis=1))
-        strange = np.minimum(far[:, 0], STRANGEST) + ONCE / np.append(self._reached.count, 1.0)[which[:, 0]]
-        deviation: Array = np.sqrt(variance * strange / (1.0 + strange))
+        mean = (PRIOR_WEIGHT * middle + (weight * rewards).sum(axis=1)) / (PRIOR_WEIGHT + weight.sum(axis=1))
+        uncertainty = np.minimum(far[:, 0], MAX_SQUARED) + SINGLE_TRY / np.append(self._reached.count, 1.0)[which[:, 0]]
+        deviation: Array = np.sqrt(variance * uncertainty / (1.0 + uncertainty))
         return mean, deviation
 
     def _neighbours(self, target: Array) -> tuple[Array, Ints]:
-        """Squared distances, ascending, and pairs of each state's nearest reaches, shape (S, 5); infinite where there are fewer."""
+        """Return squared distances, ascending, and pairs of each state's nearest reaches, shape (S, 5); infinite if there are fewer."""
         key = target.tobytes()
         none = np.full((len(self._reaches), NEIGHBOURS), np.inf), np.full((len(self._reaches), NEIGHBOURS), -1)
         seen, far, which = self._found.pop(key, (0, *none))
         if seen < len(self._reached):
             known, hands = self._reached, self._reaches.hands
             new = slice(seen, len(known))
-            state, ways = known.state[new], known.places[known.target[new]] - hands[known.state[new]]
+            state, vectors = known.state[new], known.places[known.target[new]] - hands[known.state[new]]
             squares = self._joints[:, state]
             for axis in range(3):
-                squares += ((target[axis] - hands[:, axis, None] - ways[:, axis]) / WAY) ** 2
+                squares += ((target[axis] - hands[:, axis, None] - vectors[:, axis]) / LENGTH_SCALE) ** 2
             far = np.concatenate([far, squares], axis=1)
             which = np.concatenate([which, np.broadcast_to(np.arange(seen, len(known)), squares.shape)], axis=1)
             order = np.argsort(far, axis=1, kind="stable")[:, :NEIGHBOURS]
             far, which = np.take_along_axis(far, order, axis=1), np.take_along_axis(which, order, axis=1)
-        forget(self._found, KEPT)
+        forget(self._found, MAX_CACHED)
         self._found[key] = len(self._reached), far, which
         return far, which

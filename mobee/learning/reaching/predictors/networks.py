@@ -10,17 +10,17 @@ from mobee.arrays import Array
 from mobee.learning.reaching.reaches import Reaches
 
 NETWORKS, HIDDEN = 5, 32
-STEPS, BATCH = 4, 64  # of descent after each reach
-RATE, DECAY = 5e-3, 1e-4  # of Adam, and of the weights
-MOMENTUM = 0.9, 0.99
-REACH = 0.1  # m, unit of ways and places
+STEPS, BATCH = 4, 64  # of gradient descent after each reach
+RATE, DECAY = 5e-3, 1e-4  # learning rate of Adam, and decay of the weights
+MOMENTUM = 0.9, 0.99  # of the averages of slopes and of squared slopes
+LENGTH_SCALE = 0.1  # m, unit of vectors and positions in the inputs
 
 
 class Networks:
-    """Networks of two hidden layers on joints, target and the way from hand to target.
+    """Networks of two hidden layers; inputs are the joints, the target, and the vector from hand to target.
 
-    Each reach is repeated so many times for each network as its own draw of a Poisson distribution says (online bootstrap).
-    The order of the reaches matters here, other than with the other predictors.
+    Each reach has for each network a weight drawn from a Poisson distribution (online bootstrap).
+    Unlike with the other predictors, the order of the reaches matters.
 
     Args:
         reaches: the reach actions.
@@ -50,7 +50,7 @@ class Networks:
         return {"name": "networks", "seed": self._seed}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went, and again how others did."""
+        """Learn from a reach, and again from earlier ones."""
         if self._tries == len(self._rewards):
             self._inputs, self._rewards = (np.concatenate([one, one]) for one in (self._inputs, self._rewards))
             self._copies = np.concatenate([self._copies, self._copies], axis=1)
@@ -62,35 +62,35 @@ class Networks:
             self._descend()
 
     def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,): the average of the networks."""
+        """Return the expected reward of reaching from each state, shape (S,): the average of the networks."""
         mean: Array = self._each(target).mean(axis=0)
         return mean
 
     def deviation(self, target: Array) -> Array:
-        """How much the networks differ, shape (S,)."""
+        """Return the standard deviation among the networks, shape (S,)."""
         deviation: Array = self._each(target).std(axis=0, ddof=1)
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """What one network says, shape (S,)."""
+        """Return the prediction of one network drawn at random, shape (S,)."""
         drawn: Array = self._each(target)[rng.integers(NETWORKS)]
         return drawn
 
     def _features(self, target: Array) -> Array:
-        way = (target - self._reaches.hands) / REACH
-        length = np.sqrt((way**2).sum(axis=1, keepdims=True))
-        place = np.broadcast_to((target - self._middle) / REACH, way.shape)
-        return np.concatenate([self._joints, place, way, length], axis=1)
+        vector = (target - self._reaches.hands) / LENGTH_SCALE
+        length = np.sqrt((vector**2).sum(axis=1, keepdims=True))
+        place = np.broadcast_to((target - self._middle) / LENGTH_SCALE, vector.shape)
+        return np.concatenate([self._joints, place, vector, length], axis=1)
 
     def _each(self, target: Array) -> Array:
-        """What each network says, shape (networks, S)."""
+        """Return the predictions of all networks, shape (networks, S)."""
         key = target.tobytes()
         if self._last[:2] != (key, self._tries):
             self._last = key, self._tries, layers(self._weights, self._biases, self._features(target))[-1][..., 0]
         return self._last[2]
 
     def _descend(self) -> None:
-        """One step of Adam on the squared errors of some reaches, the newest among them."""
+        """Make one step of Adam on the squared errors of some reaches, including the newest."""
         chosen = self._rng.integers(self._tries, size=(NETWORKS, BATCH))
         chosen[:, 0] = self._tries - 1
         copies = np.take_along_axis(self._copies, chosen, axis=1)
@@ -105,16 +105,16 @@ class Networks:
 
 
 def layers(weights: list[Array], biases: list[Array], inputs: Array) -> list[Array]:
-    """Activations of the three layers for inputs (n, inputs) or (networks, n, inputs), each (networks, n, size)."""
+    """Return the activations of the three layers for inputs (n, inputs) or (networks, n, inputs), each (networks, n, size)."""
     first = np.tanh(inputs @ weights[0] + biases[0])
     second = np.tanh(first @ weights[1] + biases[1])
     return [first, second, 1.0 / (1.0 + np.exp(-(second @ weights[2] + biases[2])))]
 
 
 def slopes(weights: list[Array], biases: list[Array], inputs: Array, rewards: Array, copies: Array) -> list[Array]:
-    """Derivatives of half the mean squared error, each reach counted `copies` (networks, n) times, by weights and by biases."""
-    first, second, said = layers(weights, biases, inputs)
-    out = ((said[..., 0] - rewards) * copies)[..., None] * said * (1.0 - said) / inputs.shape[1]
+    """Return the derivatives of half the mean squared error, each reach counted `copies` (networks, n) times, by weights and by biases."""
+    first, second, predicted = layers(weights, biases, inputs)
+    out = ((predicted[..., 0] - rewards) * copies)[..., None] * predicted * (1.0 - predicted) / inputs.shape[1]
     back = (out @ weights[2].swapaxes(1, 2)) * (1.0 - second**2)
     further = (back @ weights[1].swapaxes(1, 2)) * (1.0 - first**2)
     by_weights = [one.swapaxes(1, 2) @ error for one, error in ((inputs, further), (first, back), (second, out))]

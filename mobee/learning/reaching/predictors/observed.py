@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.learning.reaching.histories import room_for
+from mobee.learning.reaching.histories import grown
 
-EXPECTED, SPREAD = 0.3, 0.25  # of mean rewards before the first reach: average and standard deviation
-IMAGINED = 4.0  # pairs that these count for
+EXPECTED, SPREAD = 0.3, 0.25  # average and standard deviation of mean rewards before the first reach
+IMAGINED = 4.0  # weight of these two, in pairs
 
 
 class Reached:
@@ -62,23 +62,23 @@ class Reached:
         return float(np.maximum(within, 0.0).sum())
 
     def find(self, target: Array) -> int | None:
-        """Index of a target among the distinct ones; None: never reached for."""
+        """Return the index of a target among the distinct ones; None: never tried."""
         return self._target_of.get(target.tobytes())
 
     def pair(self, state: int, target: Array) -> int | None:
-        """Index of a pair; None: never tried."""
+        """Return the index of a pair; None: never tried."""
         known = self.find(target)
         return None if known is None else self._pair_of.get((state, known))
 
     def add(self, state: int, target: Array, reward: float) -> int:
-        """Take one reach; returns the index of its pair."""
+        """Add one reach; returns the index of its pair."""
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
-        self._places = room_for(self._places, place)
+        self._places = grown(self._places, place)
         self._places[place] = target
         pair = self._pair_of.setdefault((state, place), len(self._pair_of))
-        self._state, self._target = room_for(self._state, pair), room_for(self._target, pair)
-        self._count, self._total, self._squares = room_for(self._count, pair), room_for(self._total, pair), room_for(self._squares, pair)
+        self._state, self._target = grown(self._state, pair), grown(self._target, pair)
+        self._count, self._total, self._squares = grown(self._count, pair), grown(self._total, pair), grown(self._squares, pair)
         self._state[pair], self._target[pair] = state, place
         self._count[pair] += 1.0
         self._total[pair] += reward
@@ -88,14 +88,14 @@ class Reached:
 
 
 def around(known: Reached) -> tuple[float, float]:
-    """Average and variance of the mean rewards, with a few imagined ones so that they exist from the start."""
+    """Return average and variance of the mean rewards and a few imagined ones, so that they exist from the start."""
     rewards, pairs = known.mean, len(known) + IMAGINED
     middle = (rewards.sum() + IMAGINED * EXPECTED) / pairs
     return float(middle), float((((rewards - middle) ** 2).sum() + IMAGINED * SPREAD**2) / pairs)
 
 
 class Independent(ABC):
-    """Mean rewards are normal, each on its own, and follow from the reaches merged in `_reached`."""
+    """Base of predictors with independent normal distributions of the mean rewards, computed from the reaches in `_reached`."""
 
     def __init__(self) -> None:
         self._reached = Reached()
@@ -103,25 +103,25 @@ class Independent(ABC):
     @property
     @abstractmethod
     def settings(self) -> dict[str, Any]:
-        """All that decides what it predicts, as plain JSON values."""
+        """Settings that determine its predictions, as plain JSON values."""
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn how a reach went."""
+        """Learn from a reach."""
         self._reached.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,)."""
+        """Return the expected reward of reaching from each state, shape (S,)."""
         return self._posterior(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Standard deviation of the mean rewards, shape (S,)."""
+        """Return the standard deviations of the mean rewards, shape (S,)."""
         return self._posterior(target)[1]
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """One draw of the mean rewards, each on its own, shape (S,)."""
+        """Return one independent draw of each mean reward, shape (S,)."""
         drawn: Array = rng.normal(*self._posterior(target))
         return drawn
 
     @abstractmethod
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """Means and standard deviations of the mean rewards for a target (3,) m, each (S,) and the caller's own."""
+        """Return means and standard deviations of the mean rewards for a target (3,) m, each (S,), which the caller may change."""

@@ -10,11 +10,11 @@ from mobee.arrays import Array
 from mobee.learning.reaching.predictors.observed import IMAGINED, Independent, around
 from mobee.learning.reaching.reaches import Reaches
 
-NOISE = 0.05  # standard deviation of a reward around its mean, before repeats tell
+NOISE = 0.05  # standard deviation of a reward around its mean, before there are repeats
 
 
 class Table(Independent):
-    """Averages, drawn to the average of all rewards where there are few.
+    """Averages, shrunk towards the average of all rewards where there are few.
 
     Mean rewards are taken as normal around the average of all, with their spread, and rewards as normal around them.
 

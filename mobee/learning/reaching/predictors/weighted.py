@@ -12,12 +12,12 @@ from mobee.learning.reaching.histories import Histories
 from mobee.learning.reaching.reaches import Reaches
 
 _NO_DEVIATION = (
-    "the published predictor gives no deviation and nothing to draw: explore with intrinsic, greedy or random, or take another predictor."
+    "the published predictor has no deviation and no distribution: explore with intrinsic, greedy or random, or take another predictor."
 )
 
 
 class Weighted:
-    """Optimistic weighted averages: 1 where nothing was tried, and nearly so for targets far from those tried.
+    """Optimistic weighted averages: 1 for a state that was never tried, and nearly 1 for targets far from those tried.
 
     Args:
         reaches: the reach actions.
@@ -37,11 +37,11 @@ class Weighted:
         self._rewards.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Expected reward of reaching from each state, shape (S,) (thesis eq. 8.5)."""
+        """Return the expected reward of reaching from each state, shape (S,) (thesis eq. 8.5)."""
         return self._rewards.average(target, 1.0)
 
     def deviation(self, target: Array) -> NoReturn:
-        """Raise InvalidValue: an average does not say how sure it is."""
+        """Raise InvalidValue: an average has no deviation."""
         raise InvalidValue(_NO_DEVIATION)
 
     def sample(self, target: Array, rng: np.random.Generator) -> NoReturn:

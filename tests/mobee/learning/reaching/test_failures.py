@@ -6,7 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee.errors import UnknownName
-from mobee.learning.reaching.failures import DETOUR, FAILURES, IMAGINED, JOINT, WAY, AlikeFailures, Failures, failures_of, has_failed
+from mobee.learning.reaching.failures import (
+    FAILURES,
+    JOINT_SCALE,
+    LENGTH_SCALE,
+    MAX_COST,
+    PRIOR_WEIGHT,
+    AlikeFailures,
+    Failures,
+    failures_of,
+    has_failed,
+)
 from mobee.learning.reaching.predictors import Reaches
 from tests.mobee.learning.reaching.toy import HANDS, SPACE
 
@@ -99,13 +109,15 @@ def test_what_was_not_tried_on_a_target_is_worth_what_all_others_say_in_a_plain_
     found, usual = taught(seen).rewards(target), sum(reward < 0.0 for *_, reward in seen) / 13.0
     for state, action in [(seen[0][0], seen[0][1]), (3, 2), (40, 15)]:
         hand, joints = middle(state, action)
-        failed, weight = IMAGINED * usual, IMAGINED
+        failed, weight = PRIOR_WEIGHT * usual, PRIOR_WEIGHT
         for other, way, place, reward in seen:
             its_hand, its_joints = middle(other, way)
-            far = (((target - hand) - (place - its_hand)) ** 2).sum() / WAY**2 + ((joints - its_joints) ** 2).sum() / JOINT**2
+            far = (((target - hand) - (place - its_hand)) ** 2).sum() / LENGTH_SCALE**2 + (
+                (joints - its_joints) ** 2
+            ).sum() / JOINT_SCALE**2
             failed += np.exp(-0.5 * far) * (reward < 0.0)
             weight += np.exp(-0.5 * far)
-        expected = -DETOUR * max(failed / weight - usual, 0.0) / (1.0 - usual)
+        expected = -MAX_COST * max(failed / weight - usual, 0.0) / (1.0 - usual)
         assert found[state, action] == pytest.approx(expected, abs=1e-5)
 
 
@@ -120,8 +132,8 @@ def test_a_failure_is_a_hint_to_the_way_back_and_none_to_targets_elsewhere():
     back = SPACE.actions(goal).tolist().index(5) if 5 in SPACE.actions(goal) else None
     assert back is not None
     failures = taught([(5, 2, ORIGIN, -10.0)] * 5 + [(70, 3, BESIDE, 0.0)] * 20)
-    assert -DETOUR < failures.rewards(ORIGIN)[goal, back] < -0.2 * DETOUR
-    assert -DETOUR < failures.rewards(ORIGIN + 0.005)[5, 2] < -0.2 * DETOUR
+    assert -MAX_COST < failures.rewards(ORIGIN)[goal, back] < -0.2 * MAX_COST
+    assert -MAX_COST < failures.rewards(ORIGIN + 0.005)[5, 2] < -0.2 * MAX_COST
     np.testing.assert_allclose(failures.rewards(ORIGIN + 1.0), 0.0, atol=1e-12)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.histories import Histories, forget, room_for
+from mobee.learning.reaching.histories import Histories, forget, grown
 
 ORIGIN = np.zeros(3)
 
@@ -86,10 +86,10 @@ def test_actions_that_there_are_not_are_refused():
 
 def test_an_array_that_is_long_enough_is_kept_and_another_grows_twice_as_long():
     array = np.arange(4.0)
-    assert room_for(array, 3) is array
-    grown = room_for(array, 4)
-    assert grown.tolist() == [0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]
-    assert room_for(np.zeros((2, 3), dtype=int), 2).shape == (4, 3)
+    assert grown(array, 3) is array
+    longer = grown(array, 4)
+    assert longer.tolist() == [0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]
+    assert grown(np.zeros((2, 3), dtype=int), 2).shape == (4, 3)
 
 
 @pytest.mark.parametrize(("most", "left"), [(4, "abc"), (3, "bc"), (1, "")])

@@ -6,7 +6,7 @@ import pytest
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches
 from mobee.learning.reaching.predictors.table import Table
-from mobee.learning.reaching.strategies import AT_RANDOM, OPTIMISM, STRATEGIES, WINDOW, Progress
+from mobee.learning.reaching.strategies import OPTIMISM, RANDOM_SHARE, STRATEGIES, WINDOW, Progress
 
 REACHES = Reaches(np.zeros((4, 2)), np.zeros((4, 3)))
 
@@ -75,7 +75,7 @@ def test_the_published_predictor_is_not_for_strategies_that_need_to_know_how_sur
 MADE = Reaches(np.zeros((3, 2)) + np.arange(3)[:, None], np.zeros((3, 3)))
 
 
-STEADY = next(seed for seed in range(100) if np.random.default_rng(seed).random() >= AT_RANDOM)
+STEADY = next(seed for seed in range(100) if np.random.default_rng(seed).random() >= RANDOM_SHARE)
 
 
 SPOT = np.zeros(3)
@@ -112,7 +112,7 @@ def test_some_tries_reach_from_a_state_drawn_at_random():
     progress = progress_of(0.1, 0.4)
     drawn = [progress.rewards(SPOT, np.random.default_rng(seed)).tolist() for seed in range(500)]
     single = [one for one in drawn if sorted(one) == [0.0, 0.0, 1.0]]
-    assert abs(len(single) / 500 - AT_RANDOM) < 0.06
+    assert abs(len(single) / 500 - RANDOM_SHARE) < 0.06
     assert {one.index(1.0) for one in single} == {0, 1, 2}
 
 

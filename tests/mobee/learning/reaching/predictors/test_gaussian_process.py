@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mobee.learning.reaching.predictors import gaussian_process
-from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, points, usual
+from mobee.learning.reaching.predictors.covariance import Covariance, default_parameters, joint_squares, points
 from mobee.learning.reaching.predictors.gaussian_process import BLOCK, GaussianProcess, thinned
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
@@ -27,7 +27,7 @@ def test_mean_and_deviation_are_those_of_the_dense_posterior(tries):
     made, seen = reaches(), drawn(reaches(), tries)
     process = taught(GaussianProcess(made, refits=()), seen)
     for target in (*places()[:2], np.array([0.05, 0.0, -0.1])):
-        mean, covariance = dense(made, seen, target, usual(made))
+        mean, covariance = dense(made, seen, target, default_parameters(made))
         np.testing.assert_allclose(process.mean(target), mean, rtol=0, atol=1e-10)
         np.testing.assert_allclose(process.deviation(target), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
 
@@ -36,7 +36,7 @@ def test_merging_repeats_changes_nothing(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 200)
     monkeypatch.setattr(gaussian_process, "REPEATS", 20)
     process = taught(GaussianProcess(made, refits=()), seen)
-    mean, covariance = dense(made, seen, places()[0], usual(made))
+    mean, covariance = dense(made, seen, places()[0], default_parameters(made))
     np.testing.assert_allclose(process.mean(places()[0]), mean, rtol=0, atol=1e-10)
     np.testing.assert_allclose(process.deviation(places()[0]), np.sqrt(covariance.diagonal()), rtol=0, atol=1e-8)
 
@@ -45,12 +45,12 @@ def test_targets_forgotten_in_memory_are_worked_out_again(monkeypatch):
     made, seen = reaches(), drawn(reaches(), 100)
     other = taught(GaussianProcess(made, refits=()), seen)
     expected = [other.mean(target) for target in places()]
-    monkeypatch.setattr("mobee.learning.reaching.predictors.gaussian_process.KEPT", 80e3)
+    monkeypatch.setattr("mobee.learning.reaching.predictors.gaussian_process.MAX_CACHE", 80e3)
     process = taught(GaussianProcess(made, refits=()), seen)
     for _ in range(2):
         for target, mean in zip(places(), expected, strict=True):
             np.testing.assert_array_equal(process.mean(target), mean)
-    assert len(process._posterior._asked) < len(places())
+    assert len(process._posterior._queries) < len(places())
 
 
 def test_a_record_taken_in_at_once_is_one_learned_reach_by_reach():
@@ -70,17 +70,19 @@ def test_what_is_kept_of_targets_is_bounded_by_its_bytes(monkeypatch, targets, k
     made = reaches()
     process = GaussianProcess(made, refits=())
     process.mean(places()[0])
-    (one,) = process._posterior._asked.values()
-    monkeypatch.setattr("mobee.learning.reaching.predictors.gaussian_process.KEPT", targets * (one.rows.nbytes + 2 * one.covariance.nbytes))
+    (one,) = process._posterior._queries.values()
+    monkeypatch.setattr(
+        "mobee.learning.reaching.predictors.gaussian_process.MAX_CACHE", targets * (one.rows.nbytes + 2 * one.covariance.nbytes)
+    )
     for distance in range(6):
         process.mean(np.array([distance, 0.0, 0.0]))
-    assert len(process._posterior._asked) == kept
+    assert len(process._posterior._queries) == kept
 
 
 def test_no_data_is_the_prior_and_so_is_what_lies_far_from_all_data_but_for_what_all_rewards_share():
     made = reaches()
     fresh = GaussianProcess(made)
-    covariance = Covariance(joint_squares(made), usual(made))
+    covariance = Covariance(joint_squares(made), default_parameters(made))
     np.testing.assert_allclose(fresh.mean(places()[0]), LinearArm(made).rewards(np.arange(len(made)), places()[0]))
     np.testing.assert_allclose(fresh.deviation(places()[0]), np.sqrt(covariance.prior))
     process = taught(GaussianProcess(made, refits=()), drawn(made, 100))
@@ -103,7 +105,7 @@ def test_a_fit_makes_the_rewards_more_likely_and_predictions_better():
 
 def test_any_number_of_targets_is_learned_from_in_bounded_memory(monkeypatch):
     made, rng = reaches(), np.random.default_rng(3)
-    monkeypatch.setattr(gaussian_process, "MOST", 60)
+    monkeypatch.setattr(gaussian_process, "MAX_PAIRS", 60)
     monkeypatch.setattr(gaussian_process, "REPEATS", 20)
     process = GaussianProcess(made, refits=())
     for _ in range(400):

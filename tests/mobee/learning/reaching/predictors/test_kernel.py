@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.kernel import IMAGINED, JOINTS, PLACES, Kernel
+from mobee.learning.reaching.predictors.kernel import JOINTS, PLACES, PRIOR_WEIGHT, Kernel
 from mobee.learning.reaching.predictors.observed import EXPECTED, Reached, around
 from mobee.learning.reaching.predictors.observed import IMAGINED as PAIRS
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
@@ -31,7 +31,7 @@ def test_the_mean_is_the_sum_over_all_reaches_with_gaussian_weights():
         for state in range(len(made)):
             weights = [weight(made, kernel.scales, (state, target), one) for one in seen]
             total = sum(w * (one[2] - middle(seen)) for w, one in zip(weights, seen, strict=True))
-            np.testing.assert_allclose(kernel.mean(target)[state], middle(seen) + total / (sum(weights) + IMAGINED), rtol=1e-9)
+            np.testing.assert_allclose(kernel.mean(target)[state], middle(seen) + total / (sum(weights) + PRIOR_WEIGHT), rtol=1e-9)
 
 
 def test_the_scales_are_those_that_predict_each_reach_best_from_all_others():
@@ -45,7 +45,7 @@ def test_the_scales_are_those_that_predict_each_reach_best_from_all_others():
             itself = next(i for i, other in enumerate(seen) if other is one)
             values = np.array([np.mean(like) if weight(made, scales, one, other) == 1.0 else other[2] for other in seen])
             weights[itself] = 0.0
-            foretold = weights @ (values - middle(seen)) / (weights.sum() + IMAGINED)
+            foretold = weights @ (values - middle(seen)) / (weights.sum() + PRIOR_WEIGHT)
             total += (np.mean(like) - middle(seen) - foretold) ** 2
         errors[scales] = total
     assert taught(Kernel(made), seen).scales == min(errors, key=lambda scales: errors[scales])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.predictors.linear_arm import GIVES, LinearArm
+from mobee.learning.reaching.predictors.linear_arm import COMPLIANCES, LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import places, reaches
 
@@ -25,12 +25,12 @@ def test_what_is_left_is_where_springs_and_pull_are_in_balance():
         for _ in range(5000):  # the joints follow the pull, until their springs hold it
             remaining = way[state] - made.jacobians[state] @ turned
             turned += 0.01 * (40.0 * made.jacobians[state].T @ remaining - turned)
-        assert arm.left(np.array([state]), way[[state]]) == pytest.approx([np.linalg.norm(remaining)], rel=1e-6)
+        assert arm.remaining(np.array([state]), way[[state]]) == pytest.approx([np.linalg.norm(remaining)], rel=1e-6)
 
 
 def test_nothing_gives_where_nothing_is_known_of_the_joints():
     made, way = reaches(), places()[0] - reaches().hands
-    np.testing.assert_allclose(LinearArm(made, 160.0).left(ALL, way), np.linalg.norm(way, axis=1))
+    np.testing.assert_allclose(LinearArm(made, 160.0).remaining(ALL, way), np.linalg.norm(way, axis=1))
 
 
 @pytest.mark.parametrize("give", [5.0, 80.0])
@@ -41,7 +41,7 @@ def test_how_far_the_joints_give_and_the_line_are_found_from_rewards(give):
         for state, value in enumerate(true.rewards(ALL, target)):
             known.add(state, target, value)
     found = LinearArm(made).fitted(known)
-    assert found.give == give
+    assert found.compliance == give
     assert found.rewards(ALL, places()[1]) == pytest.approx(true.rewards(ALL, places()[1]), abs=0.02)
 
 
@@ -57,5 +57,5 @@ def test_one_reach_is_enough_for_a_fit():
     known = Reached()
     known.add(0, places()[0], 0.4)
     found = LinearArm(jointed()).fitted(known)
-    assert found.give in GIVES
+    assert found.compliance in COMPLIANCES
     assert np.isfinite(found.rewards(ALL, places()[0])).all()

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.nearest import CLOSE, IMAGINED, JOINT, NEIGHBOURS, WAY, Nearest
+from mobee.learning.reaching.predictors.nearest import HALF_WEIGHT, JOINT_WEIGHT, LENGTH_SCALE, NEIGHBOURS, PRIOR_WEIGHT, Nearest
 from mobee.learning.reaching.predictors.observed import Reached, around
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
@@ -12,17 +12,17 @@ def test_the_mean_is_that_of_the_five_nearest_pairs_found_by_looking_at_all():
     nearest, known = taught(Nearest(made), seen), Reached()
     for state, target, value in seen:
         known.add(state, target, value)
-    scaled, middle = made.samples / np.ptp(made.samples, axis=0) * JOINT, around(known)[0]
+    scaled, middle = made.samples / np.ptp(made.samples, axis=0) * JOINT_WEIGHT, around(known)[0]
     for target in (places()[0], np.array([0.1, 0.0, -0.05])):
         for state in range(len(made)):
             pairs = []
             for other, place, reward in zip(known.state, known.target, known.mean, strict=True):
                 way = (target - made.hands[state]) - (known.places[place] - made.hands[other])
-                pairs.append((((scaled[state] - scaled[other]) ** 2).sum() + way @ way / WAY**2, reward))
+                pairs.append((((scaled[state] - scaled[other]) ** 2).sum() + way @ way / LENGTH_SCALE**2, reward))
             best = sorted(pairs)[:NEIGHBOURS]
-            weights = [1.0 / (far + CLOSE) for far, _ in best]
-            total = IMAGINED * middle + sum(w * reward for w, (_, reward) in zip(weights, best, strict=True))
-            np.testing.assert_allclose(nearest.mean(target)[state], total / (IMAGINED + sum(weights)), rtol=1e-9)
+            weights = [1.0 / (far + HALF_WEIGHT) for far, _ in best]
+            total = PRIOR_WEIGHT * middle + sum(w * reward for w, (_, reward) in zip(weights, best, strict=True))
+            np.testing.assert_allclose(nearest.mean(target)[state], total / (PRIOR_WEIGHT + sum(weights)), rtol=1e-9)
 
 
 def test_neighbours_of_a_target_asked_about_all_along_are_those_found_at_once():

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from mobee.learning.reaching.predictors import covariance as evidence
-from mobee.learning.reaching.predictors.covariance import Covariance, joint_squares, most_likely, points, surprise, usual
+from mobee.learning.reaching.predictors.covariance import (
+    Covariance,
+    default_parameters,
+    fitted_parameters,
+    joint_squares,
+    negative_log_posterior,
+    points,
+)
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches
@@ -23,7 +30,7 @@ def before(reached: Reached):
 
 def test_differences_of_surprise_are_those_of_all_rewards_taken_one_by_one():
     made, seen = reaches(), drawn(reaches(), 60)
-    squares, first = joint_squares(made), usual(reaches())
+    squares, first = joint_squares(made), default_parameters(reaches())
     state, where, value = (np.array(column) for column in zip(*seen, strict=True))
     data = points(LinearArm(made), state, where)
 
@@ -34,31 +41,32 @@ def test_differences_of_surprise_are_those_of_all_rewards_taken_one_by_one():
         return 0.5 * (residual @ np.linalg.solve(matrix, residual) + np.linalg.slogdet(matrix)[1] + (logs - first) @ (logs - first))
 
     other = first + np.random.default_rng(0).normal(0.0, 0.3, len(first))
-    merged = [surprise(logs, LinearArm(made), squares, known(seen), before(known(seen)))[0] for logs in (first, other)]
+    merged = [negative_log_posterior(logs, LinearArm(made), squares, known(seen), before(known(seen)))[0] for logs in (first, other)]
     assert merged[1] - merged[0] == pytest.approx(plain(other) - plain(first), abs=1e-8)
 
 
 def test_the_derivatives_are_those_of_the_surprise():
     made, seen = reaches(), drawn(reaches(), 50)
-    logs, squares, step = usual(made) + 0.2, joint_squares(made), 1e-5
-    _, slope = surprise(logs, LinearArm(made), squares, known(seen), before(known(seen)))
+    logs, squares, step = default_parameters(made) + 0.2, joint_squares(made), 1e-5
+    _, slope = negative_log_posterior(logs, LinearArm(made), squares, known(seen), before(known(seen)))
     for axis, unit in enumerate(np.eye(len(logs))):
         up, down = (
-            surprise(logs + sign * step * unit, LinearArm(made), squares, known(seen), before(known(seen)))[0] for sign in (1.0, -1.0)
+            negative_log_posterior(logs + sign * step * unit, LinearArm(made), squares, known(seen), before(known(seen)))[0]
+            for sign in (1.0, -1.0)
         )
         assert slope[axis] == pytest.approx((up - down) / (2.0 * step), rel=1e-5, abs=1e-5)
 
 
 def test_the_most_likely_parameters_are_less_surprising_than_the_usual_ones():
     made, reached = reaches(), known(drawn(reaches(), 80))
-    squares, first = joint_squares(made), usual(made)
+    squares, first = joint_squares(made), default_parameters(made)
     rest = LinearArm(made), squares, reached, before(reached)
-    assert surprise(most_likely(first, *rest), *rest)[0] < surprise(first, *rest)[0] - 1.0
+    assert negative_log_posterior(fitted_parameters(first, *rest), *rest)[0] < negative_log_posterior(first, *rest)[0] - 1.0
 
 
 def test_only_so_many_pairs_are_looked_at(monkeypatch):
     made, reached = reaches(), known(drawn(reaches(), 80))
-    monkeypatch.setattr(evidence, "MOST", 10)
-    few, _ = surprise(usual(made), LinearArm(made), joint_squares(made), reached, before(reached))
+    monkeypatch.setattr(evidence, "MAX_FITTED", 10)
+    few, _ = negative_log_posterior(default_parameters(made), LinearArm(made), joint_squares(made), reached, before(reached))
     monkeypatch.undo()
-    assert few != surprise(usual(made), LinearArm(made), joint_squares(made), reached, before(reached))[0]
+    assert few != negative_log_posterior(default_parameters(made), LinearArm(made), joint_squares(made), reached, before(reached))[0]
