@@ -44,17 +44,17 @@ FORCED = "MOBEE_CORE"
 
 
 class CoreUnavailable(NotInstalled):
-    """There is no native library for this machine, or not of these sources, or the one asked for does not run here."""
+    """The native library is missing, was built from other sources, or does not run on this processor."""
 
 
 @cache
 def library() -> ctypes.CDLL:
-    """The shared library for this processor, loaded when it is first asked for."""
+    """Return the shared library for this processor; it is loaded at the first call."""
     return load(choose(os.environ.get(FORCED, ""), processor_flags()))
 
 
 def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
-    """The build to load: the one asked for, else the widest of those in a folder that a processor with these flags runs."""
+    """Return the build to load: the `forced` one, else the widest in a folder that a processor with these flags runs."""
     flags = frozenset(flags)
     known, possible = machine_levels(), possible_levels(flags)
     if forced:

@@ -27,10 +27,10 @@ _sweep = function("sweep", ADDRESS, result=INTEGER)
 
 
 def sweep(near: Sequence[int], q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
-    """Whether nothing touches between the poses q (V, n) of each edge (E, 2), (E,), and how many poses were looked at.
+    """Return which edges (E, 2) between poses q (V, n) are free of contact, (E,), and how many poses were checked.
 
-    `near`: the addresses of what is remembered, see `Following`, one for each thread, all in one world; the caller keeps them alive.
-    `between` (E,): how many poses there are between the ends, which themselves are not looked at.
+    `near`: addresses of neighbour lists, see `Following`, one for each thread, all in one world; the caller keeps them alive.
+    `between` (E,): how many poses to check between the ends; the ends themselves are not checked.
     """
     free = np.empty(len(edges), dtype=np.bool_)
     users = (ADDRESS * len(near))(*near)

@@ -25,7 +25,7 @@ MANY = 128  # contacts for which a room has space from the beginning
 
 
 class Handle:
-    """An object of the core."""
+    """The owner of an object of the core."""
 
     __slots__ = ("__weakref__", "_free", "_kept", "at")
 
@@ -39,7 +39,7 @@ class Handle:
 
 
 class _Memory:
-    """An array that the core has made and given away."""
+    """An array that the core has allocated and handed over."""
 
     def __init__(self, at: int, shape: tuple[int, ...], kind: str) -> None:
         self.__array_interface__ = {"shape": shape, "typestr": kind, "data": (at, False), "version": 3}
@@ -50,7 +50,7 @@ class _Memory:
 
 
 def _rows(take: Callable[[int, int], None], at: int, count: int) -> tuple[Ints, Array]:
-    """The contacts that an object of the core has found, (count, NUMBERS) and (count, REALS)."""
+    """Return the contacts that an object of the core has computed, (count, NUMBERS) and (count, REALS)."""
     if count == 0:
         return NO_NUMBERS, NO_REALS
     arrays = (ADDRESS * 2)()
@@ -109,7 +109,7 @@ _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 evaluate_one = function("evaluate_one", result=INTEGER)
-"""Evaluates one pose, of `Room.asked` and the bytes of q (n,); gives the number of contacts.  Undeclared arguments pass sooner."""
+"""Evaluate one pose, given `Room.asked` and the bytes of q (n,); returns the number of contacts. Undeclared arguments pass faster."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -127,33 +127,33 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
 def robot(counts: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> Handle:
-    """A robot from its tables, which are copied; see mobee/model/robot_tables.py."""
+    """Return a robot made from its tables, which are copied; see mobee/model/robot_tables.py."""
     tables = _RobotTables(**counts, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 
 def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
-    """A robot among the free ones of a world's objects; `carried`: those that it carries, `side`: see mobee/model/engine.py."""
+    """Return a robot among a world's free objects; `carried`: those that it carries; `side`: see mobee/model/engine.py."""
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 
 
 def link_poses(of: Handle, q: Array, links: int) -> Array:
-    """Every link in the poses q (B, n), (B, L, 4, 4)."""
+    """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
     out = np.empty((len(q), links, 4, 4))
     _link_poses(of.at, q.tobytes(), len(q), address(out))
     return out
 
 
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
-    """How a link's point (3,), root frame at zero pose, moves with each motor in the poses q (B, n), (B, 6, n)."""
+    """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
     out = np.empty((len(q), 6, q.shape[1]))
     _jacobians(of.at, q.tobytes(), len(q), link, point.tobytes(), address(out))
     return out
 
 
 class Room:
-    """What evaluations work in, one at a time; kept for the next one, for fresh memory costs more than the arithmetic of a pose."""
+    """The buffers of one evaluation at a time; they are reused, since new memory costs more than the arithmetic of a pose."""
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
 
@@ -161,31 +161,31 @@ class Room:
         self._handle = Handle(_room_new(), _room_free)
         self._at = self._handle.at
         self.torque = np.empty(motors)
-        """Where `evaluate_one` writes what the contacts do to the motors, (n,)."""
+        """The projection of the contacts to the motors that `evaluate_one` writes, (n,)."""
         self._request = _RequestOfOne(room=self._at, torque=address(self.torque))
         self.asked = ctypes.byref(self._request)
-        """What `evaluate_one` is asked, see `ask`."""
+        """The arguments of `evaluate_one`, see `ask`."""
         self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
-        """The rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and what they do to the motors (B, n)."""
+        """Return the rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and their projection to the motors (B, n)."""
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
         count = _evaluate(self._at, ctypes.addressof(request))
         return *_rows(_room_rows, self._at, count), torque
 
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        """What `evaluate_one` shall find from now on; the caller keeps the scene alive."""
+        """Set the arguments of `evaluate_one` from now on; the caller keeps the scene alive."""
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
     def make_space(self, most: int) -> None:
-        """For the rows of the most contacts that `evaluate_one` shall write."""
+        """Allocate the rows of at most so many contacts, which `evaluate_one` writes."""
         self.most, self.rows = most, bytearray(most * ROW_BYTES)
         self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:
-    """What one user remembers from pose to pose of a robot in a scene; not for two threads at once.
+    """The neighbour list of a robot in a scene, kept from pose to pose; for one thread at a time.
 
     `at` is where the core has it, for what finds contacts there: only while this lives, and after `enter`.
     """
@@ -196,19 +196,19 @@ class Following:
         self._scene: Handle | None = None
 
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
-        """Be among another world, or let others reach."""
-        self._scene = scene  # before the core lets go of the last one: nobody else uses this
+        """Change the scene or the hands that reach."""
+        self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)
         _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
-        """As `Room.evaluate`, of poses q (B, n) one after the other."""
+        """Do the same as `Room.evaluate` for poses q (B, n) one after the other."""
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """What is remembered (nothing, a pose, a list, a pose to renew), how many pairs are listed, how many poses the list has served."""
+        """The state of the list (nothing, a pose, a list, a pose to renew), its number of pairs, and of poses that it has served."""
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()
@@ -216,21 +216,21 @@ class Following:
 
 
 def sines_cosines(angles: Array) -> tuple[Array, Array]:
-    """The sine and 1 - cosine of angles (n,) rad."""
+    """Return the sine and 1 - cosine of angles (n,) rad."""
     sines, cosines = np.empty(len(angles)), np.empty(len(angles))
     _sines_cosines(address(angles), len(angles), address(sines), address(cosines))
     return sines, cosines
 
 
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
-    """How far each shape may have moved between joint angles (J,), seen from what carries it and each other link, (S, L) m."""
+    """Return bounds of the motion of each shape between joint angles (J,), relative to each link, (S, L) m."""
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
     return out
 
 
 def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
-    """All shapes (S,), `VOLUME` of mobee._core.narrow, at q (n,), in the order of the robot's tables."""
+    """Return all shapes (S,), `VOLUME` of mobee._core.narrow, at q (n,), in the order of the robot's tables."""
     out = np.zeros(shapes, dtype=VOLUME)
     _place(of.at, address(q), address(out))
     return out

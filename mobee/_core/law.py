@@ -1,4 +1,4 @@
-"""The control law and reaching: core/law.hpp and core/reach.hpp say what the numbers are."""
+"""The control law and reaching: declares core/law.cpp and core/reach.cpp; their headers document the numbers."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ MOTOR_GAINS = columns(
 CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])
 CLAUSE_ENTRY = np.dtype([("motor", WHOLE), ("factor", "f8"), ("normal", "f8")])
 STATE = columns("velocity", "acceleration", "sent", "reference", "feedforward")
-"""A motor's state under the law: rad/s, rad/s^2, the velocity commanded last, the position reference, and N m added to a torque."""
+"""The state of a motor under the law: rad/s, rad/s^2, the velocity commanded last, the position reference, N m added to a torque."""
 SETTLE = ("speed", "acceleration", "first_look", "interval", "timeout")
 
 TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
-"""The numbers of the terms that are the same for all motors, by their names in `Gains`."""
+"""The numbers of the terms that are common to all motors, by their names in `Gains`."""
 MODALITIES = ("position", "velocity", "torque")
 
 
@@ -33,13 +33,13 @@ class Settle(ctypes.Structure):
 
 
 class SettleTest(ctypes.Structure):
-    """What a settle test remembers, s."""
+    """The state of a settle test, s."""
 
     _fields_ = (("begun", REAL), ("next_look", REAL))
 
 
 class Law(ctypes.Structure):
-    """A law with its numbers; whoever makes it keeps the tables."""
+    """A law with its numbers; the caller keeps the tables alive."""
 
     _fields_ = (
         *((name, View) for name in ("motors", "active", "felt", "parts", "clauses", "rows", "entries")),
@@ -68,7 +68,7 @@ _VECTOR, _TWIST = 3 * REAL, 6 * REAL
 
 
 class Reach(ctypes.Structure):
-    """A reach under way; whoever makes it keeps the tables."""
+    """A reach in progress; the caller keeps the tables alive."""
 
     _fields_ = (
         *((name, INTEGER) for name in ("part", "surface", "turned", "used")),
@@ -81,7 +81,7 @@ class Reach(ctypes.Structure):
 
 
 class Calls:
-    """The functions of those files."""
+    """The functions of these source files."""
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
@@ -93,18 +93,18 @@ class Calls:
 
 
 calls = cache(Calls)
-"""They are found when they are first asked for."""
+"""Return the functions; the library is loaded at the first call."""
 
 
 @cache
 def term_names() -> tuple[str, ...]:
-    """The names of the forces, in the order in which the core fills and adds them."""
+    """Return the names of the forces, in the order in which the core fills and adds them."""
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
     return tuple(found.decode() for found in takewhile(bool, map(name, count())))
 
 
 @cache
 def state_term_names() -> tuple[str, ...]:
-    """Those of them that depend on the law's state."""
+    """Return the names of the forces that depend on the law's state."""
     moving = function("law_moving", INTEGER, result=INTEGER)
     return tuple(name for index, name in enumerate(term_names()) if moving(index))

@@ -1,4 +1,4 @@
-"""The motors of a simulated robot, and the offline plant's ticks: core/motors.hpp and core/plant.cpp say what the numbers are."""
+"""The motors of a simulated robot and the offline plant's ticks: declares core/motors.cpp and core/plant.cpp."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
 
 
 class Motors(ctypes.Structure):
-    """The motors; whoever makes it keeps the tables."""
+    """The motors; the caller keeps the tables alive."""
 
     _fields_ = (
         ("living", View), ("numbers", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
@@ -33,7 +33,7 @@ class Motors(ctypes.Structure):
 
 
 class Braking(ctypes.Structure):
-    """Limits of references, each (n,), and the velocities asked for now; whoever makes it keeps the arrays."""
+    """Limits of references, each (n,), and the commanded velocities; the caller keeps the arrays alive."""
 
     _fields_ = (
         ("count", INTEGER), ("lower", ADDRESS), ("upper", ADDRESS), ("fastest", ADDRESS), ("change", ADDRESS), ("velocity", ADDRESS),
@@ -42,7 +42,7 @@ class Braking(ctypes.Structure):
 
 
 class Plant(ctypes.Structure):
-    """A plant; whoever makes it keeps all that it points to."""
+    """A plant; the caller keeps alive everything that it points to."""
 
     _fields_ = (
         *((name, ADDRESS) for name in ("near", "law", "law_state", "attractor", "client", "forces")),
@@ -58,11 +58,11 @@ STRUCTURES = (
     law.MOTOR_GAINS, law.CLAUSE_ROW, law.CLAUSE_ENTRY, law.STATE, law.Law, law.DRIVE, law.JOINT, law.PULLED, law.Reach,
     NUMBERS, STATE, Motors, PART, Plant,
 )  # fmt: skip
-"""All that are laid out both here and there."""
+"""All structures that are declared both here and in the core."""
 
 
 class Calls:
-    """The functions of those files."""
+    """The functions of these source files."""
 
     def __init__(self) -> None:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER)
@@ -79,4 +79,4 @@ class Calls:
 
 
 calls = cache(Calls)
-"""They are found when they are first asked for."""
+"""Return the functions; the library is loaded at the first call."""

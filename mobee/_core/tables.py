@@ -19,18 +19,18 @@ ROW_BYTES = 8 * (NUMBERS + REALS)
 
 
 class View(ctypes.Structure):
-    """An array that somebody else owns."""
+    """An array whose owner is elsewhere."""
 
     _fields_ = (("data", ADDRESS), ("size", INTEGER))
 
 
 def view(array: Array | Ints | Table) -> View:
-    """A C-contiguous array, which the caller keeps alive, as the core reads it."""
+    """Return a C-contiguous array, which the caller keeps alive, as the core reads it."""
     return View(address(array), len(array))
 
 
 def columns(*names: str, whole: tuple[str, ...] = ()) -> np.dtype[np.void]:
-    """A structure of these numbers, behind them these whole ones."""
+    """Return the type of a structure of these real numbers, followed by these whole numbers."""
     return np.dtype([*((name, "f8") for name in names), *((name, WHOLE) for name in whole)])
 
 
@@ -38,7 +38,7 @@ INTERVAL = np.dtype([("first", WHOLE), ("end", WHOLE)])
 
 
 def numbers(values: Array, count: int) -> bytes:
-    """That many numbers as the core reads them, for a function that changes none of them; raises ValueError for another shape."""
+    """Return `count` numbers as bytes, for a function of the core that does not change them; raises ValueError for another shape."""
     given = np.asarray(values, dtype=np.float64)
     if given.shape != (count,):
         raise ValueError(f"an array of shape {given.shape}: must be ({count},)")

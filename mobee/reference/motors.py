@@ -1,6 +1,6 @@
 """The motors of a simulated robot: delay, lag, friction, play, hard stops, encoder noise (docs/plant.md).
 
-A motor has two sides, with play between them: the motor's own, and that of the joint, which the encoders read.
+Each has a motor side and a joint side, with play between them. The encoders measure the joint side.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
 
-SERVO = 8.0  # 1/s: velocity for a distance, in position mode and in a hold that has come to rest
-NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is given
-WORD = 2**64 - 1
+SERVO_GAIN = 8.0  # 1/s: velocity per distance, in position mode and in a hold that has come to rest
+NOISE_PERIOD = 0.02  # s, the tick for which the encoder noise is specified
+WORD = 2**64 - 1  # mask of 64 bits
 
 
 @dataclass(slots=True, eq=False)
 class MotorState:
-    """All motors of a robot; arrays (n,).  `line` holds what is on its way, a row for each substep, the newest last."""
+    """The state of all motors of a robot; arrays (n,). `line`: delayed commands, a row for each substep, the newest last."""
 
     q: Array  # rad, joint side
     velocity: Array  # rad/s, joint side
@@ -33,29 +33,29 @@ class MotorState:
     motor_velocity: Array  # rad/s, motor side
     mode: NDArray[np.str_]  # "position", "velocity", "torque" or "hold"
     reference: Array  # rad, rad/s or N m, by mode
-    resting: NDArray[np.bool_]  # of a hold: whether it has come to rest,
-    rest: Array  # and where, rad
-    load: Array  # N m, the robot's weight: what pulls against a motor in torque mode
-    line: list[Array]  # rad/s, of a motor in torque mode N m
+    resting: NDArray[np.bool_]  # in hold: whether the motor has come to rest
+    rest: Array  # in hold: where it came to rest, rad
+    load: Array  # N m, the robot's weight, which acts on motors in torque mode
+    line: list[Array]  # rad/s, for a motor in torque mode N m
 
 
 def at_rest(robot: Robot, parameters: MotorParameters, q: Array, dt: float) -> MotorState:
-    """Every motor in hold at q (n,) rad; all substeps will last dt [s]."""
+    """Return the state with every motor in hold at q (n,) rad; `dt`: the length of all substeps [s]."""
     n, zero = len(q), np.zeros(len(q))
     line = [zero] * (int(substeps_late(robot, parameters, dt).max(initial=0)) + 1)
     return MotorState(q, zero, q, zero, np.full(n, "hold", dtype="<U8"), zero, np.ones(n, dtype=bool), q, zero, line)
 
 
 def substeps_late(robot: Robot, parameters: MotorParameters, dt: float) -> NDArray[np.int_]:
-    """The delay of each motor, rounded to substeps of dt [s]."""
+    """Return the delay of each motor, rounded to substeps of dt [s]."""
     return np.round(parameters.of_robot("delay", robot) / dt).astype(int)
 
 
 def command(s: MotorState, where: slice, mode: str, reference: Array | None = None) -> None:
-    """What is in force for some motors from now on; a hold has no reference.
+    """Set mode and reference of some motors; a hold has no reference.
 
-    Where the mode changes, what is on its way has another unit, and becomes what the motor does now: its velocity, or the torque that
-    carries its weight.  In torque mode the gear is taken to be rigid, so the motor side begins where the joint is.
+    Where the mode changes, the delayed commands would have another unit: they are replaced by the motor's present velocity, or by the
+    torque that carries its load. In torque mode the gear is rigid, so the motor side starts at the joint's position.
     """
     if reference is not None:
         s.reference = s.reference.copy()
@@ -71,15 +71,15 @@ def command(s: MotorState, where: slice, mode: str, reference: Array | None = No
 
 
 def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> Array:
-    """Advance the motor side by a substep of dt [s]; where it drags the joint side to, (n,) rad."""
+    """Advance the motor side by a substep of dt [s]; return where it drags the joint side, (n,) rad."""
     fastest = np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = np.array([motor.max_acceleration for motor in robot.motor_table])
     strongest = np.array([motor.max_torque for motor in robot.motor_table])
     lag, backlash, friction = (parameters.of_robot(name, robot) for name in ("lag", "backlash", "friction"))
     torque, position = s.mode == "torque", s.mode == "position"
-    told = np.where(torque, np.clip(s.reference, -strongest, strongest), np.clip(s.reference, -fastest, fastest))
-    told = np.where(position, servo(s, s.reference, fastest), told)
-    s.line = [*s.line[1:], told]
+    commanded = np.where(torque, np.clip(s.reference, -strongest, strongest), np.clip(s.reference, -fastest, fastest))
+    commanded = np.where(position, servo(s, s.reference, fastest), commanded)
+    s.line = [*s.line[1:], commanded]
     asked = np.array([s.line[-1 - late][i] for i, late in enumerate(substeps_late(robot, parameters, dt))])
     velocity = np.where(torque, turned(s, asked, friction, fastest, hardest, dt), responded(s, asked, lag, friction, dt))
     velocity = np.where(s.mode == "hold", held(s, fastest, hardest * dt), velocity)
@@ -90,25 +90,25 @@ def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -
 
 
 def servo(s: MotorState, position: Array, fastest: Array) -> Array:
-    """The velocity (n,) rad/s towards a position (n,) rad."""
-    return np.clip(SERVO * (position - s.motor_q), -fastest, fastest)
+    """Return the velocity (n,) rad/s towards a position (n,) rad."""
+    return np.clip(SERVO_GAIN * (position - s.motor_q), -fastest, fastest)
 
 
 def responded(s: MotorState, asked: Array, lag: Array, friction: Array, dt: float) -> Array:
-    """The velocity after a substep in which one was asked for: lag dv/dt = u - v - friction sign(v), solved exactly."""
+    """Return the velocity after a substep under the command u: lag dv/dt = u - v - friction sign(v), solved exactly."""
     share = np.where(lag > 0.0, 1.0 - np.exp(-dt / np.where(lag > 0.0, lag, 1.0)), 1.0)
     return nearer_to_zero(s.motor_velocity + share * (asked - s.motor_velocity), share * friction)
 
 
 def turned(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
-    """The velocity after a substep under a torque: I dv/dt = tau - load - B v - B friction sign(v), within the motor's limits."""
+    """Return the velocity after a substep under a torque: I dv/dt = tau - load - B v - B friction sign(v), within the motor's limits."""
     push = np.clip((asked - s.load - VISCOUS * s.motor_velocity) / INERTIA, -hardest, hardest)
     slowed = nearer_to_zero(s.motor_velocity + push * dt, VISCOUS * friction / INERTIA * dt)
     return np.clip(slowed, -fastest, fastest)
 
 
 def held(s: MotorState, fastest: Array, change: Array) -> Array:
-    """The velocity of a motor that brakes to rest and then stays where that was."""
+    """Return the velocity of a motor that brakes to rest and then stays there."""
     arrived = (s.mode == "hold") & ~s.resting & (np.abs(s.motor_velocity) <= change)
     s.rest = np.where(arrived, s.motor_q, s.rest)
     s.resting = s.resting | arrived
@@ -117,12 +117,12 @@ def held(s: MotorState, fastest: Array, change: Array) -> Array:
 
 
 def nearer_to_zero(x: Array, by: Array) -> Array:
-    """Coulomb's friction: less by that much, at most to 0."""
+    """Return x reduced in size by `by`, at most to 0 (Coulomb's friction)."""
     return np.copysign(np.maximum(np.abs(x) - by, 0.0), x)
 
 
 def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
-    """Take the joint side (n,) rad at the end of a substep; the motor side follows into the play, so nothing winds up at a stop."""
+    """Set the joint side (n,) rad at the end of a substep; the motor side follows into the play, so that nothing winds up at a stop."""
     torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
     s.velocity, s.q = (q - s.q) / dt, q
     s.motor_q = np.where(torque, q, np.clip(s.motor_q, q - half, q + half))
@@ -130,19 +130,19 @@ def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt
 
 
 def substep(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> None:
-    """One substep of dt [s] of a robot without physics: the joints go where their motors drag them, as far as the hard stops."""
+    """Advance a robot without physics by dt [s]: the joints follow their motors, as far as the hard stops."""
     adopt(robot, parameters, s, np.clip(drive(robot, parameters, s, dt), *robot.limits.T), dt)
 
 
 def encoders(robot: Robot, parameters: MotorParameters, s: MotorState, seed: int, k: int, dt: float) -> Array:
-    """The joints (n,) rad as read at tick k: white noise of a strength that does not depend on the tick's length dt [s]."""
+    """Return the encoder values (n,) rad at tick k, with white noise whose strength does not depend on the tick's length dt [s]."""
     strength = parameters.encoder_noise * math.sqrt(NOISE_PERIOD / dt) * fine_units(robot)
     read: Array = s.q + strength * np.array([normal(seed, k, motor) for motor in range(len(s.q))])
     return read
 
 
 def normal(seed: int, k: int, motor: int) -> float:
-    """A standard normal, a pure function of seed, tick and motor (Box and Muller), so that whoever knows them draws the same."""
+    """Return a standard normal number, a pure function of seed, tick and motor (Box and Muller)."""
     one = mixed(mixed(mixed(seed & WORD) ^ k) ^ mixed(motor // 2))
     radius = math.sqrt(-2.0 * math.log(((one >> 11) + 1) * 2.0**-53))
     angle = 2.0 * math.pi * ((mixed(one) >> 11) * 2.0**-53)
@@ -150,7 +150,7 @@ def normal(seed: int, k: int, motor: int) -> float:
 
 
 def mixed(x: int) -> int:
-    """The next number of splitmix64 after x (Steele, Lea, Flood 2014)."""
+    """Return the next number of splitmix64 after x (Steele, Lea, Flood 2014)."""
     x = (x + 0x9E3779B97F4A7C15) & WORD
     x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & WORD
     x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & WORD

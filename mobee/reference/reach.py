@@ -1,11 +1,12 @@
 """The force that draws a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
-Published law: J^T f with f as strong as the marker is far, bounded as a client's force, against the attractor's spring.
+Published law: J^T f, with f proportional to the distance of the marker, bounded as a client's force, against the attractor's spring.
 
-Default law: J^T control swings where commands are late, for its stiffness, J J^T and for a far target the bend of the marker's path,
-differs with the pose; and it stops in singular poses (thesis 5.1).  So the marker is drawn at one RATE in every direction, by
-(J E J^T + damping)^-1 e, where e is what is missing and E how fast the motors give way; from a singular pose the error's negative
-curvature leads out; limits, clauses and contacts are walls along which it goes on; and the spring gives way while the reach lasts.
+Default law: J^T control oscillates with late commands, because its stiffness depends on the pose: it is J J^T plus, for a far target,
+the curvature of the marker's path. And it stops in singular poses (thesis 5.1). Therefore the marker is drawn at the same RATE in
+every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. From a singular pose the
+negative curvature of the error leads out. Limits, clauses and contacts count as walls, along which the motion continues. The
+attractor's spring is removed while the reach lasts.
 """
 
 from __future__ import annotations
@@ -25,46 +26,46 @@ from mobee.robot.robot import Robot
 
 FORCE_GAIN = math.radians(5000.0)  # rad/s^2 for a lever and a distance of 1 m; the 2014 program's 5000 are deg/s^2
 
-RATE = 5.0  # 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
-ARM = 0.1  # m: a normal that is wrong by an angle counts as a position that is wrong by this times the angle
-LONGEST = 0.2  # m: beyond it the pull grows no more
+RATE = 5.0  # 1/s: far below the rate at which commands three ticks old at 100 Hz oscillate (docs/law.md)
+ARM = 0.1  # m: an error of the normal by an angle counts as an error of the position by this times the angle
+LONGEST = 0.2  # m: the pull does not grow beyond this distance
 TOLERANCE = 2e-3  # m
-SOFT = 0.03  # of the size of J E J^T: damping
-WALL = 0.5  # rad/s^2: what holds the motors back half counts as a wall where it is that strong
-SMOOTH = 0.25  # s, over which the error is averaged before it is judged
-BETTER = 5e-4  # m, that count as nearer
-WAIT = 0.6  # s: what has come nearer since has not arrived
-PATIENCE = 3.0  # s without coming nearer: no way out is tried any more
-WEAK = 0.05  # of the error's force that arrives at the motors: below it the pose is singular, or as near as possible
-CURVED = 1e-3  # of the size of J E J^T: curvature that counts
+SOFT = 0.03  # damping, relative to the size of J E J^T
+WALL = 0.5  # rad/s^2: a force of this size that holds the motors back counts half as a wall
+SMOOTH = 0.25  # s, over which the error is averaged
+BETTER = 5e-4  # m: a decrease of the error that counts
+WAIT = 0.6  # s without such a decrease, after which the reach may be over
+PATIENCE = 3.0  # s without such a decrease, after which no direction out of a singular pose is tried
+WEAK = 0.05  # of the error's force that acts on the motors: below it the pose counts as singular
+CURVED = 1e-3  # relative to the size of J E J^T: the smallest curvature that counts
 NUDGE = 0.1  # rad, out of a singular pose
-PROBE = 1e-4  # rad
-NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that nothing moves
+PROBE = 1e-4  # rad, step of finite differences
+NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that no motor moves
 
 
 @dataclass(slots=True, eq=False)
 class Reach:
-    """A reach under way: by which motors, and what the default law remembers from tick to tick."""
+    """A reach in progress: its motors, and the state of the default law from tick to tick."""
 
     robot: Robot
     gains: Gains
     marker: str
     target: ReachTarget
-    motors: Ints  # (m,) those that are pulled
-    seen: Array = field(default_factory=lambda: np.zeros(6))  # m, the error without the encoders' noise
-    left: float = 0.0  # m, the size of that
-    best: float = math.inf  # m, the least so far
-    since: float = 0.0  # s, how long ago that was
-    way: Array | None = None  # (m,) rad, the last way out of a singular pose
+    motors: Ints  # (m,) the motors that are pulled
+    seen: Array = field(default_factory=lambda: np.zeros(6))  # m, the error, averaged over the encoders' noise
+    left: float = 0.0  # m, its size
+    best: float = math.inf  # m, the smallest size so far
+    since: float = 0.0  # s, the time since then
+    way: Array | None = None  # (m,) rad, the last direction out of a singular pose
 
     @property
     def nears(self) -> bool:
-        """Whether the marker is not there yet and still comes nearer: then it is not over, however slow the motors are."""
+        """Whether the marker has not arrived and still comes nearer: then the reach is not over, however slow the motors are."""
         return self.left > 0.75 * TOLERANCE and self.since < WAIT
 
 
 def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
-    """Pull with the motors of a part, or of the whole body, that may be moved and that move the marker."""
+    """Return a reach with the motors of a part, or of the whole body, that may be moved and that move the marker."""
     moving = (robot.coupling[0][joints_to(robot, robot.marker(marker).link)] != 0.0).any(axis=0) & (gains.weight(robot.motors) > 0)
     if part is not None:
         moving[: robot.part(part).slice.start] = moving[robot.part(part).slice.stop :] = False
@@ -73,23 +74,23 @@ def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: Rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The target as seen from a pose."""
+    """The errors of the marker in a pose, and its derivatives."""
 
-    error: Array  # (3,) m to where the marker is to be
-    turn: Array  # (3,) n x n*, about which the normal is to turn
+    error: Array  # (3,) m, from the marker to its goal
+    turn: Array  # (3,) n x n*, the axis about which the normal should turn
     facing: float  # n . n*
-    columns: Array  # (k, 6) how each joint from the base to the marker moves and turns it
-    drives: Array  # (k, m) how each motor that is pulled drives each of these joints, in the motor's unit
+    columns: Array  # (k, 6) the marker's motion and rotation with each joint from the base to it
+    drives: Array  # (k, m) the motion of these joints with each pulled motor, in the motor's unit
 
     @property
     def jacobian(self) -> Array:
-        """How the marker moves and turns with each motor that is pulled, (6, m)."""
+        """The marker's Jacobian with respect to the pulled motors, (6, m)."""
         found: Array = self.columns.T @ self.drives
         return found
 
 
 def view(r: Reach, q: Array) -> View:
-    """Evaluate the marker and its Jacobian at q (n,) rad."""
+    """Return the marker's errors and derivatives at q (n,) rad."""
     frames, target = link_frames(r.robot, q), r.target
     place, normal = marker_at(r.robot, frames, r.marker)
     error = target.position - place
@@ -103,7 +104,7 @@ def view(r: Reach, q: Array) -> View:
 
 
 def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
-    """What the reach adds to eq. 5.7, (n,) rad/s^2; `against` (n,) is what acts on the motors beside their springs, dt s the tick."""
+    """Return the force of a reach in eq. 5.7, (n,) rad/s^2; `against` (n,): all other forces but the springs; `dt`: the tick [s]."""
     total, seen = np.zeros(len(s.q)), view(r, s.q)
     if r.gains.law == "published_2014":
         total[r.motors] = bounded(r, published(r, seen))
@@ -116,7 +117,7 @@ def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
 
 
 def bounded(r: Reach, force: Array) -> Array:
-    """L as for a client's force, of the motors that are pulled (m,)."""
+    """Bound a force on the pulled motors (m,), as a client's force."""
     maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
     unit = motor_units(r.robot)[r.motors]
     if r.gains.client_squash == "each":
@@ -125,17 +126,17 @@ def bounded(r: Reach, force: Array) -> Array:
 
 
 def published(r: Reach, v: View) -> Array:
-    """The 2014 program: J^T f, f = 5000 (x* - x), and where a normal is asked for the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*)."""
+    """Return the force of the 2014 program: J^T f, f = 5000 (x* - x); for a normal the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*)."""
     twist = 0.5 * float(np.linalg.norm(v.error)) * (1.0 - v.facing) * v.turn
     force: Array = FORCE_GAIN * v.jacobian.T @ np.concatenate([v.error, twist])
     return force
 
 
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
-    """The default law: the force of the motors that are pulled (m,) before it is bounded, and where a nudge moves their springs to."""
+    """Return the force of the default law on the pulled motors (m,), not yet bounded, and a shift of their springs."""
     jacobian, error = rows(r, v)
-    note_missing(r, error, dt)
-    slope = jacobian.T @ error  # how fast half the square of the error falls along each motor
+    note_error(r, error, dt)
+    slope = jacobian.T @ error  # the decrease of half the squared error along each motor
     ease = eased(r, s.q, slope)
     give = (jacobian * ease) @ jacobian.T
     size = max(float(np.linalg.norm(give)), NOTHING)
@@ -143,21 +144,21 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
     nudge = np.zeros(len(r.motors))
     if weak and r.left > TOLERANCE and r.since <= PATIENCE:
         nudge = NUDGE * way_out(r, s.q, ease, size)
-    fading = r.left / (r.left + 0.5 * TOLERANCE)  # so that at the target the encoders' noise is not followed
+    fading = r.left / (r.left + 0.5 * TOLERANCE)  # so that at the target the encoders' noise has no effect
     pull = RATE * fading / (1.0 + float(np.linalg.norm(error)) / LONGEST) * error / size
     force = jacobian.T @ pushed(r, v, give / size, pull, ease)
     return along_walls(r, v, s, against, force, ease, size, pull), nudge
 
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
-    """Jacobian (rows, m) and error (rows,), in m: three rows, six where a normal is asked for."""
+    """Return Jacobian (rows, m) and error (rows,), in m: three rows, or six with a wanted normal."""
     if r.target.normal is None:
         return v.jacobian[:3], v.error
     return v.jacobian * np.repeat([1.0, ARM], 3)[:, None], np.concatenate([v.error, ARM * v.turn])
 
 
-def note_missing(r: Reach, error: Array, dt: float) -> None:
-    """Average the error over SMOOTH, and keep for how long it has not become less."""
+def note_error(r: Reach, error: Array, dt: float) -> None:
+    """Average the error over SMOOTH, and count the time since it last decreased."""
     seen = r.seen[: len(error)]
     seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
     r.left = float(np.linalg.norm(seen))
@@ -167,7 +168,7 @@ def note_missing(r: Reach, error: Array, dt: float) -> None:
 
 
 def eased(r: Reach, q: Array, slope: Array) -> Array:
-    """E: how fast each motor goes for a torque of 1, slope of the squash over damping; 0 for one that its limit keeps."""
+    """Return E: the velocity of each motor for a torque of 1, slope of the squash over damping; 0 for a motor at its limit."""
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
     kept = ((q < low)[r.motors] & (slope < 0.0)) | ((q > high)[r.motors] & (slope > 0.0))
@@ -176,7 +177,7 @@ def eased(r: Reach, q: Array, slope: Array) -> Array:
 
 
 def pushed(r: Reach, v: View, give: Array, pull: Array, ease: Array) -> Array:
-    """The force on the marker (rows,): (J E J^T / size + damping)^-1 of the pull, with so much damping that the bend makes it not swing."""
+    """Return the force on the marker (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable pull."""
     soft = SOFT
     while True:
         push: Array = np.asarray(np.linalg.solve(give + soft * np.eye(len(give)), pull), dtype=np.float64)
@@ -187,9 +188,9 @@ def pushed(r: Reach, v: View, give: Array, pull: Array, ease: Array) -> Array:
 
 
 def bend_of_path(v: View, push: Array, ease: Array) -> Array:
-    """How the force on the motors changes as they move, because the marker's path bends: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
+    """Return the stiffness by the curvature of the marker's path: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
 
-    Of joints a and b, a the nearer to the base, the path's second derivative is the axis of a times (x) the motion of b.
+    For joints a and b, a nearer to the base, the second derivative of the path is the axis of a times (x) the motion of b.
     """
     count = len(v.columns)
     along = np.zeros((count, count))
@@ -205,8 +206,8 @@ def bend_of_path(v: View, push: Array, ease: Array) -> Array:
 
 
 def largest_eigenvalue(matrix: Array, ease: Array, turns: int) -> tuple[float, Array]:
-    """The largest eigenvalue of a symmetric matrix and its vector, by power iteration, which costs little; motors without ease rest."""
-    shift = float(np.linalg.norm(matrix))  # makes it the largest in size, too
+    """Return the largest eigenvalue of a symmetric matrix and its vector, by power iteration; entries without ease are 0."""
+    shift = float(np.linalg.norm(matrix))  # makes it the largest in absolute value too
     vector: Array = 1.0 + 0.1 * np.arange(len(matrix), dtype=np.float64)
     length = 0.0
     for _ in range(turns):
@@ -217,11 +218,11 @@ def largest_eigenvalue(matrix: Array, ease: Array, turns: int) -> tuple[float, A
 
 
 def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, ease: Array, size: float, pull: Array) -> Array:
-    """The force (m,) where something holds the motors back: along it as along a wall, not into it."""
+    """Return the force (m,) where limits or other forces hold the motors back: along these as along a wall, not into it."""
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]
     limited = np.where(limit * force < 0.0, np.abs(limit) / unit, 0.0)  # of each motor alone
-    held = (against[r.motors] - limit) / unit  # by all else: a direction of the motors
+    held = (against[r.motors] - limit) / unit  # by all other forces: a direction of the motors
     into = float(held @ (ease * force)) < 0.0
     if not (limited.any() or into):
         return force
@@ -232,13 +233,13 @@ def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, ease:
         strength = float(np.linalg.norm(held))
         wall = strength / (strength + WALL) / across
         away = jacobian @ (ease * held)
-        give = give - wall * np.outer(away, away)  # in that direction the motors give no way, the less the weaker it is
+        give = give - wall * np.outer(away, away)  # in that direction the motors do not move; less so for a weak force
     force = jacobian.T @ pushed(r, v, give / size, pull, ease)
     return (force - wall * float(held @ (ease * force)) * held) * share
 
 
 def way_out(r: Reach, q: Array, ease: Array, size: float) -> Array:
-    """From a pose that the pull does not move: the way (m,) along which the error falls on both sides; zeros where there is none."""
+    """Return the direction (m,) out of a singular pose, along which the error falls on both sides; zeros where there is none."""
     curve = np.empty((len(r.motors), len(r.motors)))
     for k, motor in enumerate(r.motors):
         probe = np.zeros(len(q))
@@ -251,13 +252,13 @@ def way_out(r: Reach, q: Array, ease: Array, size: float) -> Array:
         r.way = None
         return np.zeros(len(way))
     middle = (r.robot.limits.mean(axis=1) - q)[r.motors]
-    side = float(way @ before) or float(way @ middle)  # as before, at first toward the middle of the motors' ranges
+    side = float(way @ before) or float(way @ middle)  # as before; at first towards the middle of the motors' ranges
     r.way = -way if side < 0.0 else way
     return r.way
 
 
 def slope_at(r: Reach, q: Array) -> Array:
-    """How fast half the square of the error falls along each motor that is pulled, at q (n,) rad."""
+    """Return the decrease of half the squared error along each pulled motor, at q (n,) rad."""
     jacobian, error = rows(r, view(r, q))
     slope: Array = jacobian.T @ error
     return slope
