@@ -25,7 +25,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """`free` (E,): along which edges nothing touches; `poses`: how many were looked at for that, those at the ends included."""
+    """`free` (E,): edges without contacts; `poses`: number of poses checked, ends included."""
 
     free: Flags
     poses: int
@@ -34,7 +34,7 @@ class Checked:
 def check_edges(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Flags:
-    """Along which edges (E, 2) between poses q (V, n) rad nothing touches anything, (E,).
+    """Return which edges (E, 2) between poses q (V, n) rad are free of contacts, (E,) bool.
 
     Every vertex is looked at once.  Of each edge the middle comes first, and the first pose that touches is the last that is looked
     at; give each edge once, for it is the same in both directions.  Nearest to each other are edges in the order of a map's.
@@ -54,7 +54,7 @@ def check_edges(
 def checked(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Checked:
-    """What `check_edges` finds, and how many poses that took."""
+    """Return the result of `check_edges` and the number of poses checked."""
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
     checked_threads(threads)
@@ -72,7 +72,7 @@ def checked(
 
 
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
-    """How many poses there are between the ends of each edge (E, 2), (E,), when none of them is farther than a step from the next."""
+    """Return the number of poses between the ends of each edge (E, 2), (E,), so that none is farther than a step from the next."""
     far = np.zeros(len(edges))
     places = points(model, q, marker)
     for place in places:
@@ -82,7 +82,7 @@ def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
 
 
 def points(model: Model, q: Array, marker: str | None = None) -> Array:
-    """Where the marker is in poses q (V, n), (1, V, 3) m; None: where the middles of all shapes are that move with the motors."""
+    """Return the positions of the marker in poses q (V, n), (1, V, 3) m; None: of the centres of all shapes that motors move."""
     if marker is not None:
         model.robot.marker(marker)
     found = []
@@ -112,7 +112,7 @@ _MARGIN = 1e-6  # m
 
 
 class EdgeWatch:
-    """Which edges (E, 2) between poses q (V, n) rad are free, `free` (E,), in the world of the last `update`.
+    """Keeps `free` (E,) up to date: which edges (E, 2) between poses q (V, n) rad are free in the world of the last `update`.
 
     `step`, `marker`, `threads`: as of `check_edges`.
     """
@@ -132,7 +132,7 @@ class EdgeWatch:
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
-        """Check again what may be free no more, or again, in the world as it is now; returns the indices of those edges."""
+        """Check again the edges that a change of the world may affect; return their indices."""
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
         changed = _changed(old, new)
@@ -147,7 +147,7 @@ class EdgeWatch:
         return again
 
     def near(self, thing: WorldObject) -> Flags:
-        """Along which edges the robot may come to touch an object, (E,); along the others it cannot.
+        """Return along which edges the robot could touch an object, (E,) bool.
 
         A shape on its way is never farther from both of its ends than half of that way.
         """
@@ -159,7 +159,7 @@ class EdgeWatch:
 
 
 def apart(places: Array, thing: WorldObject) -> Array:
-    """How far places (N, 3) are from a free object, (N,) m, 0 within it."""
+    """Return the distances of points (N, 3) from a free object, (N,) m, 0 inside."""
     local = np.abs((places - thing.position) @ thing.rotation)
     size = thing.size
     if thing.kind == "box":
@@ -174,7 +174,7 @@ def apart(places: Array, thing: WorldObject) -> Array:
 
 
 def _changed(old: Snapshot, new: Snapshot) -> list[WorldObject]:
-    """The objects that can be touched and differ between two snapshots, as they were and as they are."""
+    """Return the objects that can be touched and differ between two snapshots, in both versions."""
     found = []
     for here, there in ((old.objects, new.objects), (new.objects, old.objects)):
         for name, one in here.items():

@@ -17,7 +17,7 @@ from mobee.roadmap.edges import check_edges
 
 
 def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
-    """Edges (E, 2) from each vertex to the `count` nearest of all others, by task coordinates y (V, m) in units of spacing.
+    """Return edges (E, 2) from each vertex to the `count` nearest others, by task coordinates y (V, m) in units of spacing.
 
     As of all edges the lower vertex comes first, each is there once, and they are sorted.
     """
@@ -36,7 +36,7 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
 
 def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
-    """Edges (E, 2) from each vertex to the `count` nearest of those found before it, as thesis Algorithm 4 joins them.
+    """Return edges (E, 2) from each vertex to the `count` nearest earlier ones, as in thesis Algorithm 4.
 
     So joined, a map is in one piece, and with as many neighbours as task coordinates it is made of simplices.
     """
@@ -53,7 +53,7 @@ def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
 
 def short(q: Array, edges: Ints, longest: float | None) -> Ints:
-    """The edges (E, 2) along which no motor turns by more than `longest` [rad]; None: all."""
+    """Return the edges (E, 2) along which no motor turns by more than `longest` [rad]; None: all."""
     if longest is None:
         return edges
     steps = np.abs(q[edges[:, 0]] - q[edges[:, 1]]).max(axis=1, initial=0.0)
@@ -62,14 +62,14 @@ def short(q: Array, edges: Ints, longest: float | None) -> Ints:
 
 
 def sorted_edges(pairs: ArrayLike) -> Ints:
-    """Pairs of vertices (P, 2) as the edges of a map: the lower vertex first, each once, sorted."""
+    """Return pairs of vertices (P, 2) as edges: the lower vertex first, without repetitions, sorted."""
     ordered = np.sort(np.asarray(pairs, dtype=np.intp).reshape(-1, 2), axis=1)
     return np.unique(ordered[ordered[:, 0] < ordered[:, 1]], axis=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Places q (V, n), and at each vertex its neighbours and how far they are."""
+    """Vertices at q (V, n), and for each vertex its neighbours and their distances."""
 
     q: Array
     neighbours: list[list[int]]
@@ -77,7 +77,7 @@ class Graph:
     components: Ints  # (V,) which connected part a vertex belongs to, the largest is 0
 
     def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
-        """The vertices of the shortest way from one to the other, both included; None where there is none.
+        """Return the vertices of the shortest path from one to the other, both included; None if there is no path.
 
         `without`: edges that are not gone, the lower vertex first.
         """
@@ -107,7 +107,7 @@ class Graph:
 
 
 def graph(q: Array, edges: Ints) -> Graph:
-    """The graph of undirected edges (E, 2) between places q (V, n); an edge is as long as its straight line."""
+    """Return the graph of undirected edges (E, 2) between vertices q (V, n), with Euclidean lengths."""
     count = len(q)
     ends = np.concatenate([edges, edges[:, ::-1]])
     order = np.lexsort((ends[:, 1], ends[:, 0]))
@@ -120,7 +120,7 @@ def graph(q: Array, edges: Ints) -> Graph:
 
 
 def components(count: int, edges: Ints) -> Ints:
-    """Which connected part each of `count` vertices belongs to, (count,): 0 is the largest, of equal ones that of the first vertex."""
+    """Return the number of the connected part of each vertex, (count,): 0 is the largest, of equal ones that of the first vertex."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -138,7 +138,7 @@ LAZY = 30  # searches after which all the edges that are left are checked at onc
 
 
 def free_way(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
-    """The vertices of a free way from the posture `start` (n,) rad over the map, by the first of its vertices that can be reached.
+    """Return the vertices of a path without contacts from the posture `start` (n,) rad, by the nearest vertex that can be reached.
 
     `to_enter`, `to_leave`: (V,) how far each vertex is from the start, and from the goal; infinite: it is none.  Raises MobeeError
     where no way is free, with why.
@@ -165,7 +165,7 @@ def free_way(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Ar
 
 
 class _Search:
-    """Shortest ways over edges of which it is found out one after the other whether they are free."""
+    """Finds shortest paths over edges that are checked for contacts only when a path needs them."""
 
     def __init__(self, model: Model, roads: Graph, edges: Ints) -> None:
         self._model, self._graph, self._edges = model, roads, edges
@@ -183,7 +183,7 @@ class _Search:
         return None if self._known is None else self._known.shortest(start, goal)
 
     def _lazily(self, start: int, goal: int) -> list[int] | None:
-        """A free way, or None if there is none, or if it is quicker to check all."""
+        """Return a path without contacts; None if there is none, or if checking all edges is faster."""
         while self._searches < LAZY and (way := self._graph.shortest(start, goal, self.touching)) is not None:
             steps = {(min(a, b), max(a, b)) for a, b in zip(way, way[1:], strict=False)}
             if steps <= self._free:
@@ -202,7 +202,7 @@ class _Search:
         return [(min(vertex, other), max(vertex, other)) for other in self._graph.neighbours[vertex]]
 
     def _check(self, edges: set[tuple[int, int]]) -> list[tuple[int, int]]:
-        """Find out about edges; returns those that turn out to touch something."""
+        """Check edges; return those that have contacts."""
         unknown = sorted(edges - self._free - self.touching)
         if not unknown:
             return []

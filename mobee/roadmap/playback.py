@@ -24,7 +24,7 @@ _SAME = 1e-9  # rad
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Where the motors are to be: q, velocity and acceleration (T, n) rad, rad/s, rad/s^2 at times (T,) s; at rest at both ends."""
+    """A planned motion: q, velocity, acceleration (T, n) rad, rad/s, rad/s^2 at times (T,) s; at rest at both ends."""
 
     times: Array
     q: Array
@@ -33,7 +33,7 @@ class Reference:
 
 
 def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """The motion along a path (K, n) rad within the motors' speeds (n,) rad/s and accelerations (n,) rad/s^2, a row each dt s.
+    """Return the motion along a path (K, n) rad within the motors' speeds (n,) rad/s and accelerations (n,) rad/s^2, a row each dt s.
 
     `rounding`: how far before and behind a corner [rad, of all motors together] the motion leaves the path, at most half way to the
     next; it passes the corner in half that distance or less.  0: it stops there instead.
@@ -62,7 +62,7 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
 
 
 def rounded(corners: ArrayLike, rounding: float) -> Array:
-    """Places along a path (K, n), about STEP apart, (S, n): straight, with a parabola at each corner."""
+    """Return points along a path (K, n), about STEP apart, (S, n): straight lines with a parabola at each corner."""
     points = real_array("corners", corners)
     ways = np.diff(points, axis=0)
     far = np.linalg.norm(ways, axis=1)
@@ -92,7 +92,7 @@ def _line(start: Array, end: Array) -> Array:
 
 
 def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tuple[Array, Array, Array]:
-    """A motion over places (S, n), as fast as the limits let it: q, velocity and acceleration (T, n), a row each dt s."""
+    """Return the fastest motion over points (S, n) within the limits: q, velocity and acceleration (T, n), a row each dt s."""
     from scipy.interpolate import CubicHermiteSpline
 
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -123,7 +123,7 @@ def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tup
 
 
 def _speeds(ways: Array, tangent: Array, bend: Array, speeds: Array, accelerations: Array) -> Array:
-    """How fast the path may be gone at each of its places (S,): half of each acceleration is for bends, half for gaining speed."""
+    """Return the largest speed at each point of the path (S,): half of each acceleration is used for bends, half for changes of speed."""
     half = 0.5 * accelerations
     with np.errstate(divide="ignore"):
         limit = np.minimum((speeds / np.abs(tangent)).min(axis=1) ** 2, (half / np.abs(bend)).min(axis=1))
@@ -156,7 +156,7 @@ _HARD = 0.8  # of its largest force: what a spring gives at most to follow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """What a robot did on a path, a row a tick.
+    """The motion of a robot along a path, a row per tick.
 
     `wanted`, `q`: (T, n) rad, where it was to be and where it was; `solid`, `field`: (T,) m, the deepest contacts; `rested`: it came to
     rest; `deepest`: what touched what where `solid` was largest.
@@ -172,17 +172,17 @@ class Played:
 
     @property
     def lag(self) -> float:
-        """The largest difference of a motor of the path from where it was to be at that moment, rad."""
+        """Largest distance of a motor from its planned position at the time [rad]."""
         return float(np.abs(self._q - self._wanted).max())
 
     @property
     def missing(self) -> float:
-        """The largest difference of a motor of the path from the path's end, at the end, rad."""
+        """Largest distance of a motor from its goal at the end [rad]."""
         return float(np.abs(self._q[-1] - self._wanted[-1]).max())
 
     @property
     def off(self) -> float:
-        """How far it came from the path, whenever it was to be there: the largest difference of a motor of the path, rad."""
+        """Largest distance of a motor from the path, at any time [rad]."""
         from scipy.spatial import KDTree
 
         return float(KDTree(self._wanted).query(self._q, p=np.inf)[0].max())
@@ -204,7 +204,7 @@ class Played:
 def play(
     model: Model, path: ArrayLike, speed: float = SPEED, rounding: float = ROUNDING, gains: Gains | None = None, seed: int = 0
 ) -> Played:
-    """Have the offline plant follow a path (K, n) rad from its first pose, at rest, until it rests behind it.
+    """Move the offline plant along a path (K, n) rad from its first pose, until it comes to rest.
 
     Args:
         model: the robot in its world.
@@ -241,7 +241,7 @@ def play(
 
 
 def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: bool) -> Played:
-    """What was played elsewhere, by the poses q (T, n) rad that were seen at times (T,) s."""
+    """Return the result of a motion that was observed as poses q (T, n) rad at times (T,) s."""
     depths = np.zeros((2, len(q)))  # solids, fields
     table = model.track().evaluate(q).table
     np.maximum.at(depths, (table.kind, table.pose), table.depth)
@@ -249,7 +249,7 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
-    """The solid contacts in the one of the poses q (T, n) in which they are deepest, solid (T,) m."""
+    """Return the solid contacts of that pose of q (T, n) in which they are deepest; solid: (T,) m."""
     worst = int(solid.argmax())
     if not solid[worst] > 0.0:
         return ()
@@ -257,7 +257,7 @@ def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
 
 
 def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """The reference along a path (K, n) rad that the springs of the attractor can follow, at a share of their speed."""
+    """Return the motion along a path (K, n) rad that the attractor's springs can follow, at a share of their speed."""
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
     strength, damping = (gains.of_robot(name, robot) for name in ("max_spring", "damping"))
@@ -267,7 +267,7 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
 
 
 def attractors(robot: Robot, wanted: Reference, gains: Gains) -> Iterator[Array]:
-    """Where the attractor is every PERIOD, (n,) rad each: so far ahead that the law's spring gives what the motion takes (eq. 5.7).
+    """Yield the attractor (n,) rad every PERIOD: so far ahead that the spring of the law produces the motion (eq. 5.7).
 
     The last is the reference's end.  A motor that has not to move keeps its place.
     """
@@ -280,23 +280,23 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains) -> Iterator[Array]
 
 
 def at(wanted: Reference, times: Array) -> Array:
-    """Where the motors are to be at times (T,) s, (T, n) rad; behind the end, at the end."""
+    """Return the planned positions at times (T,) s, (T, n) rad; after the end, those at the end."""
     return np.stack([np.interp(times, wanted.times, column) for column in wanted.q.T], axis=1)
 
 
 def moving(robot: Robot, path: Array) -> tuple[str, ...]:
-    """The parts of which some motor moves along a path (K, n)."""
+    """Return the parts that a path (K, n) moves."""
     moves = np.ptp(path, axis=0) > 0.0
     return tuple(name for name, part in robot.parts.items() if moves[part.slice].any())
 
 
 def standing(robot: Robot, q: Array) -> Robot:
-    """The robot with another home, q (n,) rad, where an offline plant begins."""
+    """Return the robot with home q (n,) rad, where an offline plant begins."""
     return replace(robot, motor_table=tuple(replace(motor, home=float(x)) for motor, x in zip(robot.motor_table, q, strict=True)))
 
 
 def _within(robot: Robot, path: ArrayLike) -> Array:
-    """The path, if the robot can be there; encoders may say a hair's breadth more than the limits."""
+    """Return the path clipped to the limits; raises InvalidValue if it is more than 0.01 rad beyond them."""
     given, n = real_array("path", path), len(robot.motors)
     if given.ndim != 2 or given.shape[1] != n or not len(given):
         raise InvalidValue(f"path has shape {given.shape}; it must be (K, {n}) rad.")

@@ -1,4 +1,4 @@
-"""Finds reachable places and poses for a marker by inverse kinematics."""
+"""Finds reachable positions and poses of a marker by inverse kinematics."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STARTS = 23  # random ones
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The posture (n,) rad whose marker is nearest to a place, where the marker is then, (3,) m, and how far from the place [m]."""
+    """A posture (n,) rad that brings the marker nearest to a target, the marker's position (3,) m, and its distance [m]."""
 
     q: Array
     position: Array
@@ -33,7 +33,7 @@ class Nearest:
 
 
 def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
-    """The posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
+    """Return the posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
 
     Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`: nothing keeps it from
     touching, and what it finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker, or
@@ -49,7 +49,7 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
 
 
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
-    """The link in whose solid shapes `position` (3,) m lies in the posture q (n,) rad, of those that the part does not move; or None."""
+    """Return the link, not moved by the part, in whose solid shapes `position` (3,) m lies in posture q (n,) rad; None without one."""
     robot, world = model.robot, World()
     world.add("place", sphere(POINT), position=position)
     table = Model(robot, world).evaluate(q).table
@@ -59,7 +59,7 @@ def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
 
 
 def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Array) -> Array | None:
-    """About the nearest place to `position` (3,) m that is outside the body, see `body_at`, and to which the part can bring the marker.
+    """Return approximately the nearest point to `position` (3,) m outside the body, see `body_at`, that the marker can reach.
 
     Within FAR, on shells that are SHELL apart; None if there is none.
     """
@@ -75,7 +75,7 @@ def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Ar
 
 
 def _movers(model: Model, part: str, marker: str) -> Ints:
-    """The part's motors that move the marker."""
+    """Return the part's motors that move the marker."""
     robot = model.robot
     where = robot.part(part)
     rows = np.abs(model.jacobian(np.stack([robot.home, robot.limits.mean(axis=1)]), marker)).max(axis=(0, 1))

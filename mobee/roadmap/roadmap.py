@@ -18,16 +18,16 @@ from mobee.roadmap.ik.problem import chosen
 from mobee.robot.load import load_robot, shipped_robots
 from mobee.robot.robot import Robot
 
-NEAR = 1.5  # spacings: a goal further from all vertices is not of the map
+MAX_GOAL_DISTANCE = 1.5  # spacings: a goal further from all vertices is outside the map
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Roadmap:
     """A graph of poses.
 
-    `q`: (V, n) rad, all motors.  `y`: (V, m), the task coordinates, in their units.  `edges`: (E, 2) vertices, the first the lower
-    one, sorted.  `spacing`: (m,).  `settings`: how it was made, plain JSON; with "motors", the names of those that moved, and "names",
-    those of the task coordinates, where they are known.
+    `q`: (V, n) rad, all motors.  `y`: (V, m) task coordinates in their units.  `edges`: (E, 2) vertices, sorted, the lower one first.
+    `spacing`: (m,).  `settings`: the settings of the builder as plain JSON values; "motors" are the names of the motors that may move,
+    "names" those of the task coordinates, if they are known.
     """
 
     model: Model  # robot and world it belongs to
@@ -39,7 +39,7 @@ class Roadmap:
     graph: Graph = field(init=False)
 
     def __post_init__(self) -> None:
-        """Check that the arrays belong together; raises InvalidValue."""
+        """Check that the arrays fit together; raises InvalidValue."""
         n, m = len(self.model.robot.motors), len(self.spacing)
         if self.q.shape != (len(self.q), n) or self.y.shape != (len(self.q), m) or self.edges.shape != (len(self.edges), 2):
             shapes = f"q {self.q.shape}, y {self.y.shape}, edges {self.edges.shape}"
@@ -52,25 +52,25 @@ class Roadmap:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the task coordinates."""
+        """Names of the task coordinates."""
         return tuple(self.settings.get("names") or (f"y{k + 1}" for k in range(len(self.spacing))))
 
     @property
     def motors(self) -> tuple[str, ...]:
-        """Those that moved when it was made; the others are at the same place in every pose."""
+        """Names of the motors that may move; the others have the same position in every pose."""
         known = self.settings.get("motors")
         return self.model.robot.motors if known is None else tuple(known)
 
     def entry(self, q_from: ArrayLike) -> int:
-        """The vertex nearest to a posture (n,) rad, in fractions of the ranges of the motors that moved."""
+        """Return the vertex nearest to a posture (n,) rad, in fractions of the ranges of `motors`."""
         return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
-        """The vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than NEAR of them."""
+        """Return the vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than MAX_GOAL_DISTANCE."""
         return int(self._to(y_goal).argmin())
 
     def way(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
-        """The vertices of the `path`, from that at which the map is entered to that at which it is left."""
+        """Return the vertices of the `path`, from the first to the last one in the map."""
         if free:
             return free_way(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
         start, goal = self.entry(q_from), self.exit(y_goal)
@@ -80,30 +80,30 @@ class Roadmap:
         return way
 
     def path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> Array:
-        """Poses (K, n) rad from the posture q_from (n,) over the map to the vertex nearest to y_goal (m,), by the shortest way.
+        """Return the shortest path through the map from a posture to the vertex nearest to a goal, as poses (K, n) rad.
 
-        Straight lines lead from each to the next; the first, from q_from to its nearest vertex, is none of the map's own.
+        Poses are joined by straight lines; the first line, from q_from to the nearest vertex, is not an edge of the map.
 
         Args:
             q_from: (n,) rad.
             y_goal: (m,), in the units of the coordinates.
-            free: only where nothing touches in the world as it is now: edges that do are gone round, and so is a first step, by the next
-                nearest vertices, and a last pose, by those as near as NEAR spacings.  Edges are checked when a way needs them.
+            free: return only a path without contacts in the present world.  Edges are checked when a path needs them.  If the first line
+                or the last pose has contacts, other near vertices are tried: at the goal those within MAX_GOAL_DISTANCE.
 
         Raises:
-            InvalidValue: the map is empty, or has nothing near the goal; says what is.
-            MobeeError: the two are in parts of the map that no edge connects, or no way is free.
+            InvalidValue: the map is empty, or has no vertex near the goal.
+            MobeeError: start and goal are in unconnected parts of the map, or every path has contacts.
         """
         start = self._posture(q_from)
         poses = self.q[self.way(start, y_goal, free)]
         return poses if np.array_equal(start, poses[0]) else np.concatenate([start[None], poses])
 
     def __repr__(self) -> str:
-        """In one line."""
+        """Return a description in one line."""
         return f"Roadmap({len(self.q)} poses, {len(self.edges)} edges, {self.model.robot.name!r}: {', '.join(self.names)})"
 
     def save(self, path: str | Path) -> None:
-        """Write it to a .npz file, whole or not at all; raises MobeeError."""
+        """Write the roadmap to a .npz file, whole or not at all; raises MobeeError."""
         model = self.model
         write(
             path,
@@ -112,7 +112,7 @@ class Roadmap:
         )
 
     def told(self, y: Array) -> str:
-        """Task coordinates (m,) in words."""
+        """Return task coordinates (m,) with their names as text."""
         return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
     def _posture(self, given: ArrayLike) -> Array:
@@ -123,7 +123,7 @@ class Roadmap:
         return q
 
     def _from(self, q_from: ArrayLike) -> Array:
-        """How far every vertex is from a posture (n,) rad, (V,), see `entry`."""
+        """Return the distance of every vertex from a posture (n,) rad, (V,), see `entry`."""
         start = self._posture(q_from)
         free = chosen(self.model.robot, self.motors)
         low, high = self.model.robot.limits[free].T
@@ -131,19 +131,19 @@ class Roadmap:
         return apart
 
     def _to(self, y_goal: ArrayLike) -> Array:
-        """How far every vertex is from task coordinates (m,), (V,) spacings, infinite beyond NEAR of them."""
+        """Return the distance of every vertex from task coordinates (m,), (V,) spacings; infinite beyond MAX_GOAL_DISTANCE."""
         goal, m = np.atleast_1d(real_array("y_goal", y_goal)), len(self.spacing)
         if goal.shape != (m,) or not np.isfinite(goal).all():
             raise InvalidValue(f"y_goal has shape {goal.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")
         self._require_vertices()
         apart: Array = np.linalg.norm((self.y - goal) / self.spacing, axis=1)
         nearest = int(apart.argmin())
-        if apart[nearest] > NEAR:
+        if apart[nearest] > MAX_GOAL_DISTANCE:
             raise InvalidValue(
                 f"nothing of the map is at {self.told(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
-                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {NEAR:g} spacings of one."
+                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {MAX_GOAL_DISTANCE:g} spacings of one."
             )
-        return np.where(apart > NEAR, np.inf, apart)
+        return np.where(apart > MAX_GOAL_DISTANCE, np.inf, apart)
 
     def _require_vertices(self) -> None:
         if not len(self.q):
@@ -160,12 +160,15 @@ class Roadmap:
 
 
 def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | None = None) -> Roadmap:
-    """The map of a file, for the robot and the world that it was made for.
+    """Load a roadmap from a file.
 
-    `model` None: in the world as it was then, for this robot; `robot` None: the one that comes with mobee under the name in the map.
+    Args:
+        path: of the .npz file.
+        model: robot and world, which must be those of the roadmap; None: load them too.
+        robot: without a model, the robot of the roadmap; None: the shipped robot of the recorded name.
 
     Raises:
-        MobeeError: no map, not a whole one, or one of another robot or world, with the digests of both.
+        MobeeError: the file is not a complete roadmap, or belongs to another robot or world; the message has the digests of both.
     """
     arrays, notes = read(path)
     try:
@@ -184,7 +187,7 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
 
 
 def digests(model: Model) -> dict[str, str]:
-    """What the settings of a map say of the robot and the world it was made for."""
+    """Return the settings that identify the robot and the world of a roadmap."""
     return {
         "robot": model.robot.name,
         "robot_digest": robot_digest(model.robot),
@@ -214,5 +217,5 @@ def _require_same(path: str | Path, settings: dict[str, Any], model: Model) -> N
 
 
 def _short(value: float) -> str:
-    """Four digits behind the point, without those that say nothing."""
+    """Format a number with at most four decimals, without trailing zeros."""
     return f"{round(float(value), 4) + 0.0:.4f}".rstrip("0").rstrip(".")

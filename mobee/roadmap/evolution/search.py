@@ -17,7 +17,7 @@ _NEGLIGIBLE = 1e-12
 
 
 class Searches:
-    """Search distributions (L of them) over d coordinates; the arrays are all there is to them.
+    """L search distributions over d coordinates; the arrays are their whole state.
 
     `mean` (L, d), `sigma` (L,), `shape` (L, d, d), `path` (L, d), `age` (L,) generations since they began.
     """
@@ -32,17 +32,17 @@ class Searches:
         self._rates = path_rates(dimensions, population)
 
     def begin(self, number: int, mean: Array, std: float) -> None:
-        """Begin a search anew, from a mean (d,) with the same standard deviation everywhere."""
+        """Start a search from a mean (d,) with the same standard deviation in all coordinates."""
         self.mean[number], self.sigma[number], self.age[number] = mean, std, 0
         self.shape[number], self.path[number] = np.eye(len(mean)), 0.0
 
     def ask(self, which: Ints, z: Array) -> Array:
-        """The samples (k, population, d) of some searches (k,), from standard normal ones z of the same shape."""
+        """Return samples (k, population, d) of searches (k,), from standard normal samples z of the same shape."""
         samples: Array = self.mean[which, None] + self.sigma[which, None, None] * (z @ self.shape[which].transpose(0, 2, 1))
         return samples
 
     def tell(self, which: Ints, z: Array, costs: Array) -> None:
-        """Let the searches (k,) follow the costs (k, population) of what they asked for, see `NES.tell`."""
+        """Update searches (k,) with the costs (k, population) of their samples, see `NES.tell`."""
         rates, d = self._rates, z.shape[-1]
         z = np.take_along_axis(z, np.argsort(costs, axis=1, kind="stable")[:, :, None], axis=1)
         shape, sigma = self.shape[which], self.sigma[which]
@@ -62,7 +62,7 @@ class Searches:
 
 
 def _series(a: Array) -> Array:
-    """(exp(a) - 1) / a of matrices (k, d, d) by Taylor's series, see `shapes`."""
+    """Return (exp(a) - 1) / a of matrices (k, d, d) by Taylor series."""
     norm, size, power = math.sqrt(float((a * a).sum(axis=(1, 2)).max())), 1.0, 1
     term = np.broadcast_to(np.eye(a.shape[-1]), a.shape)
     total = term.copy()
@@ -74,16 +74,16 @@ def _series(a: Array) -> Array:
     return total
 
 
-PENALTY = 100.0  # of a sample that was moved back into the box: times its squared way in box widths
+PENALTY = 100.0  # on the cost of a sample that was moved into the box: times its squared distance in box widths
 EVALUATIONS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """When a search begins anew, in turn from a random place of the box and from its start.
+    """When a search restarts, alternately at a random point of the box and at its start.
 
-    `std`: the largest standard deviation has fallen below this share of the box; `gain`: that many generations (`patience`) have
-    not lowered the best cost by this share.
+    `std`: restart if the largest standard deviation is below this share of the box.  `patience`, `gain`: restart if so many generations
+    have not lowered the best cost by this share.
     """
 
     std: float = 1e-3
@@ -93,7 +93,7 @@ class Restart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Minimum:
-    """The best sample x (d,), its cost, how many were evaluated, and how often the search began (1: no restart)."""
+    """The best sample x (d,), its cost, the number of evaluations, and the number of starts (1: no restart)."""
 
     x: Array
     cost: float
@@ -102,15 +102,15 @@ class Minimum:
 
 
 class Search:
-    """`ask` gives a generation inside the box, `tell` takes its costs; the best sample of all is kept.
+    """A search in a box: `ask` returns a generation, `tell` takes its costs; the best sample of all is kept.
 
     Args:
         start, std, population, method, seed: as of NES.
-        limits: (d, 2) box that no sample leaves: those outside are moved to its border, and cost more for it.  None: no box.
-        restart: when to begin anew; needs limits.  None: never.
+        limits: (d, 2) box; samples outside are moved to its border, at an additional cost.  None: no box.
+        restart: when to restart; needs limits.  None: never.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is not valid; the message says what is.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Search:
         self.starts = 1
 
     def ask(self) -> Array:
-        """The next generation, (population, d), inside the box."""
+        """Return the next generation, (population, d), inside the box."""
         places = self._nes.ask()
         if not self._boxed:
             self._asked = places
@@ -158,7 +158,7 @@ class Search:
         return self._asked
 
     def tell(self, costs: ArrayLike) -> None:
-        """Follow the costs (population,) of the samples that `ask` gave; begins anew where the search is stuck."""
+        """Update the search with the costs (population,) of the samples of `ask`; restart it if it is stuck."""
         values = np.asarray(costs, dtype=np.float64)
         self._nes.tell(values + PENALTY * self._beyond)
         self.evaluations += len(values)
@@ -194,9 +194,9 @@ def minimize(
     method: Method = "full",
     seed: int | np.random.Generator = 0,
 ) -> Minimum:
-    """The best sample found when one costs no more than the target, or when another generation would pass the number of evaluations.
+    """Minimise a cost until a sample costs no more than the target, or until the number of evaluations is used up.
 
-    `cost` takes samples (population, d) and returns their costs (population,); the rest is as of Search.
+    `cost` takes samples (population, d) and returns their costs (population,); the other arguments are those of Search.
     """
     search = Search(start, std, limits, restart, population, method, seed)
     while search.best_cost > target:
@@ -208,7 +208,7 @@ def minimize(
 
 
 def _box(limits: ArrayLike, start: Array) -> tuple[Array, Array]:
-    """Its low and its high corner."""
+    """Return the low and the high corner of the box; raises InvalidValue."""
     box = np.array(limits, dtype=np.float64)
     if box.shape != (*start.shape, 2) or not np.isfinite(box).all() or not (box[:, 0] < box[:, 1]).all():
         raise InvalidValue(

@@ -21,7 +21,7 @@ _EXACT = 1e-6  # m or rad, for a term that is without tolerance
 
 
 class Descent:
-    """Least squares of a problem's aims, and of others besides, from any starts; the others' goals may differ from start to start.
+    """Damped least squares on a problem's aims and on other aims, from many starts; the goals of the others may differ per start.
 
     `threads` share the starts; the results are the same for any number.
     """
@@ -43,24 +43,24 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Which of the motors that may move (d,) are to be random in a random start, see `needed`."""
+        """Which of the motors that may move (d,) are random in a random start, see `needed`."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
-        """Where poses q (B, n), within the limits, lead to that meet every aim, (K, n); goals: as of `ends`."""
+        """Return the solutions (K, n) from poses q (B, n) that meet every aim; goals: as of `ends`."""
         ends, met = self.met(q, goals)
         return ends[met]
 
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
-        """Where poses q (B, n), within the limits, lead to, (B, n), and which of them meet every aim, (B,); goals: as of `ends`."""
+        """Return the solutions (B, n) from poses q (B, n), and which of them meet every aim, (B,); goals: as of `ends`."""
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
         return ends, met
 
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
-        """Where poses q (B, n), within the limits, lead to, (B, n), and what every aim misses there, (B, aims) m or rad.
+        """Return the solutions (B, n) from poses q (B, n) within the limits, and the residuals of every aim, (B, aims) m or rad.
 
-        `goals`: what the aims besides the problem's own are to be at each start, (B, reals of those), see `aim_reals`; None: as given.
+        `goals`: numbers of the other aims for each start, (B, reals of these), see `aim_reals`; None: as given to the constructor.
         """
         from mobee._core.least_squares import descend  # loads the core: not before somebody asks
         from mobee.model.engine import robot_handle
@@ -77,7 +77,7 @@ class Descent:
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
-    """A pose (n,) within all tolerances, the cheapest of those found at once; None where there are no aims, or none was found."""
+    """Return a pose (n,) within all tolerances, the cheapest of those found at once; None if there are no aims or none was found."""
     descent = Descent(problem)
     if not descent.count:
         return None
@@ -91,14 +91,14 @@ def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
                 return found
         if left <= 0:
             return None
-        # What no term asks for stays at the start as long as that will do; then it may be what touches, as a thumb above a table.
+        # Motors that affect no term stay at the start at first; later they move too, since they may cause contacts, as a thumb does.
         which = descent.drawn if left > RESTARTS // 2 else np.ones_like(descent.drawn)
         starts = problem.whole(_drawn(problem, rng, min(AT_ONCE, left), which))
         left -= AT_ONCE
 
 
 def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags) -> Array:
-    """Starts of the free motors (count, d), in turn anywhere and about the start; some motors (d,) alone, the others stay there."""
+    """Draw starts of the free motors (count, d), alternately around the start and anywhere; only of some motors (d,)."""
     low, high = problem.limits.T
     start = problem.start[problem.free]
     drawn = rng.uniform(low, high, (count, len(low)))
@@ -109,7 +109,7 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags)
 
 
 def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
-    """All that the core wants to know of aims in real numbers, REALS each, one after the other; with how much each may miss."""
+    """Return the real numbers of aims and their tolerances as the core reads them, REALS for each aim, one after the other."""
     return np.concatenate([_reals(aim, tolerance) for aim, tolerance in aims]) if aims else np.empty(0)
 
 
@@ -119,7 +119,7 @@ def _reals(aim: Aim, tolerance: float | None) -> Array:
 
 
 def _numbers(robot: Robot, aims: Sequence[Aim]) -> Ints:
-    """Kind, links and motor of each aim, (K, 4)."""
+    """Return kind, links and motor of each aim, (K, 4)."""
     found = [(aim.kind, aim.first_link, aim.second_link, aim.motor) for aim in aims]
     valid = len(KINDS), len(robot.links), len(robot.links), len(robot.motors)
     for one in found:

@@ -25,10 +25,10 @@ POPULATION = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IK:
-    """The pose that was found.
+    """The result of `solve_ik`.
 
-    `q`: (n,) rad.  `reached`: every term is within its tolerance, by another evaluation of q.  `residuals`: what each term misses, by
-    its name.  `evaluations`: how many poses were looked at.  `table`: all its contacts, those of fields too.
+    `q`: (n,) rad.  `reached`: every term is within its tolerance, by another evaluation of q.  `residuals`: of each term, by name.
+    `evaluations`: number of evaluated poses.  `table`: all contacts of the pose, fields included.
     """
 
     q: Array
@@ -52,22 +52,22 @@ def solve_ik(
     method: Literal["hybrid", "nes", "least_squares"] = "hybrid",
     evaluations: int = EVALUATIONS,
 ) -> IK:
-    """A pose whose terms are all within their tolerances, or the cheapest of those looked at (thesis eq. 3.1).
+    """Find a pose whose terms are all within their tolerances, or else the cheapest pose found (thesis eq. 3.1).
 
-    The search ends with the first pose that is good enough.  Where no term has a tolerance it goes on until it has converged.
+    The search ends with the first pose within all tolerances.  If no term has a tolerance it ends when it has converged.
 
     Args:
-        model: whose solids are felt, in its world as it is now.
+        model: robot and world; contacts are those of solids.
         costs: terms of mobee.costs, and plain functions of pose and contacts, see mobee.costs.term.
-        start: (n,) rad, where the search begins, and what the motors that may not move keep; None: home.
-        seed: of all that is drawn.
+        start: (n,) rad, where the search begins, and the posture of the motors that may not move; None: home.
+        seed: of the random numbers.
         motors: names of parts and motors that may move; None: all.
         method: "nes": by an evolution strategy, whatever the terms are; "least_squares": damped least squares with restarts on the terms
-            that have a derivative, accepted where the others agree; "hybrid": least squares, and what it misses by evolution.
-        evaluations: how many poses the evolution strategy may look at.
+            that have a derivative, accepted if the others are within their tolerances; "hybrid": least squares, then evolution if it fails.
+        evaluations: largest number of poses that the evolution strategy evaluates.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is not valid; the message says what is.
     """
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
@@ -82,7 +82,7 @@ def solve_ik(
 
 
 def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
-    """The first generation's best that is within all tolerances; else the cheapest of all poses looked at."""
+    """Return the first pose found within all tolerances, or else the cheapest of all evaluated poses."""
     start = problem.start[problem.free]
     costs, good = problem.evaluate(problem.start[None])
     if good[0] and problem.must:
@@ -101,7 +101,7 @@ def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
 
 
 def _result(model: Model, problem: Problem, q: Array) -> IK:
-    """Told by another evaluation, of the whole model."""
+    """Return the result, from another evaluation of the whole model."""
     pose = model.evaluate(q[None])
     missing = {name: float(one.residual(pose)[0]) for name, one in problem.by_name.items()}
     reached = all(one.tolerance is None or missing[name] <= one.tolerance for name, one in problem.by_name.items())

@@ -22,7 +22,7 @@ _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 def solid_model(model: Model) -> Model:
-    """The model without fields, in the same world; the same as before for the same model."""
+    """Return the model without fields, in the same world; cached per model."""
     known = _KNOWN.get(model)
     if known is None:
         known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
@@ -31,7 +31,7 @@ def solid_model(model: Model) -> Model:
 
 @per_robot
 def solid_robot(robot: Robot) -> Robot:
-    """The robot without its fields."""
+    """Return the robot without its fields."""
     kept = [index for index, shape in enumerate(robot.shapes) if shape.role == "solid"]
     number = {index: k for k, index in enumerate(kept)}
     pairs = [(number[int(a)], number[int(b)]) for a, b in robot.solid_pairs]
@@ -46,14 +46,14 @@ def solid_robot(robot: Robot) -> Robot:
 
 Flags = NDArray[np.bool_]
 
-PROBES = 3  # random poses in which a motor is moved, to see whether a term feels it
-_FELT = 1e-9
+PROBES = 3  # random poses in which a motor is moved, to see whether it affects a term
+_MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Of the motors that may move, those (d,) that move an aim or are felt by a term that has none, as a plain function of a finger.
+    """Return which of the motors that may move affect an aim, or a term without aims such as a plain function, (d,) bool.
 
-    Contacts do not count: that a finger could touch is no reason to spread it.
+    Contacts do not count: a random finger posture only adds contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
@@ -66,12 +66,12 @@ def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
     pose = problem.model.evaluate(problem.whole(drawn.reshape(-1, len(low))))
     for one in others:
         said = one.residual(pose).reshape(PROBES, -1)
-        moves[still[(np.abs(said[:, 1:] - said[:, :1]) > _FELT).sum(axis=0) > 0]] = True
+        moves[still[(np.abs(said[:, 1:] - said[:, :1]) > _MIN_EFFECT).sum(axis=0) > 0]] = True
     return moves
 
 
 def _movers(robot: Robot, aims: Iterable[Aim]) -> Flags:
-    """The motors (n,) before the links of aims, and those that are aims themselves."""
+    """Return the motors (n,) that move the links of aims, and those that are aims themselves."""
     scale = robot.coupling[0]
     moves = np.zeros(len(robot.motors), dtype=bool)
     for aim in aims:
@@ -88,7 +88,7 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 
 
 class Problem:
-    """The terms of a cost over some motors, the others as at the start; counts how many poses were evaluated."""
+    """The terms of a cost over some motors, the others stay at the start; counts the evaluated poses."""
 
     def __init__(
         self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None, margin: float = 0.0
@@ -107,13 +107,13 @@ class Problem:
         self.evaluations = 0
 
     def whole(self, samples: Array) -> Array:
-        """All motors (N, n) from the free ones (N, d)."""
+        """Return all motors (N, n) from the free ones (N, d)."""
         q = np.repeat(self.start[None], len(samples), axis=0)
         q[:, self.free] = samples
         return q
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """The cost of poses q (N, n), (N,), and which of them are within all tolerances, (N,) bool."""
+        """Return the costs (N,) of poses q (N, n), and which are within all tolerances, (N,) bool."""
         pose = self.model.evaluate(q)
         self.evaluations += len(q)
         total, good = np.zeros(len(q)), np.ones(len(q), dtype=bool)
@@ -126,7 +126,7 @@ class Problem:
 
 
 def _within(limits: Array, margin: float) -> Array:
-    """The limits (d, 2) less a margin at both ends, but no more than a quarter of a range."""
+    """Return the limits (d, 2) reduced by a margin at both ends, at most by a quarter of a range."""
     if not (np.isfinite(margin) and margin >= 0.0):
         raise InvalidValue(f"margin {margin!r} rad: must be finite and at least 0.")
     kept = np.minimum(margin, 0.25 * (limits[:, 1] - limits[:, 0]))
@@ -134,7 +134,7 @@ def _within(limits: Array, margin: float) -> Array:
 
 
 def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:
-    """Indices of the motors that may move, (d,), of their names or those of parts; None: all."""
+    """Return the indices of motors (d,) from the names of motors and parts; None: all."""
     if motors is None:
         return np.arange(len(robot.motors))
     if isinstance(motors, str):
@@ -154,7 +154,7 @@ def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:
 
 
 def named(terms: Sequence[Term]) -> dict[str, Term]:
-    """The terms by name; of equal names the later ones get a number."""
+    """Return the terms by name; equal names get a number."""
     found: dict[str, Term] = {}
     for one in terms:
         name, number = one.name, 1
