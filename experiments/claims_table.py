@@ -33,7 +33,7 @@ An experiment is one module in `claims/`, by chapter of the thesis: its docstrin
 intervals, unless stated otherwise; the last column has the number of seeds.
 
 A sweep (`--seeds N`) uses all cores; each finished cell is written to disk, and `--resume` continues after Ctrl-C or a kill.
-`--engine ray` (`pip install '.[cluster]'`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
+`--engine ray` (`pip install "mobee[cluster]"`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
 is none; MoBeE must be installed on all of them in the same version. `--quick` runs a short version, to check that it works.
 
 **confirmed**: our number agrees with the publication. **refuted**: it does not. **open**: it was not measured, does not decide, or has

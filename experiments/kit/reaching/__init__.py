@@ -1,1 +1,1 @@
-"""What the experiments on reaching share: targets, the scene, the truth about both, and what is learned of them."""
+"""Shared by experiments on reaching: the arm, its targets, learners, the planner peer, and measured true outcomes."""

@@ -16,6 +16,6 @@ def test_numbers_are_read() -> None:
     [(positive_whole, "0"), (positive_whole, "-1"), (positive_whole, "1.5"), (positive_whole, "²"), (whole_from_two, "1")]
     + [(positive_number, text) for text in ("0", "-2", "nan", "inf", "few")],
 )
-def test_what_is_none_is_refused(read, text) -> None:
+def test_other_texts_are_refused(read, text) -> None:
     with pytest.raises(argparse.ArgumentTypeError, match=f"'{text}'"):
         read(text)

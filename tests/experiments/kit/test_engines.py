@@ -10,7 +10,7 @@ from experiments.kit.sweep import CellsFailed, run_cells
 from tests.experiments.kit.toy_sweep import cells, options, work
 
 
-def test_without_ray_it_is_said_what_to_install(tmp_path, monkeypatch):
+def test_without_ray_the_error_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(RayMissing, match=r'pip install "mobee\[cluster\]"'):
         run_cells(work, cells(2), tmp_path, options(str(tmp_path), "--engine", "ray"))
@@ -18,7 +18,7 @@ def test_without_ray_it_is_said_what_to_install(tmp_path, monkeypatch):
 
 @pytest.mark.system
 @pytest.mark.untimed
-def test_cells_are_worked_off_on_ray_and_what_fails_or_dies_is_named(tmp_path):
+def test_cells_run_on_ray_and_failed_or_dead_ones_are_named(tmp_path):
     pytest.importorskip("ray")
     with pytest.raises(CellsFailed, match=r"toy-s1: ValueError: the toy is broken\n  toy-s2: its process died|toy-s2: its process died"):
         run_cells(work, cells(5, fails=1, dies=2), tmp_path, options(str(tmp_path), "--engine", "ray", "--jobs", "2"))

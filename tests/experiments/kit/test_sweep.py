@@ -74,7 +74,7 @@ def inline(folder: Path):
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_every_cell_is_worked_off_and_read_back(tmp_path, jobs):
+def test_every_cell_is_run_and_read_back(tmp_path, jobs):
     run_cells(work, cells(3), tmp_path, options(str(tmp_path), "--jobs", jobs))
     found = load_cells(tmp_path)
     assert list(found) == ["toy-s0", "toy-s1", "toy-s2"]
@@ -139,12 +139,12 @@ def test_two_cells_of_one_name_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden", "with space"])
-def test_a_name_that_is_no_file_name_is_refused(name):
+def test_a_name_that_is_not_a_file_name_is_refused(name):
     with pytest.raises(InvalidValue, match="a name has"):
         Cell(name, 0)
 
 
-def test_what_a_kill_left_half_written_is_no_cell(tmp_path):
+def test_a_half_written_file_is_not_a_cell(tmp_path):
     run_cells(work, cells(1), tmp_path, inline(tmp_path))
     (tmp_path / "cells" / "toy-s1.unfinished").write_bytes((tmp_path / "cells" / "toy-s0.npz").read_bytes()[:100])
     assert set(load_cells(tmp_path)) == {"toy-s0"}
@@ -166,7 +166,7 @@ def sweep(folder: Path, seconds: float) -> subprocess.Popen[str]:
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_a_sweep_that_is_killed_goes_on_behind_what_it_has_finished(tmp_path, how):
+def test_a_killed_sweep_continues_after_its_finished_cells(tmp_path, how):
     process = sweep(tmp_path, 0.3)
     wait_until(lambda: len(list(tmp_path.glob("cells/*.npz"))) >= 2)
     os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)  # a terminal's Ctrl-C goes to the whole group
@@ -196,7 +196,7 @@ def wait_until(holds, timeout: float = 30.0) -> None:
         time.sleep(0.02)
 
 
-def test_the_time_left_follows_the_costs_of_what_is_done_now():
+def test_the_remaining_time_follows_the_costs_of_finished_cells():
     time_left = TimeLeft([1.0, 1.0, 4.0, 4.0], [1.0, 4.0, 4.0], start=100.0)
     assert time_left.fraction == pytest.approx(0.1)
     time_left.finished(4.0, 140.0)
@@ -204,7 +204,7 @@ def test_the_time_left_follows_the_costs_of_what_is_done_now():
     assert str(time_left) == "50 s left"
 
 
-def test_long_times_are_told_in_minutes_and_hours():
+def test_long_times_are_shown_in_minutes_and_hours():
     time_left = TimeLeft([1.0, 100.0], [1.0, 100.0], start=0.0)
     time_left.finished(1.0, 18.0)
     assert str(time_left) == "30 min left"

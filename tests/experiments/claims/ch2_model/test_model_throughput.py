@@ -65,7 +65,7 @@ def test_a_flood_records_every_number_of_objects():
     assert all(r["evaluations"] > 0 for r in records if not r["edits"])
 
 
-def test_what_fails_in_the_models_thread_is_not_hidden(monkeypatch):
+def test_an_exception_in_the_models_thread_is_raised(monkeypatch):
     def evaluate(self, q):
         raise mobee.InvalidValue("made to fail")
 
@@ -74,7 +74,7 @@ def test_what_fails_in_the_models_thread_is_not_hidden(monkeypatch):
         list(flood_model("katana", first=1, last=3, edits=5, seed=0, is_over=lambda: False))
 
 
-def test_a_run_that_was_interrupted_goes_on_behind_its_records(tmp_path):
+def test_an_interrupted_run_continues_after_its_records(tmp_path):
     part = run(tmp_path, "--robots", "katana", "--objects", "2")
     assert part["complete"]
     assert part["katana"]["objects_reached"] == 2

@@ -23,7 +23,7 @@ def verdicts(known) -> dict[str, str]:
     return {claim.text: claim.verdict for claim in judged(known)}
 
 
-def test_who_needs_fewer_on_one_task_outperforms_and_who_needs_more_on_all_does_not():
+def test_a_strategy_outperforms_with_fewer_evaluations_on_one_task():
     known = runs(nes=1.0, xnes=3.0, snes=3.0)
     known["snes", TASKS[0]] /= 6.0
     found = verdicts(known)
@@ -31,7 +31,7 @@ def test_who_needs_fewer_on_one_task_outperforms_and_who_needs_more_on_all_does_
     assert found[BETTER["snes"].text] == "confirmed"
 
 
-def test_comparable_is_what_needs_little_more_on_the_median_task():
+def test_a_strategy_is_comparable_with_few_more_evaluations_on_the_median_task():
     found = verdicts(runs(nes=1.1, xnes=3.0, snes=1.4))
     assert [found[AS_GOOD[name].text] for name in ("xnes", "snes", "nes")] == ["refuted", "confirmed", "confirmed"]
     assert found[AIM.text] == "refuted"
@@ -58,7 +58,7 @@ def test_a_quick_cell_finds_or_counts_with_all_it_had():
     assert evaluations(found)["snes", ("cigar 1e6", 10)].tolist() == [500.0]
 
 
-def test_what_is_done_can_be_drawn():
+def test_finished_runs_can_be_drawn():
     pytest.importorskip("matplotlib")
     found = finished_trials(nes.trial, [Cell("a", 1, {"strategy": "nes", "function": "sphere", "dimensions": 10, "most": 200})])
     assert len(nes.plot(found).axes) == len(FUNCTIONS)

@@ -15,7 +15,7 @@ def solver(evaluations: float, reached: float = 1.0) -> Solver:
     return Solver(np.full(SEEDS, reached), evaluations * (1.0 + 0.01 * np.arange(SEEDS)), np.full(SEEDS, 40.0))
 
 
-def test_who_needs_fewer_evaluations_outperforms():
+def test_fewer_evaluations_outperform():
     known = {(NES, WHOLE): solver(2500.0), ("cma", WHOLE): solver(4000.0), ("annealing", WHOLE): solver(2000.0)}
     found = {claim.text: claim for claim in judged(known)}
     cma, annealing, particles = (found[OUTPERFORMS[NES, rival].text] for rival in ("cma", "annealing", "particles"))

@@ -37,7 +37,6 @@ from experiments.claims.ch4_reflex.babbling_trial import (
     read_commands,
     read_trial,
     scenario,
-    speed,
     write_trial,
 )
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch
@@ -77,7 +76,7 @@ def rows(**changed: Trial) -> dict[str, dict[str, Any]]:
     return {mode: summarise([each]) for mode, each in {**GOOD, **changed}.items()}
 
 
-def test_all_claims_stand_when_all_is_as_it_should_be() -> None:
+def test_all_claims_hold_for_good_trials() -> None:
     claims = verdict(rows())
     assert len(claims) == 5
     assert all(claims.values())
@@ -94,7 +93,7 @@ def test_all_claims_stand_when_all_is_as_it_should_be() -> None:
         ("one", trial(completed=1, jerk=3.0), "moves more smoothly"),
     ],
 )
-def test_a_claim_falls_with_what_contradicts_it(mode: str, spoiled: Trial, claim: str) -> None:
+def test_a_claim_fails_with_a_contradicting_trial(mode: str, spoiled: Trial, claim: str) -> None:
     fallen = [name for name, stands in verdict(rows(**{mode: spoiled})).items() if not stands]
     assert len(fallen) == 1
     assert claim in fallen[0]
@@ -181,7 +180,7 @@ def options(*given: str) -> argparse.Namespace:
     return options_of(EXPERIMENT, "--minutes", "15", "--seed", "2", *given)
 
 
-def test_an_interrupted_run_goes_on_behind_its_finished_trials(
+def test_an_interrupted_run_continues_after_its_finished_trials(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trials = Trials(monkeypatch)
@@ -199,7 +198,7 @@ def test_an_interrupted_run_goes_on_behind_its_finished_trials(
     assert again["modes"]["two"]["commands"] == 8
 
 
-def test_a_trial_in_which_somebody_was_late_is_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_in_which_a_process_was_late_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trials = Trials(monkeypatch)
     trials.late = 2
     EXPERIMENT.method.run(options("--minutes", "1", "--modes", "two", "--json"), tmp_path)
@@ -211,7 +210,7 @@ def test_a_trial_in_which_somebody_was_late_is_run_again(tmp_path: Path, monkeyp
     assert not babbling.read_trials(tmp_path, "one")
 
 
-def test_the_figure_is_drawn_of_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_figure_shows_the_finished_trials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     with pytest.raises(InvalidValue, match="no finished trial"):
         EXPERIMENT.method.figure(tmp_path)
@@ -290,7 +289,7 @@ def test_the_measures_of_a_trial_are_read_as_they_were_written(tmp_path: Path) -
     assert not list(tmp_path.glob("*.new"))
 
 
-def test_a_command_is_in_the_log_when_it_has_ended_and_what_a_kill_has_cut_is_not(tmp_path: Path) -> None:
+def test_ended_commands_are_in_the_log_and_an_incomplete_line_is_ignored(tmp_path: Path) -> None:
     path = tmp_path / "deep" / COMMANDS
     log = CommandLog(path)
     assert read_commands(path) == []
@@ -324,10 +323,6 @@ def test_the_path_counts_motion_back() -> None:
 def test_the_jerk_of_a_cubic_is_constant() -> None:
     t = np.arange(10) * DT
     assert np.allclose(jerk(np.column_stack([t**3, -2.0 * t**3]), DT), [6.0, -12.0])
-
-
-def test_the_speed_is_the_first_difference() -> None:
-    assert np.allclose(speed(np.array([[0.0, 1.0], [0.1, 1.0], [0.1, 0.9]]), DT), [[5.0, 0.0], [0.0, -5.0]])
 
 
 def test_the_23_motors_are_torso_head_and_arms_without_hands() -> None:

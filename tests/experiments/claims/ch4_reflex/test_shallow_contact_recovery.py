@@ -76,7 +76,7 @@ def test_the_client_goes_on_from_where_it_was_put(table: Table, spot: Spot) -> N
         assert np.abs(client.next() - path.postures[place]).max() < 0.01
 
 
-def test_head_on_the_mended_reflex_recovers_and_the_controller_settles(steep: tuple[Table, HandPath]) -> None:
+def test_in_steep_contacts_the_mended_reflex_recovers_and_the_controller_settles(steep: tuple[Table, HandPath]) -> None:
     found = {variant: run_trial(*steep, variant, 90.0, 0, 0) for variant in VARIANTS}
     assert found["off"].depth > 0.035
     assert found["mended"].recovered
@@ -90,7 +90,7 @@ def test_a_trial_can_be_repeated(steep: tuple[Table, HandPath]) -> None:
     assert run_trial(*steep, "naive", 90.0, 0, 5) == run_trial(*steep, "naive", 90.0, 0, 5)
 
 
-def test_a_recovery_is_clean_when_nothing_is_seen_on_the_way_back() -> None:
+def test_a_recovery_is_clean_without_contact_during_the_motion_back() -> None:
     assert CLEAN.clean
     flickers = replace(CLEAN, again=True)
     assert flickers.recovered
@@ -135,7 +135,7 @@ def test_the_claim_fails_with_any_of_its_parts() -> None:
         assert not holds(spoiled)
 
 
-def test_results_tell_shares_of_each_variant_and_angle() -> None:
+def test_results_have_shares_of_each_variant_and_angle() -> None:
     found = results(claimed())
     assert found["naive"]["90"]["recovered"] == 1.0
     assert found["naive"]["1"]["relapse"] == 1.0

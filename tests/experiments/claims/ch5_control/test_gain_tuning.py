@@ -34,7 +34,7 @@ def imagined(monkeypatch):
     monkeypatch.setattr(gain_tuning, "evaluate", evaluate)
 
 
-def test_what_is_wrong_costs_and_what_is_better_than_asked_does_not() -> None:
+def test_unmet_requirements_cost_and_exceeded_ones_do_not() -> None:
     assert objective(GOOD) == pytest.approx(GOOD.settling_s)
     assert objective(replace(GOOD, solid_mm=9.0)) > objective(replace(GOOD, solid_mm=3.0)) > objective(GOOD)
     assert objective(replace(GOOD, longest_ms=15.0)) > objective(GOOD)
@@ -50,7 +50,7 @@ def test_the_search_begins_with_the_default_and_finds_better(imagined) -> None:
     assert best.objective < tried[0].objective and best.judged.solid_mm < 5.0
 
 
-def test_an_interrupted_search_goes_on_as_if_it_had_not_been(imagined, tmp_path) -> None:
+def test_an_interrupted_search_continues_with_the_same_results(imagined, tmp_path) -> None:
     (tmp_path / "whole").mkdir()
     (tmp_path / "parts").mkdir()
     EXPERIMENT.method.run(options_of(EXPERIMENT, "--sets", "8", "--seed", "2"), tmp_path / "whole")

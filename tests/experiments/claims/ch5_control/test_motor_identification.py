@@ -37,7 +37,7 @@ def test_motors_with_known_numbers_come_back():
     assert errors["friction"]["largest"] < 0.04
 
 
-def test_what_the_model_cannot_explain_is_reported_as_misfit(rng, monkeypatch):
+def test_unexplained_residuals_are_reported_as_misfit(rng, monkeypatch):
     monkeypatch.setattr(motor_identification_fitting, "LONGEST", 0.025)
     signals = fitted_signal(), held_out_signal(rng)
     known = MotorParameters(encoder_noise=0.0)

@@ -7,7 +7,7 @@ from experiments.kit.live.recordings import Touch, read_touches, touches
 HAND, ELBOW = "l_hand table", "chest l_elbow"
 
 
-def test_ticks_in_contact_are_one_event_until_the_pair_was_apart_for_long_enough() -> None:
+def test_ticks_in_contact_are_one_event_until_the_pair_was_apart_long_enough() -> None:
     rows = [(5, HAND, 0.001), (6, HAND, 0.003), (10, HAND, 0.002), (16, HAND, 0.004)]
     assert touches(rows, gap=5) == [Touch(HAND, 5, 10, 0.003), Touch(HAND, 16, 16, 0.004)]
 
