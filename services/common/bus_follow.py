@@ -19,13 +19,13 @@ from services.common.bus_plant import BusPlant
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
-CONTROL = 8.0  # s for the parts to come under control and their goals to be free
-STALLED = 5.0  # s in which the robot's clock must have moved
-RESTING = 60.0  # s for coming to rest behind the motion; the controller's own patience ends before
+TAKE_TIMEOUT = 8.0  # s until the parts are under control and their goals free
+CLOCK_TIMEOUT = 5.0  # s within which the robot's clock must advance
+REST_TIMEOUT = 60.0  # s until the parts rest after the motion; the controller ends an action before
 
 
 class BusFollower(BusPlant):
-    """A BusPlant whose parts move together; all that it waits for has an end."""
+    """A BusPlant whose parts move together; every wait has a time limit."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))
@@ -35,27 +35,27 @@ class BusFollower(BusPlant):
     @property
     def q(self) -> Array:
         """Positions of all motors by the encoders, (n,) rad; raises MobeeError if there is no robot."""
-        self._service.spin(time.monotonic() + CONTROL, lambda: bool(self._seen))
+        self._service.spin(time.monotonic() + TAKE_TIMEOUT, lambda: bool(self._seen))
         if not self._seen:
-            raise MobeeError("no tick of the robot came: `mobee status` says whether robot_sim runs")
+            raise MobeeError("no tick of the robot was received: `mobee status` shows whether robot_sim runs")
         return self._seen[-1][1]
 
     def take(self, parts: Sequence[str]) -> None:
-        """Take the goals of parts; raises MobeeError if one stays in hold or somebody else's."""
-        give_up = time.monotonic() + CONTROL
+        """Take the goals of parts; raises MobeeError if a part stays in hold or belongs to another service."""
+        give_up = time.monotonic() + TAKE_TIMEOUT
         while not self._has(parts):
             if time.monotonic() > give_up:
                 waiting = ", ".join(part for part in parts if not self._has([part]))
-                raise MobeeError(f"{waiting} in hold: `mobee status` says why, `mobee estop --reset` ends an emergency stop")
+                raise MobeeError(f"{waiting} in hold: `mobee status` shows why, `mobee estop --reset` ends an emergency stop")
             for part in parts:
                 self._take(part)
             self._wait(lambda: self._has(parts))
 
     def follow(self, parts: Sequence[str], attractors: Sequence[Array], period: float) -> dict[str, Outcome]:
-        """Move the attractor (n,) rad of parts that were taken, one place each period [s of the robot's clock], until all rest.
+        """Move the attractor (n,) rad of parts that were taken, one row per period [s of the robot's clock], until all rest.
 
-        A place that comes too late is left out, but for the last.  Raises ActionInterrupted when a part is in hold or not ours any
-        more, or the robot's clock stands still: `let_go` then.
+        A row that is too late is left out, except the last.  Raises ActionInterrupted if a part is in hold or was lost to another
+        service, or the robot's clock stands still: call `let_go` then.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()
@@ -69,9 +69,11 @@ class BusFollower(BusPlant):
                     asked[part] = self._aim(part, here[where])
             if row == last:
                 break
-            self._until(parts, run, self._reached(begun + (row + 1) * period), STALLED, "the robot's clock stands still")
+            self._until(parts, run, self._reached(begun + (row + 1) * period), CLOCK_TIMEOUT, "the robot's clock stands still")
             row, before = min(max(row + 1, int((self._now - begun) / period)), last), here
-        self._until(parts, run, lambda: all(self._is_over(part, *one) for part, one in asked.items()), RESTING, "it does not come to rest")
+        self._until(
+            parts, run, lambda: all(self._is_over(part, *one) for part, one in asked.items()), REST_TIMEOUT, "it does not come to rest"
+        )
         return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:
@@ -80,9 +82,9 @@ class BusFollower(BusPlant):
         return times - times[:1], np.array([q for _, q in self._seen])
 
     def let_go(self) -> None:
-        """Give back all goals, of which some may be lost: the parts then stay where they are."""
+        """Release all goals, of which some may be lost already: the parts then stay where they are."""
         for part in list(self._epochs):
-            with suppress(CallFailed):  # lost already, or nobody is there: then it holds
+            with suppress(CallFailed):  # lost already, or there is no controller: then the part holds
                 self.release(part)
 
     @property
@@ -101,7 +103,7 @@ class BusFollower(BusPlant):
         return action_id, self._ask(part, "goal", Goal, action_id=action_id, q=[float(x) for x in target])
 
     def _until(self, parts: Sequence[str], run: int, enough: Callable[[], bool], patience: float, why: str) -> None:
-        """Wait until it is enough, as long as all parts are ours; raises ActionInterrupted."""
+        """Wait until `enough` returns True; raises ActionInterrupted with `why` after `patience` s, or if a part is lost."""
         give_up = time.monotonic() + patience
         while not enough():
             if run != self._runs:
@@ -110,7 +112,7 @@ class BusFollower(BusPlant):
                 raise ActionInterrupted("the controller is gone")
             if not self._has(parts):
                 lost = ", ".join(part for part in parts if not self._has([part]))
-                raise ActionInterrupted(f"{lost}: in hold, or somebody else's")
+                raise ActionInterrupted(f"{lost}: in hold, or taken by another service")
             if time.monotonic() > give_up:
                 raise ActionInterrupted(why)
             self._service.check_router()

@@ -28,7 +28,7 @@ UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 
 class ReachClient:
-    """The target of one process, and the newest word on the reaches of its parts."""
+    """The target that a process presents to the model, and the newest messages of its parts' reaches."""
 
     def __init__(self, service: Service, parts: tuple[str, ...]) -> None:
         self._service = service
@@ -45,31 +45,31 @@ class ReachClient:
         if target is not None:
             self._put(target)
         elif self._is_there:
-            with suppress(InvalidValue):  # somebody else has taken it away already
+            with suppress(InvalidValue):  # another client has removed it already
                 self._call("remove", OneName, name=TARGET)
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
-        """What is reached for is an object of the model's world, wherever it goes; returns where it is now.
+        """Reach for an object of the model's world, also when it moves; returns it as a target at its present position.
 
-        Raises UnknownName, and InvalidValue if it repels hands, being no target.
+        Raises UnknownName; InvalidValue if its role is not target, because it then repels hands.
         """
-        thing = self._known(name)
-        if thing.role != "target":
+        found = self._known(name)
+        if found.role != "target":
             raise InvalidValue(
-                f"{name!r} is an {thing.role} of the model's world: a hand can be put on what has the role target; give it that by "
-                f"{keys.world_rpc('role')}, or a place that is free."
+                f"{name!r} has the role {found.role} in the model's world, and hands reach only for the role target: change the role "
+                f"by {keys.world_rpc('role')}, or reach for a free position."
             )
         self.present(None)
-        self._target, self._object = ReachTarget(np.array(thing.position), _inner_radius(thing.geometry), aim, normal), name
+        self._target, self._object = ReachTarget(np.array(found.position), _inner_radius(found.geometry), aim, normal), name
         return self._target
 
     def asked(self) -> dict[str, object]:
-        """The fields of a ReachFor that say what is reached for; raises InvalidValue if nothing is presented."""
+        """The fields of a ReachFor that describe the target; raises InvalidValue if none is presented."""
         target = self._target
         if target is None:
-            raise InvalidValue("nothing is presented to be reached for: call present(ReachTarget(position)) first")
-        if self._object == TARGET and not self._is_there:  # the model is a new one
+            raise InvalidValue("no target is presented: call present(ReachTarget(position)) first")
+        if self._object == TARGET and not self._is_there:  # the model was started again
             self._put(target)
             self._is_there = True
         return {
@@ -80,16 +80,16 @@ class ReachClient:
             "normal": None if target.normal is None else target.normal.tolist(),
         }
 
-    def is_told(self, part: str, action_id: str) -> bool:
+    def has_ended(self, part: str, action_id: str) -> bool:
         """Whether the end of a reach's force is known."""
         reach = self._reaches.get(part)
         return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
 
     def outcome(self, part: str, motion: Motion, after: Outcome, tick: float) -> ReachOutcome:
-        """Of a reach that is over, by its last words; `after`: as of an action, `tick` s."""
+        """The outcome of a reach that has ended; `after`: the outcome of its action, `tick`: in s."""
         reach = self._reaches[part]
         if reach.phase == "interrupted":
-            raise ActionInterrupted(f"{part}: the reach was broken off")
+            raise ActionInterrupted(f"{part}: the reach was interrupted")
         back = motion.since_k - reach.end_k
         return ReachOutcome(
             marker=np.array(reach.position),
@@ -102,11 +102,11 @@ class ReachClient:
         )
 
     def leave(self) -> None:
-        """Take the target away, if there is one; nobody may be there any more to hear of it."""
+        """Remove the target, if there is one; the model may have ended already."""
         try:
             self.present(None)
         except ActionInterrupted as error:
-            self._service.log.info("the target stays where it is: %s", error)
+            self._service.log.info("the target could not be removed: %s", error)
 
     def _put(self, target: ReachTarget) -> None:
         sphere = Geometry(kind="sphere", size=[target.radius])
@@ -116,7 +116,7 @@ class ReachClient:
         try:
             objects = {one.name: one for one in self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES).objects}
         except CallFailed as error:
-            raise ActionInterrupted(f"the model does not say what there is: {error}") from None
+            raise ActionInterrupted(f"the model does not list its objects: {error}") from None
         if name not in objects:
             raise UnknownName("object of the model's world", name, objects)
         return objects[name]
@@ -138,18 +138,18 @@ class ReachClient:
 
 
 def _inner_radius(shape: Geometry) -> float:
-    """Of the largest sphere about the middle that fits into the shape, in m."""
+    """Radius [m] of the largest sphere about the centre that fits into the shape."""
     if shape.kind == "box":
         return 0.5 * min(shape.size)
     return min(shape.size[0], 0.5 * shape.size[1]) if shape.kind == "cylinder" else shape.size[0]
 
 
-POLL = 0.2  # s between attempts while the controller is away or the part is in hold
-OWNED = 3.0  # s for which a goal may belong to somebody else: the tokens of the dead last up to a second
+RETRY_PERIOD = 0.2  # s between attempts while there is no controller or the part is in hold
+OWNED_PATIENCE = 3.0  # s for which a goal may belong to another service: the token of one that ended lasts up to a second
 
 
 class BusPlant:
-    """A ReachPlant on the bus for the parts named; waits in the service's inbox, so its calls are answered meanwhile.
+    """A ReachPlant on the bus for some parts.  While it waits, the service answers calls.
 
     In lockstep it takes part for its service: a tick of which the controller says that this service may have something to decide is
     answered when the service waits again, so what it decides falls into that tick however long it takes.
@@ -165,8 +165,8 @@ class BusPlant:
         self._reads_all = False
         self._runs = 0
         self._participant = Participant(service)
-        self._wanted: set[str] = set()  # parts that somebody measured
-        self._to_answer: int | None = None  # lockstep: a tick that waits for this service
+        self._wanted: set[str] = set()  # parts that were measured
+        self._to_answer: int | None = None  # lockstep: the tick that waits for this service
         for part in parts:
             robot.part(part)
             service.on_newest(Motion, self._noter(part), part)
@@ -189,7 +189,7 @@ class BusPlant:
         return self._q.copy()
 
     def measure(self, part: str) -> Array:
-        """The part's motor positions, (n_part,) rad, as soon as the part is under control and its goal is ours."""
+        """The part's motor positions, (n_part,) rad; waits until the part is under control and its goal belongs to this service."""
         self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
             self._service.check_router()
@@ -207,9 +207,9 @@ class BusPlant:
         self._reaches.present(target)
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
-        """What is reached for is an object of the model's world, wherever it goes; returns where it is now.
+        """Reach for an object of the model's world, also when it moves; returns it as a target at its present position.
 
-        Raises UnknownName, and InvalidValue if it is no target; ActionInterrupted as `present`.
+        Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted as `present`.
         """
         return self._reaches.present_object(name, aim, normal)
 
@@ -221,18 +221,18 @@ class BusPlant:
         return self._reaches.outcome(part, self._motion[part], after, self._tick)
 
     def _perform(self, part: str, verb: str, request: type[Request], **fields: object) -> str:
-        """Have an action done; returns its id when its end is known.  Raises ActionInterrupted, or InvalidValue if it is refused."""
+        """Start an action and wait for its end; returns its id.  Raises ActionInterrupted, or InvalidValue if it is refused."""
         if part not in self._epochs:
             self.measure(part)
         elif part in self._motion and not self._owns(part):
             del self._epochs[part]
-            raise ActionInterrupted(f"{part}: its goal is not ours any more, so where it is must be measured anew")
+            raise ActionInterrupted(f"{part}: this service lost its goal; measure the part again")
         run, action_id = self._runs, uuid.uuid4().hex
         asked = self._ask(part, verb, request, action_id=action_id, **fields)
 
         def is_known() -> bool:
             return self._is_over(part, action_id, asked) and (
-                verb == "goal" or self._is_broken_off(part, action_id) or self._reaches.is_told(part, action_id)
+                verb == "goal" or self._is_interrupted(part, action_id) or self._reaches.has_ended(part, action_id)
             )
 
         while True:
@@ -244,23 +244,23 @@ class BusPlant:
                 return action_id
             if not self._owns(part) or not self._service.alive.get("controller"):
                 self._epochs.pop(part, None)
-                raise ActionInterrupted(f"{part}: the controller is gone")
+                raise ActionInterrupted(f"{part}: the controller has ended, or gave its goal to another service")
 
     def release(self, part: str) -> None:
-        """Give the part's goal back."""
+        """Release the part's goal."""
         epoch = self._epochs.pop(part, None)
         if epoch is not None:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
 
     def leave(self) -> None:
-        """Give back all goals and, in lockstep, take part no longer."""
+        """Release all goals and, in lockstep, leave the participants."""
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()
         self._participant.done(self._service.bus.k, last=True)
 
     def _wait(self, enough: Callable[[], bool]) -> None:
-        """Handle what comes for a while, or until it was enough; before it waits, the tick is answered."""
+        """Run handlers for a while, or until `enough` returns True; answer the tick before waiting."""
 
         def may_go_on() -> bool:
             if enough():
@@ -268,10 +268,10 @@ class BusPlant:
             self._answer()
             return False
 
-        self._service.spin(time.monotonic() + POLL, may_go_on)
+        self._service.spin(time.monotonic() + RETRY_PERIOD, may_go_on)
 
     def _answer(self) -> None:
-        """Tick 0 is answered only when what can be owned is: it is repeated until everybody has answered it."""
+        """Answer the tick that waits; tick 0, which is repeated, only when all goals that can be owned are owned."""
         if self._to_answer is None:
             return
         if self._to_answer > 0 or all(self._owns(part) or self._is_held(part) for part in self._wanted):
@@ -296,8 +296,8 @@ class BusPlant:
 
     def _outcome(self, part: str, action_id: str) -> Outcome:
         motion = self._motion[part]
-        if self._is_broken_off(part, action_id):
-            raise ActionInterrupted(f"{part}: in hold before the action ended")
+        if self._is_interrupted(part, action_id):
+            raise ActionInterrupted(f"{part}: the part was in hold before the action ended")
         duration = (motion.since_k - motion.start_k) * self._tick
         return Outcome(np.array(motion.q), motion.status == "settled", duration, tuple(motion.touched))
 
@@ -307,7 +307,7 @@ class BusPlant:
             return False
         return motion.action_id != action_id or motion.status != "moving"
 
-    def _is_broken_off(self, part: str, action_id: str) -> bool:
+    def _is_interrupted(self, part: str, action_id: str) -> bool:
         motion = self._motion[part]
         return motion.action_id != action_id or motion.status == "held"
 
@@ -324,23 +324,23 @@ class BusPlant:
         return part in self._epochs and motion is not None and motion.epoch == self._epochs[part]
 
     def _take(self, part: str) -> None:
-        waits_for_motion = part in self._epochs and part not in self._motion  # a new run: the goal is still ours
+        waits_for_motion = part in self._epochs and part not in self._motion  # a new run: this service still owns the goal
         if self._owns(part) or waits_for_motion or not self._service.alive.get("controller"):
             return
         try:
             reply = self._service.call(keys.goal(part, "take"), Take, Taken, instance=self._service.instance)
         except CallFailed as error:
             if error.code == "owned":
-                self._bear(part, str(error))
+                self._wait_for_owner(part, str(error))
             self._service.log.info("the goal of %s cannot be taken yet: %s", part, error)
             return
         self._refused_since.pop(part, None)
         self._epochs[part] = reply.epoch
 
-    def _bear(self, part: str, refusal: str) -> None:
-        """The goal belongs to somebody else: perhaps a process that has just died, else there is one agent too many."""
+    def _wait_for_owner(self, part: str, refusal: str) -> None:
+        """Wait if the goal belongs to another service that may have just ended; raise MobeeError if it still does after a while."""
         now = time.monotonic()
-        if now - self._refused_since.setdefault(part, now) > OWNED:
+        if now - self._refused_since.setdefault(part, now) > OWNED_PATIENCE:
             raise MobeeError(refusal)
 
     def _noter(self, part: str) -> Callable[[Motion], None]:

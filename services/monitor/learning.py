@@ -18,11 +18,11 @@ from mobee.rendering import palette
 from mobee.rendering.palette import Rgba
 from mobee.robot.robot import Robot
 
-SOUND = (92, 98, 110, 110)  # an action that has always reached its goal
-THIN, THICK = 0.012, 0.06  # widths of arrows, in steps of the lattice
-DOT, BIG = 0.06, 0.16  # radii of states, likewise
-LIFT = 0.12  # how far an arrow's ends are from the centres of its states
-MOST = 65_536  # state-actions; of more nothing could be seen, and drawing them twice a second would take all of the monitor's time
+CERTAIN = (92, 98, 110, 110)  # colour of an action that has always reached its goal
+MIN_WIDTH, MAX_WIDTH = 0.012, 0.06  # of arrows, in steps of the lattice
+MIN_RADIUS, MAX_RADIUS = 0.06, 0.16  # of states, in steps of the lattice
+ARROW_GAP = 0.12  # between an arrow's ends and the centres of its states
+MAX_DRAWN = 65_536  # state-actions; more could not be told apart, and drawing them would take all of the monitor's time
 QUANTITIES = ("tries", "reward", "value")
 
 
@@ -44,20 +44,20 @@ class Learning:
         self._drawn: dict[str, Drawn | None] = {}
         self._made_from: dict[str, str] = {}
 
-    def log(self, part: str, told: Learned) -> None:
+    def log(self, part: str, learned: Learned) -> None:
         """The space, arrows, and bars of an agent.
 
         Nothing is drawn of a space that is too large, or that this robot cannot make, nor of numbers that do not fit it.
         """
-        if len(told.tries) > 4 * MOST:
-            self._leave_out(part, told)
+        if len(learned.tries) > 4 * MAX_DRAWN:
+            self._leave_out(part, learned)
             return
-        drawn = self._space(part, told.space)
+        drawn = self._space(part, learned.space)
         if drawn is None:
             return
         shape = drawn.space.goals.shape
         tries, reward, value = (
-            _numbers(data, kind, shape) for data, kind in ((told.tries, "<u4"), (told.reward, "<f4"), (told.value, "<f4"))
+            _numbers(data, kind, shape) for data, kind in ((learned.tries, "<u4"), (learned.reward, "<f4"), (learned.value, "<f4"))
         )
         if tries is None or reward is None or value is None:
             return
@@ -65,14 +65,14 @@ class Learning:
         for name, numbers in zip(QUANTITIES, (tries, reward, value), strict=True):
             self._stream.log(f"{path}/{name}", rr.BarChart(numbers[drawn.exists].astype(np.float32), color=color))
         surprising = np.zeros(shape, dtype=bool)
-        found = [one for one in told.surprises if one.s < shape[0] and one.a < shape[1] and one.s_next < shape[0]]
+        found = [one for one in learned.surprises if one.s < shape[0] and one.a < shape[1] and one.s_next < shape[0]]
         for one in found:
             surprising[one.s, one.a] = True
         states, actions = np.nonzero((tries > 0) & ~surprising)
-        self._arrows(f"{path}/space/sound", drawn, states, drawn.space.goals[states, actions], THIN, SOUND)
+        self._arrows(f"{path}/space/sound", drawn, states, drawn.space.goals[states, actions], MIN_WIDTH, CERTAIN)
         self._log_surprises(f"{path}/space/surprising", drawn, [(one.s, one.a, one.s_next, one.share) for one in found])
         best = np.where(drawn.exists, value, -np.inf).max(axis=1)
-        self._log_states(f"{path}/space/states", drawn, best, told.s)
+        self._log_states(f"{path}/space/states", drawn, best, learned.s)
 
     def log_step(self, part: str, seen: Transition) -> None:
         """The newest transition: where it was meant to go, and where it went."""
@@ -81,7 +81,7 @@ class Learning:
             return
         color = (*self._colors[part], 255)
         ends = np.array([seen.goal, seen.s_next])
-        self._arrows(f"learning/{part}/space/newest", drawn, np.array([seen.s, seen.s]), ends, THICK, [(255, 255, 255, 120), color])
+        self._arrows(f"learning/{part}/space/newest", drawn, np.array([seen.s, seen.s]), ends, MAX_WIDTH, [(255, 255, 255, 120), color])
 
     def _space(self, part: str, settings: str) -> Drawn | None:
         if self._made_from.get(part) != settings:
@@ -94,34 +94,37 @@ class Learning:
                 self._drawn[part] = Drawn(space, plane_layout(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
         return self._drawn[part]
 
-    def _leave_out(self, part: str, told: Learned) -> None:
-        """Say, once, that a space is not drawn."""
-        if self._made_from.get(part) != told.space:
-            self._made_from[part], self._drawn[part] = told.space, None
-            text = f"{part}: what it learns is not drawn, its space has more than {MOST} state-actions"
+    def _leave_out(self, part: str, learned: Learned) -> None:
+        """Report, once, that a space is not drawn."""
+        if self._made_from.get(part) != learned.space:
+            self._made_from[part], self._drawn[part] = learned.space, None
+            text = f"{part}: what it learns is not drawn, because its space has more than {MAX_DRAWN} state-actions"
             self._stream.log("events", rr.TextLog(text, level="INFO"))
 
     def _log_states(self, path: str, drawn: Drawn, best: Array, here: int) -> None:
-        """States, the larger the more valuable; the agent's own is white."""
+        """States, larger with larger value; the agent's present state is white."""
         span = np.ptp(best)
-        radii = DOT + (BIG - DOT) * ((best - best.min()) / span if span > 0.0 else np.zeros(len(best)))
+        radii = MIN_RADIUS + (MAX_RADIUS - MIN_RADIUS) * ((best - best.min()) / span if span > 0.0 else np.zeros(len(best)))
         colors = [(255, 255, 255) if state == here else (150, 160, 176) for state in range(len(best))]
         self._stream.log(path, rr.Points2D(drawn.places, radii=radii, colors=colors))
 
     def _log_surprises(self, path: str, drawn: Drawn, found: list[tuple[int, int, int, float]]) -> None:
         """One colour a state-action, as in the paper's figure 7; the width is the probability."""
         colors = [(*palette.JOINTS[(7 * s + a) % len(palette.JOINTS)], 255) for s, a, _, _ in found]
-        widths = [THIN + (THICK - THIN) * share for *_, share in found]
+        widths = [MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * share for *_, share in found]
         states, ends = (np.array([one[k] for one in found], dtype=np.intp) for k in (0, 2))
         self._arrows(path, drawn, states, ends, widths, colors)
 
     def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: float | list[float], colors: Rgba | list[Rgba]) -> None:
-        """Arrows between states; one that stays is a dot beside its state."""
+        """Arrows between states; one that stays in its state is a dot beside it."""
         start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
         length = np.linalg.norm(way, axis=1, keepdims=True)
         unit = np.divide(way, length, out=np.full_like(way, 0.7), where=length > 0.0)
         self._stream.log(
-            path, rr.Arrows2D(origins=start + LIFT * unit, vectors=np.maximum(length - 2.0 * LIFT, 0.05) * unit, radii=radii, colors=colors)
+            path,
+            rr.Arrows2D(
+                origins=start + ARROW_GAP * unit, vectors=np.maximum(length - 2.0 * ARROW_GAP, 0.05) * unit, radii=radii, colors=colors
+            ),
         )
 
 

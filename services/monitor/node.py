@@ -25,13 +25,13 @@ from services.monitor.output import Output
 from services.monitor.plots import Plots
 from services.monitor.scene import Poses, Scene
 
-WORLD_PERIOD = 1.0  # s between looks at the model's world
+WORLD_PERIOD = 1.0  # s between two requests for the model's world
 JPEG_QUALITY = 85
 LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class MonitorNode:
-    """Listens, and logs at its own pace: whatever came in between is overwritten."""
+    """Shows the newest messages at its own rate; those between are not shown."""
 
     def __init__(self, service: Service, config: Config, robot: Robot, output: Output) -> None:
         self._service, self._output, self._stream = service, output, output.stream
@@ -52,12 +52,12 @@ class MonitorNode:
         service.on_run(self._new_run)
         service.on_clock(self._note_clock)
         service.on_alive(self._note_alive)
-        service.on_each(WorldObject, self._see)
-        service.on_each(Transition, self._learn)
-        service.on_each(Learned, self._know, history=True)
-        service.on_each(Event, self._tell, history=True, any_run=True)
+        service.on_each(WorldObject, self._show_object)
+        service.on_each(Transition, self._show_transition)
+        service.on_each(Learned, self._show_learned, history=True)
+        service.on_each(Event, self._show_event, history=True, any_run=True)
         self._rate, self._image_rate, self._world_rate = Rate(1.0 / config.rate), Rate(1.0 / config.image_rate), Rate(WORLD_PERIOD)
-        for rate, look in ((self._rate, self._look), (self._image_rate, self._look_out), (self._world_rate, self._ask_world)):
+        for rate, look in ((self._rate, self._show_robot), (self._image_rate, self._show_images), (self._world_rate, self._ask_world)):
             self._repeat(rate, look)
 
     def _repeat(self, rate: Rate, look: Callable[[], None]) -> None:
@@ -67,8 +67,8 @@ class MonitorNode:
 
         self._service.inbox.at(rate.next(), turn)
 
-    def _look(self) -> None:
-        """Robot, contacts and plots as they are now."""
+    def _show_robot(self) -> None:
+        """Show robot, contacts and plots."""
         begin = time.perf_counter()
         self._check_page()
         self._set_time()
@@ -88,8 +88,8 @@ class MonitorNode:
         self._looks += 1
         self._time.add(1e3 * (time.perf_counter() - begin))
 
-    def _look_out(self) -> None:
-        """The eyes' newest pictures."""
+    def _show_images(self) -> None:
+        """Show the newest pictures of the eyes."""
         for eye, stream in self._images.items():
             image = stream.take()
             if image is not None and len(image.data) == image.width * image.height * 3:
@@ -104,10 +104,10 @@ class MonitorNode:
         if isinstance(answer, World):
             self._scene.set_objects(answer.objects)
 
-    def _see(self, thing: WorldObject) -> None:
-        self._scene.log_object(thing)
+    def _show_object(self, seen: WorldObject) -> None:
+        self._scene.log_object(seen)
 
-    def _learn(self, seen: Transition) -> None:
+    def _show_transition(self, seen: Transition) -> None:
         part = seen.agent.removeprefix("agent_")
         if part in self._motions:
             self._plots.log_transition(part, seen)
@@ -116,11 +116,11 @@ class MonitorNode:
                 self._poses.note(self._body.q())
             self._transitions += 1
 
-    def _know(self, told: Learned) -> None:
-        if told.agent in self._motions:
-            self._learning.log(told.agent, told)
+    def _show_learned(self, learned: Learned) -> None:
+        if learned.agent in self._motions:
+            self._learning.log(learned.agent, learned)
 
-    def _tell(self, event: Event) -> None:
+    def _show_event(self, event: Event) -> None:
         self._stream.log("events", rr.TextLog(f"{event.src}: {event.text}", level=LEVELS[event.level]))
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
@@ -140,7 +140,9 @@ class MonitorNode:
     def _check_page(self) -> None:
         page = self._output.page
         if page is not None and page.poll() is not None:
-            self._service.log.error("the page's server ended with %s: ending too, to be started again", page.returncode)
+            self._service.log.error(
+                "the server of the page ended with code %s: the monitor ends too, and is started again", page.returncode
+            )
             raise SystemExit(FAILED)
 
     def _mark(self) -> None:

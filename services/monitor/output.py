@@ -21,7 +21,7 @@ from services.common.exit_codes import BAD_INPUT
 from services.monitor.config import Config
 from services.monitor.page import HOST, program
 
-START = 10.0  # s for the page to come up
+START_TIMEOUT = 10.0  # s until the page answers
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Output:
 
 @contextmanager
 def open_output(config: Config, layout: rrb.Blueprint, recording: Path | None) -> Iterator[Output]:
-    """Serve as configured, and record to a file if one is named; exits with 2 and one line when a port cannot be used."""
+    """Serve as configured, and record to a file if one is named; exits with code 2 and one line if a port cannot be used."""
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
         page = _start_page(config, private) if config.serve else None
         stream = rr.RecordingStream("mobee")
@@ -44,16 +44,16 @@ def open_output(config: Config, layout: rrb.Blueprint, recording: Path | None) -
             yield Output(stream, page, page_url(config) if page else "")
         finally:
             if page is not None:
-                page.kill()  # first: to a page that hangs, the last data would be waited for
+                page.kill()  # before disconnect, which would wait for a page that hangs
                 page.wait()
             stream.disconnect()
 
 
 def recording_of(config: Config) -> Path | None:
-    """The file that is recorded to; exits with 2 and one line when its folder is missing."""
+    """The file that is recorded to; exits with code 2 and one line if its folder is missing."""
     folder = Path(config.run_dir) if config.run_dir else None
     if folder is not None and not folder.is_dir():
-        _refuse(f"run_dir {folder} is not a folder: make it, or leave run_dir empty for no recording")
+        _refuse(f"run_dir {folder} is not a folder: make it, or set run_dir to an empty text for no recording")
     return folder / "recording.rrd" if folder else None
 
 
@@ -68,7 +68,7 @@ def _connect(stream: rr.RecordingStream, config: Config, layout: rrb.Blueprint, 
 
 
 def page_url(config: Config) -> str:
-    """The address a person opens."""
+    """The address of the page."""
     source = quote(f"rerun+http://{HOST}:{config.grpc_port}/proxy", safe="")
     return f"http://{HOST}:{config.web_port}/?url={source}"
 
@@ -79,24 +79,24 @@ def _start_page(config: Config, folder: str) -> subprocess.Popen[bytes]:
     words = [str(os.getpid()), config.bind, str(config.web_port), str(config.grpc_port), config.memory_limit]
     command = [sys.executable, "-m", "mobee_system.run", "services.monitor.page", *words]
     page = subprocess.Popen(command, stdin=subprocess.DEVNULL, env=_private(folder))
-    give_up = time.monotonic() + START
+    give_up = time.monotonic() + START_TIMEOUT
     while not all(_answers(port) for port in (config.web_port, config.grpc_port)):
         if page.poll() is not None or time.monotonic() > give_up:
             page.kill()
-            _refuse(f"the page did not come up at port {config.web_port} within {START:g} s; serve = false runs without it")
+            _refuse(f"the page did not start at port {config.web_port} within {START_TIMEOUT:g} s; set serve = false to run without it")
         time.sleep(0.05)
     return page
 
 
 def _private(folder: str) -> dict[str, str]:
-    """Surroundings in which Rerun's program sends no usage data anywhere and reads no settings of the user."""
+    """An environment in which Rerun's program sends no usage data and reads no settings of the user."""
     surroundings = {**os.environ, "RUST_LOG": "error", "XDG_CONFIG_HOME": folder, "XDG_DATA_HOME": folder}
-    subprocess.run([program(), "analytics", "disable"], env=surroundings, capture_output=True, check=True, timeout=START)
+    subprocess.run([program(), "analytics", "disable"], env=surroundings, capture_output=True, check=True, timeout=START_TIMEOUT)
     return surroundings
 
 
 def _require_free(config: Config, name: str, port: int) -> None:
-    """A page that was just killed may hold its port for a moment more."""
+    """Wait for the port: a page that was just killed may hold it for a moment."""
     give_up = time.monotonic() + 1.0
     while True:
         with socket.socket() as probe:

@@ -17,7 +17,7 @@ PR_SET_PDEATHSIG = 1
 
 
 def arguments(bind: str, web_port: int, grpc_port: int, memory_limit: str) -> list[str]:
-    """What Rerun's program is told."""
+    """The command line of Rerun's program."""
     return [
         "rerun",
         "--serve-web",
@@ -40,7 +40,7 @@ def main() -> None:
     """Become the server; the kernel ends it when the monitor that started it has died."""
     parent, *rest = sys.argv[1:]
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != int(parent):  # died before the kernel was told
+    if os.getppid() != int(parent):  # it ended before the call above
         return
     os.execv(program(), arguments(rest[0], int(rest[1]), int(rest[2]), rest[3]))
 

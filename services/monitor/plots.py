@@ -41,7 +41,7 @@ class Plots:
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
-        """Norms over the whole robot, with those of the other sender's forces that are there already."""
+        """Norms over the whole robot, together with those of the other sender's terms."""
         known = len(self._strengths)
         self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}
         if len(self._strengths) > known:
@@ -49,7 +49,7 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """What an agent has just learned."""
+        """Reward, value and number of a transition."""
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):
             self._stream.log(f"plots/{quantity}/{part}", rr.Scalars(value))
 

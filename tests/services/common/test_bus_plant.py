@@ -66,7 +66,7 @@ def test_a_target_is_put_moved_and_taken_away(service: FakeService, client: Reac
 
 
 def test_what_is_asked_for_is_what_was_presented(client: ReachClient) -> None:
-    with pytest.raises(InvalidValue, match=r"nothing is presented .* present\(ReachTarget"):
+    with pytest.raises(InvalidValue, match=r"no target is presented.* present\(ReachTarget"):
         client.asked()
     client.present(ReachTarget(np.array(AT), aim="surface", normal=np.array([0.0, 0.0, 2.0])))
     expected = {"object": TARGET, "position": AT, "radius": 0.05, "aim": "surface", "normal": [0.0, 0.0, 1.0]}
@@ -101,7 +101,7 @@ def test_what_is_no_target_of_the_world_is_refused_with_what_is_valid(service: F
     service.objects = [thing("table", "box", [0.6, 1.5, 0.5], "obstacle"), thing("ball", "sphere", [0.03])]
     with pytest.raises(UnknownName, match="Did you mean 'ball'.*Valid: ball, table"):
         client.present_object("bal")
-    with pytest.raises(InvalidValue, match="'table' is an obstacle .* model/rpc/world/role"):
+    with pytest.raises(InvalidValue, match="'table' has the role obstacle .* model/rpc/world/role"):
         client.present_object("table")
 
 
@@ -112,7 +112,7 @@ def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeSer
     service.failure = CallFailed("no_answer", "nobody answers")
     with pytest.raises(ActionInterrupted, match="the model does not answer"):
         client.present(ReachTarget(np.array(AT)))
-    with pytest.raises(ActionInterrupted, match="does not say what there is"):
+    with pytest.raises(ActionInterrupted, match="does not list its objects"):
         client.present_object("ball")
     client.leave()  # nobody need hear of it
 
@@ -121,5 +121,5 @@ def test_a_target_that_somebody_else_has_taken_away_is_not_missed(service: FakeS
     client.present(ReachTarget(np.array(AT)))
     service.failure = CallFailed("world", "unknown world object 'reach_target'")
     client.present(None)
-    with pytest.raises(InvalidValue, match="nothing is presented"):
+    with pytest.raises(InvalidValue, match="no target is presented"):
         client.asked()

@@ -17,7 +17,7 @@ from services.agents.streams import surprises
 from tests.services.robots import ARM as OWN
 
 rr = pytest.importorskip("rerun")
-from services.monitor.learning import MOST, Learning  # noqa: E402  # only where Rerun is
+from services.monitor.learning import MAX_DRAWN, Learning  # noqa: E402  # only where Rerun is
 from services.monitor.scene import Poses  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
@@ -89,7 +89,7 @@ def test_what_does_not_fit_is_not_drawn_and_does_no_harm(wrong: dict[str, Any]) 
 def test_a_space_that_is_too_large_is_not_drawn_and_said_so_once() -> None:
     notebook = Notebook()
     learning = Learning(notebook, ROBOT)
-    huge = told(TransitionModel(SPACE), tries=bytes(4 * (MOST + 1)))
+    huge = told(TransitionModel(SPACE), tries=bytes(4 * (MAX_DRAWN + 1)))
     learning.log("left_arm", huge)
     assert list(notebook.logged) == ["events"] and notebook.logged.pop("events").text
     learning.log("left_arm", huge)
