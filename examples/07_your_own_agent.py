@@ -1,6 +1,6 @@
 """Your own agent: anything that decides, acts through a plant, and observes.
 
-This one is not curious: it goes where it was least often, and keeps a plain count of arrivals. It uses the lattice, the
+This one is not curious: it goes to the state that it visited least, and counts its arrivals. It uses the lattice, the
 transition model and the plant, and it would run on the live robot unchanged.
 """
 
@@ -27,7 +27,7 @@ class Wanderer:
         return int(self.rng.choice(np.flatnonzero(visits == visits.min())))
 
     def observe(self, state: int, action: int, outcome: mobee.Outcome) -> float:
-        """Learn from how the action ended; returns the information gain in nats."""
+        """Learn from the outcome of the action; returns the information gain in nats."""
         self.state = self.space.state_of(outcome.q)
         self.visits[self.state] += 1
         return self.model.observe(state, action, self.state)

@@ -1,7 +1,7 @@
-"""Learn from which poses to reach for what: a coarse plan, then a reach that closes the rest (thesis chapter 8).
+"""Learn from which pose to reach for each target: a coarse plan, then a reach that closes the remaining distance (thesis chapter 8).
 
-Each place is a problem. What a reach brought on one target tells something of the others, so that also a place never tried before
-is reached from a good pose.
+Each position is a problem. The reward of a reach for one target informs about the others, so that a position never tried before
+is reached from a good pose, too.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ agent = mobee.ReachAgent(space, plant, marker="right_palm", predictor="gp", stra
 for _ in range(3):
     agent.learn(targets, tries=40)
     found = agent.evaluate(targets, repetitions=2)  # from random poses; nothing is learned from it
-    print(f"after {agent.tries} tries: {found.scores.mean():.2f} of {len(targets)}; {100 * np.nanmedian(found.missing):.1f} cm are missing")
+    print(f"after {agent.tries} tries: {found.scores.mean():.2f} of {len(targets)}; {100 * np.nanmedian(found.missing):.1f} cm remain")
 
 new = mobee.ReachTarget(np.array((-0.3, 0.1, 0.15)))
-way = agent.plan(new)
-print(f"a new place: {' -> '.join(map(str, way.path))}, then reach; expected reward {way.expected:.2f}")
+plan = agent.plan(new)
+print(f"a new target: {' -> '.join(map(str, plan.path))}, then reach; expected reward {plan.expected:.2f}")
 made = agent.try_problem(new)
-print(f"reached from state {made.reach_state}: {1000 * made.missing:.1f} mm are missing, reward {made.reward:.2f}")
+print(f"reached from state {made.reach_state}: {1000 * made.missing:.1f} mm remain, reward {made.reward:.2f}")

@@ -140,5 +140,5 @@ def test_11_reaches_a_place_never_tried_before(tmp_path: Path) -> None:
     text = printed("11", tmp_path)
     scores = [float(score) for score in re.findall(r"tries: (\S+) of 8", text)]
     assert len(scores) == 3 and all(3.0 < score < 8.0 for score in scores)
-    missing, reward = numbers(r"state \d+: (\S+) mm are missing, reward (\S+)", text)
+    missing, reward = numbers(r"state \d+: (\S+) mm remain, reward (\S+)", text)
     assert missing < 20.0 and reward == pytest.approx(1 / (1 + missing / 10), abs=0.01)
