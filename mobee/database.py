@@ -55,7 +55,7 @@ def opened(path: Path, read_only: bool) -> sqlite3.Connection:
 
 @contextmanager
 def transaction(database: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing, and nobody else writes meanwhile."""
+    """A transaction that excludes other writers."""
     database.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -67,7 +67,7 @@ def transaction(database: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turn SQLite's errors into one line that names the file and the remedy."""
+    """Convert SQLite's errors into one line with the file and the remedy."""
     try:
         yield
     except sqlite3.Error as error:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 
 class MobeeError(Exception):
-    """What was given, where, what is valid, and what to do next, in one message."""
+    """The base class; a message says what was given, where, what is valid, and what to do next."""
 
 
 class RobotFileError(MobeeError):
@@ -15,7 +15,7 @@ class RobotFileError(MobeeError):
 
 
 class OlderVersion(UserWarning):
-    """A file of an older version of the grammar: something in it was read as that version meant it, and not as it stands there."""
+    """A warning for a file of an older version: an element was read as in that version, not as in the present one."""
 
 
 class InvalidValue(MobeeError, ValueError):
@@ -36,7 +36,7 @@ class UnknownName(MobeeError, KeyError):
 
 
 class NotInstalled(MobeeError):
-    """A package or a built library that is not there, or not for this machine; the message holds the remedy."""
+    """A package or a built library is missing, or not for this machine; the message says what to do."""
 
 
 class ActionInterrupted(MobeeError):

@@ -33,7 +33,7 @@ class AgentFile:
         self._db: sqlite3.Connection = opened(self.path, read_only)
 
     def bind(self, settings: dict[str, Any]) -> None:
-        """Record the agent's settings (plain JSON values), or refuse if it has others on record."""
+        """Record the agent's settings (plain JSON values); raises if others are recorded."""
         given = {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
         with explained(self.path), transaction(self._db):
             known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
@@ -54,13 +54,13 @@ class AgentFile:
                 )
 
     def settings(self, agent: str | None = None) -> dict[str, Any]:
-        """The settings on record of this agent, or of another one in the file; empty if there are none."""
+        """Return the recorded settings of this agent, or of another one in the file; empty if there are none."""
         with explained(self.path):
             rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self._named(agent),)).fetchall()
         return {key: json.loads(value) for key, value in rows}
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._db.close()
 
     def __enter__(self) -> Self:
@@ -135,7 +135,7 @@ class TransitionStore(AgentFile):
         self._last = transition.n
 
     def load(self, agent: str | None = None) -> list[Transition]:
-        """All transitions of this agent, or of another one in the file, in order."""
+        """Return all transitions of this agent, or of another one in the file, in order."""
         name = self._named(agent)
         query = "SELECT n, s, a, s_next, reward, settled, duration, q, touched FROM transitions WHERE agent = ? ORDER BY n"
         with explained(self.path):
@@ -155,7 +155,7 @@ class TransitionStore(AgentFile):
         return [t for (t,) in rows]
 
     def agents(self) -> tuple[str, ...]:
-        """Names of the agents that have transitions in the file."""
+        """Return the names of the agents that have transitions in the file."""
         with explained(self.path):
             return tuple(name for (name,) in self._db.execute("SELECT DISTINCT agent FROM transitions ORDER BY agent"))
 

@@ -15,13 +15,13 @@ FARTHEST = 1e6  # m: beyond it a number is a slip, and the arithmetic would lose
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """Where a frame stands in another."""
+    """The position and rotation of a frame in another."""
 
     position: Array  # (3,) m
     rotation: Array  # (3, 3)
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """The frame `inner`, given in this one, as seen from where this one is given."""
+        """Return the frame `inner`, given in this one, in the frame in which this one is given."""
         return Frame(self.rotation @ inner.position + self.position, self.rotation @ inner.rotation)
 
 
@@ -39,7 +39,7 @@ def read_origin(parent: Node) -> Frame:
 
 
 def child(parent: Node, tag: str) -> Node | None:
-    """The only child of that tag, or None; raises RobotFileError when there are two."""
+    """Return the only child with that tag, or None; raises RobotFileError if there are two."""
     found = [node for node in parent if node.tag == tag]
     if len(found) > 1:
         found[1].fail("position in the file", f"a second <{tag}>", f"The first is in line {found[0].line}: remove one")
@@ -47,7 +47,7 @@ def child(parent: Node, tag: str) -> Node | None:
 
 
 def triple(node: Node, name: str) -> Array:
-    """Three numbers that a robot can have."""
+    """Return three numbers of plausible size."""
     values = np.array(node.numbers(name, 3))
     if float(np.abs(values).max()) > FARTHEST:
         node.fail(name, f"{float(np.abs(values).max()):g} is too large", "URDF counts in metres and radians")
@@ -55,7 +55,7 @@ def triple(node: Node, name: str) -> Array:
 
 
 def bounded(node: Node, name: str, default: float | None = None) -> float:
-    """A number that a robot can have."""
+    """Return a number of plausible size."""
     value = node.number(name, default)
     if abs(value) > FARTHEST:
         node.fail(name, f"{value:g} is too large", "URDF counts in metres and radians")

@@ -30,7 +30,7 @@ class Drive:
 
 
 def read_drives(joints: Mapping[str, UrdfJoint], moving: Sequence[UrdfJoint]) -> dict[str, Drive]:
-    """What drives each moving joint, chains of <mimic> followed; raises RobotFileError for cycles and unknown joints."""
+    """Return the drive of each moving joint, along chains of <mimic>; raises RobotFileError for cycles and unknown joints."""
     names = {joint.name for joint in moving}
     drives: dict[str, Drive] = {}
     for joint in moving:
@@ -107,7 +107,7 @@ def _or_infinite(limit: Node, name: str) -> float:
 
 
 def _warn_of_free(joint: UrdfJoint) -> None:
-    """Say which interval is taken for a joint that should have limits and states none."""
+    """Warn which range is assumed for a joint that should have limits and states none."""
     limit = child(joint.node, "limit")
     if joint.kind == "continuous" or np.isfinite(stated_limits(joint)).all():
         return
@@ -158,7 +158,7 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
 
 
 def _extended(master: UrdfJoint, motor: Motor) -> Motor:
-    """What `write_urdf` notes of a motor that URDF has no word for: its name, its own unit, its acceleration."""
+    """Read what `write_urdf` adds for a motor and URDF cannot express: its name, its own unit, its acceleration."""
     note = child(master.node, "mobee")
     if note is None:
         return motor

@@ -27,7 +27,7 @@ CLOSE = 1e-9  # m, for the ends of a cylinder that carries two spheres as caps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A shape, where it was read, and whether it stands on the world."""
+    """A shape, its file and line, and whether it belongs to the base."""
 
     node: Node
     shape: Shape

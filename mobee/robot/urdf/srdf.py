@@ -80,7 +80,7 @@ def read_srdf(path: Path, tree: Tree) -> Srdf:
 
 
 def _known(node: Node, attribute: str, valid: Mapping[str, object]) -> Iterable[str]:
-    """The name if the robot has it; an SRDF is often shared by robots that differ in a gripper."""
+    """Return the name in a tuple if the robot has it, else warn and return (): robots with different grippers often share an SRDF."""
     name = node.text(attribute)
     if name in valid:
         return (name,)
@@ -159,7 +159,7 @@ State = dict[str, tuple[Node, float]]  # joint -> its line in the SRDF, and wher
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """A pose by joints, and its name; `meant`: that is home, or was asked for, so a value that no motor can reach is an error."""
+    """A pose of joints, and its name; `meant`: it is named home or was requested, so that an unreachable value is an error."""
 
     name: str
     state: State
@@ -206,7 +206,7 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
 
 
 def homed(motor: Motor, home: Home, moving: list[UrdfJoint]) -> Motor:
-    """The motor with its place in a home that speaks of joints; raises RobotFileError where a home that is meant is out of reach."""
+    """Return the motor with its home from a pose of joints; raises RobotFileError if a requested home is out of reach."""
     for index, scale, offset in motor.joints:
         if moving[index].name not in home.state:
             continue

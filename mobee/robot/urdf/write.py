@@ -40,7 +40,7 @@ class GeometryWriter:
                 ET.SubElement(element, "mobee", note)
 
     def field(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
-        """Note a field, which URDF has no word for."""
+        """Write a field, which URDF cannot express, as a note."""
         element = ET.SubElement(link, "mobee", {"field": shape.name} | note)
         _origin(element, shape, point)
         element.append(self._geometry(shape))
@@ -125,7 +125,7 @@ def write_urdf(robot: Robot, path: str | Path) -> Path:
 
 
 def _master(motor: Motor) -> Master:
-    """The joint that stands for a motor: one that moves as it does, else the first."""
+    """Return the joint that represents a motor: one that moves as the motor does, else the first."""
     return next((drive for drive in motor.joints if drive[1:] == (1.0, 0.0)), motor.joints[0])
 
 
@@ -198,7 +198,7 @@ def _normal(marker: Marker) -> dict[str, str]:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """The name, changed where it is taken already; then it is."""
+    """Return the name, changed if it is taken, and mark it as taken."""
     while name in taken:
         name += "_marker"
     taken.add(name)

@@ -19,7 +19,7 @@ from mobee.robot.xml.node import Node, read_xml
 
 
 def write_srdf(robot: Robot, masters: Sequence[tuple[int, float, float]], path: Path) -> None:
-    """Write the SRDF; `masters`: for each motor the joint that stands for it in the URDF, with its scale and offset."""
+    """Write the SRDF; `masters`: for each motor the joint that represents it in the URDF, with scale and offset."""
     root = ET.Element("robot", name=robot.name)
     for part in robot.parts.values():
         group = ET.SubElement(root, "group", name=part.name)
@@ -88,7 +88,7 @@ def _begun(name: str, lines: list[str]) -> bytes:
 
 
 def _merged(base: Path, lines: list[str]) -> bytes:
-    """The text with lines before its last </robot>."""
+    """Return the text with lines inserted before its last </robot>."""
     text = base.read_bytes()
     ends = list(_END.finditer(text))
     if not ends:

@@ -1,4 +1,4 @@
-"""Reads what is mounted on a link or joint: volumes, hulls, masses, markers."""
+"""Reads the elements on a link or joint: volumes, hulls, masses, markers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ MOST_SHAPES = 2000  # what is tested grows with the square
 
 
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
-    """The cylinders that `radius` and `field` of a link or joint stand for."""
+    """Add the cylinders that `radius` and `field` of a link or joint describe."""
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
             continue
@@ -83,7 +83,7 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
 
 
 def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
-    """Append a shape, remembering its line, its element and whether it belongs to the base."""
+    """Append a shape, and record its line, its element and whether it belongs to the base."""
     if len(draft.shapes) >= MOST_SHAPES:
         node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
     if place.base:
@@ -95,7 +95,7 @@ def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
 
 
 def free_name(draft: Draft, name: str) -> str:
-    """The name, with a number behind it if a shape has it already."""
+    """Return the name, with a number appended if a shape has it already."""
     free = name
     while free in draft.shape_names:
         free = f"{name}_{draft.shape_names[name]}"

@@ -14,7 +14,7 @@ from mobee.robot.xml.node import Node
 
 @dataclass(slots=True)
 class Draft:
-    """What has been read so far."""
+    """The elements read so far."""
 
     links: list[str] = field(default_factory=lambda: ["base"])
     subtree: list[int] = field(default_factory=lambda: [-1])  # for each link the element whose noSelfCollision holds for it
@@ -32,17 +32,17 @@ class Draft:
     bodies: list[Body] = field(default_factory=list)  # several a link, perhaps
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
-    others: list[tuple[Node, Placed]] = field(default_factory=list)  # robots of other files, and where they were asked for
+    others: list[tuple[Node, Placed]] = field(default_factory=list)  # included robots, and the elements that include them
     where: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def note(self, kind: str, name: str, node: Node) -> None:
-        """Remember where a thing was read first."""
+        """Record file and line of an element, the first time it is read."""
         self.where.setdefault((kind, name), f"{node.file}:{node.line}")
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in the tree a child stands: two points, the link it is on, its part, motor, and the element whose noSelfCollision holds."""
+    """The position of the reader in the tree: two points, link, part, motor, and the element whose noSelfCollision applies."""
 
     point: Array  # (3,) m, where links and joints go on: the end of a link
     start: Array  # (3,) m, where shapes and markers stand: the start of a link
@@ -56,7 +56,7 @@ class Place:
 
 
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
-    """The place inside a link or joint that a reason calls `name`."""
+    """Return the place inside a link or joint; `name`: its name in reasons."""
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:
         draft.hands[index] = name

@@ -1,4 +1,4 @@
-"""Opens foreign XML files: refuses what is absent, too large or hostile, and repairs faults that the readers of 2010 to 2014 accepted."""
+"""Opens XML files: refuses missing, too large and hostile ones, and repairs faults that the readers of 2010 to 2014 accepted."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CONFLICT = (b"<<<<<<<", b"=======", b">>>>>>>")
 
 
 class MalformedXml(RobotFileError):
-    """A file that is no XML, and where: line and column from 1, and what the parser says."""
+    """A file that is not well-formed XML; has line and column from 1, and the message of the parser."""
 
     def __init__(self, message: str, line: int, column: int, problem: str) -> None:
         super().__init__(message)
@@ -40,7 +40,7 @@ class MalformedXml(RobotFileError):
 
 
 class LineHandler(xml.sax.handler.ContentHandler):
-    """A handler of SAX events that knows the line it has reached."""
+    """A handler of SAX events that records the current line."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,7 +57,7 @@ class LineHandler(xml.sax.handler.ContentHandler):
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; a name that no file can have is none."""
+    """Return whether the file exists; False for a name that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -65,7 +65,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; a name that no folder can have is none."""
+    """Return whether the folder exists; False for a name that no folder can have."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -100,7 +100,7 @@ def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
 
 
 def read_content(path: Path) -> bytes:
-    """The bytes of a file of at most 8 MB; errors as parse_xml."""
+    """Return the bytes of a file of at most 8 MB; raises the errors of `parse_xml`."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             reason = os.strerror(21) if path.is_dir() else "Not a regular file"
@@ -122,7 +122,7 @@ _ATTRIBUTE = re.compile(rb"""\s*([\w:.-]+)\s*=\s*("[^"<]*"|'[^'<]*')""")
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """What was mended in which line, and the error that it would have been."""
+    """A repair: its line, what was changed, and the error without it."""
 
     line: int
     what: str
@@ -132,14 +132,14 @@ class Repair:
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """The content of a file after one repair; no line has moved."""
+    """The content of a file after one repair, with unchanged line numbers."""
 
     content: bytes
     repair: Repair
 
 
 def mend(content: bytes, error: RobotFileError) -> Mended | None:
-    """The content without the fault that a parser reported; None where the old reader refused the file too."""
+    """Return the content without the fault that a parser reported; None where the old reader refused the file too."""
     if not isinstance(error, MalformedXml):
         return None
     if error.problem == "duplicate attribute":

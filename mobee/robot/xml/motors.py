@@ -16,7 +16,7 @@ NARROWEST = 1e-6  # deg between the limits of a motor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorDraft:
-    """A motor as its element says, before its joints are known; angles still in [deg]."""
+    """A motor as written in its element, before its joints are known; angles in [deg]."""
 
     node: Node
     name: str
@@ -28,7 +28,7 @@ class MotorDraft:
 
 
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
-    """One <motor>; `count` motors came before it."""
+    """Return the motor of a <motor>; `count`: motors before it."""
     low, high = node.number("minPos"), node.number("maxPos")
     if low == high:
         remedy = "Write a <link> instead of the joint if it shall not move, or another interval"
@@ -47,7 +47,7 @@ def read_motor(node: Node, part: str, count: int) -> MotorDraft:
 
 
 def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:
-    """All motors, part by part in the order of the file, within a part by idx; raises RobotFileError on a double idx."""
+    """Return all motors, part by part in the order of the file, within a part by idx; raises RobotFileError for equal idx."""
     ordered = []
     for part in parts:
         mine = sorted((motor for motor in motors.values() if motor.part == part), key=lambda motor: motor.index)
@@ -61,7 +61,7 @@ def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list
 def finish_joints(
     joints: Sequence[Joint], drives: Sequence[tuple[Node, str]], motors: Sequence[MotorDraft]
 ) -> tuple[tuple[Joint, ...], tuple[Motor, ...]]:
-    """Joints with limits in SI units and motors with the affine map of thesis 2.3.1: motor interval onto joint interval."""
+    """Return joints with limits in SI units, and motors with the affine map of thesis 2.3.1: motor range onto joint range."""
     places = {motor.name: k for k, motor in enumerate(motors)}
     driven: list[list[tuple[int, float, float]]] = [[] for _ in motors]
     finished = []

@@ -30,7 +30,7 @@ FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no":
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """One element: its tag in lower case, its attributes, its children, and where it stands."""
+    """One element: tag in lower case, attributes, children, file and line."""
 
     file: Path
     line: int
@@ -47,7 +47,7 @@ class Node:
         raise RobotFileError(f"{self.file}:{self.line}: <{shown(self.tag)}> {what}: {problem}. {remedy}")
 
     def number(self, name: str, default: float | None = None) -> float:
-        """A finite number, in the unit of the file; without a default the attribute is required."""
+        """Return a finite number, in the unit of the file; without a default the attribute is required."""
         if name not in self.attributes:
             if default is None:
                 self.missing(name)
@@ -55,7 +55,7 @@ class Node:
         return self.finite(name, self.attributes[name])
 
     def finite(self, name: str, text: str) -> float:
-        """A finite number from the text of attribute `name`."""
+        """Return a finite number from the text of attribute `name`."""
         try:
             value = float(text)
         except ValueError:
@@ -69,41 +69,41 @@ class Node:
         return value
 
     def positive(self, name: str, default: float | None = None, unit: str = "metres") -> float:
-        """A number above zero."""
+        """Return a number above zero."""
         value = self.number(name, default)
         if value < SMALLEST:
             self.fail(name, f"{value:g} is {'not positive' if value <= 0 else 'too small'}", f"Write a value above 0, in {unit}")
         return value
 
     def vector(self, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-        """Three numbers from three attributes; `default` where none of them is given, zero for single missing ones."""
+        """Return three numbers from three attributes; `default` if none of them is given, 0 for single absent ones."""
         if not any(name in self.attributes for name in names):
             return np.array(default)
         return np.array([self.number(name, 0.0) for name in names])
 
     def numbers(self, name: str, count: int | None = None) -> list[float]:
-        """A list of numbers separated by blanks or commas, of the given length."""
+        """Return a list of numbers separated by blanks or commas, of the given length."""
         values = [self.finite(name, word) for word in self.words(name)]
         if count is not None and len(values) != count:
             self.fail(name, f"has {len(values)} numbers", f"Write {count} numbers separated by blanks")
         return values
 
     def words(self, name: str) -> list[str]:
-        """A required list of words separated by blanks or commas."""
+        """Return a required list of words separated by blanks or commas."""
         if name not in self.attributes:
             self.missing(name)
         return self.attributes[name].replace(",", " ").split()
 
     def text(self, name: str) -> str:
-        """A required, non-empty text."""
+        """Return a required, non-empty text."""
         return self.optional(name) or self.missing(name)
 
     def optional(self, name: str) -> str:
-        """A text, empty when it is left out."""
+        """Return a text; empty if the attribute is absent."""
         return self.attributes.get(name, "").strip()
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """A yes or no."""
+        """Return a boolean."""
         if name not in self.attributes:
             return default
         value = self.attributes[name].strip().lower()
@@ -112,13 +112,13 @@ class Node:
         return FLAGS[value]
 
     def choice(self, name: str, given: str, valid: Collection[str], kind: str) -> str:
-        """The given name if it is one of the valid ones; else an error with the nearest."""
+        """Return the given name if it is valid; else raise RobotFileError with the nearest one."""
         if given not in valid:
             self.fail(name, f"unknown {kind} {shown(given)!r}", f"{nearest(given, valid)}Valid: {listed(valid)}")
         return given
 
     def missing(self, name: str) -> NoReturn:
-        """Raise the error of a required attribute that is not there, naming a misspelt one if it looks like it."""
+        """Raise RobotFileError for a required attribute that is absent, with an attribute that looks misspelt."""
         given = sorted(self.attributes)
         near = difflib.get_close_matches(name, given, n=1, cutoff=0.5) if len(given) <= LISTED else []
         remedy = f"Did you misspell it as {near[0]!r}? " if near else ""
@@ -138,7 +138,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """How something in a file was understood: a warning where it was not read as it stands there."""
+    """How an element was interpreted; a warning if it was not read literally."""
 
     node: Node
     what: str
@@ -147,26 +147,26 @@ class Remark:
 
 
 def nearest(given: str, valid: Collection[str]) -> str:
-    """A sentence that proposes the nearest valid name, or nothing."""
+    """Return a sentence that proposes the nearest valid name; empty if none is near."""
     lower = {name.lower(): name for name in valid}
     near = difflib.get_close_matches(given.lower(), lower, n=1) if len(given) <= 100 else []
     return f"Did you mean {lower[near[0]]!r}? " if near else ""
 
 
 def listed(names: Collection[str]) -> str:
-    """The names, sorted, for a message: the first ones where there are many."""
+    """Format names, sorted, for a message: only the first of many."""
     words = [shown(name) for name in sorted(names)]
     rest = f" and {len(words) - LISTED} more" if len(words) > LISTED else ""
     return (", ".join(words[:LISTED]) or "none") + rest
 
 
 def shown(text: str) -> str:
-    """A text as a message may hold it: not longer than 60 characters."""
+    """Shorten a text to 60 characters for a message."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def descendants(root: Node) -> Iterator[Node]:
-    """A node and all that it holds, in the order of the file."""
+    """Yield a node and everything inside it, in the order of the file."""
     waiting = [root]
     while waiting:
         node = waiting.pop()
@@ -231,7 +231,7 @@ SPELLING = {"zeropositionkinematictree": "ZeroPositionKinematicTree", "constrain
 
 
 def tree_of(node: Node) -> ET.Element:
-    """The elements of a node that was read, with tags in the spelling of the grammar."""
+    """Return the elements of a node that was read, with tags in the spelling of the grammar."""
     root = ET.Element(SPELLING.get(node.tag, node.tag), node.attributes)
     waiting = [(node, root)]
     while waiting:

@@ -21,7 +21,7 @@ IGNORE_ATTRIBUTES = frozenset({"first", "second", "of", "part", "role", "reason"
 
 @dataclass(slots=True)
 class _Ignored:
-    """What the tags of one role name."""
+    """The pairs that the tags of one role name."""
 
     links: dict[LinkPair, str] = field(default_factory=dict)  # and why
     shapes: set[frozenset[int]] = field(default_factory=set)
@@ -29,7 +29,7 @@ class _Ignored:
 
 
 def without_ignored(robot: Robot, nodes: Iterable[Node]) -> Robot:
-    """The robot without the pairs that <ignore> tags name; raises RobotFileError for an unknown link, shape, part or role."""
+    """Return the robot without the pairs in <ignore> tags; raises RobotFileError for an unknown link, shape, part or role."""
     names = {
         "links": {name: index for index, name in enumerate(robot.links)},
         "shapes": {shape.name: index for index, shape in enumerate(robot.shapes)},
@@ -88,7 +88,7 @@ Table = NDArray[np.bool_]
 
 
 def ignore_elements(robot: Robot) -> list[ET.Element]:
-    """Whole parts where nothing of a role is tested among itself, then pairs of links with their reasons, then pairs of shapes."""
+    """Return <ignore> elements: parts without tests inside, then pairs of links with their reasons, then pairs of shapes."""
     elements = []
     for pair, reason in robot.untested.items():
         first, second = sorted(pair)

@@ -37,7 +37,7 @@ MOST_ELEMENTS_2014 = 500  # and the descents of pairs_2014.py faster
 
 
 def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
-    """The robot of a draft whose file has been read to its end, joined with those of other files; raises RobotFileError."""
+    """Return the robot of a complete draft, joined with the robots that it includes; raises RobotFileError."""
     if not draft.parts and not draft.others:
         root.fail("bodypart", "the robot has no body part", 'Put its motors and links inside <bodypart name="...">')
     draft.note("robot", name, root)
@@ -78,7 +78,7 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
 
 
 def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, Ints, dict[LinkPair, str]]:
-    """Tested pairs of fields and of solids, and the reasons for the pairs of links that are never tested."""
+    """Return tested pairs of fields and of solids, and the reasons for pairs of links that are never tested."""
     given = root.choice("adjacency", root.attributes.get("adjacency", "joined"), ("joined", "listed", *get_args(Rule)), "rule")
     if given == "listed":
         return tested_pairs(draft.shapes, "field", {}, own=True), tested_pairs(draft.shapes, "solid", {}), {}
@@ -95,7 +95,7 @@ def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, I
 
 
 def _with_others(robot: Robot, draft: Draft) -> Robot:
-    """The robot of this file, if it has a body, and those of other files."""
+    """Join the robot of this file, if it has a body, with those that it includes."""
     node, _ = draft.others[-1]
     own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers or draft.bodies else []
     placed = own + [other for _, other in draft.others]
@@ -156,7 +156,7 @@ def _read(path: Path, trail: Trail) -> Robot:
 
 
 def _check_counts(root: Node) -> None:
-    """Refuse what no robot has and what would keep the reader busy for minutes."""
+    """Raise RobotFileError for files that are implausibly large, which would take minutes to read."""
     counts: Counter[str] = Counter()
     waiting = [root]
     while waiting:
@@ -169,7 +169,7 @@ def _check_counts(root: Node) -> None:
 
 
 def _read_tree(root: Node, draft: Draft, place: Place) -> None:
-    """Everything below the root, in the order of the file."""
+    """Read everything below the root, in the order of the file."""
     waiting = [(child, place) for child in reversed(root.children)]
     while waiting:
         node, place = waiting.pop()
@@ -180,7 +180,7 @@ def _read_tree(root: Node, draft: Draft, place: Place) -> None:
         inside = READERS.get(node.tag, _misplaced)(node, draft, place)
         if inside is not None:
             waiting += [(child, inside) for child in reversed(node.children)]
-        elif node.tag != "constraintlist":  # its reader has looked at its rows
+        elif node.tag != "constraintlist":  # its reader has checked its rows
             _check_children(node)
 
 
@@ -293,13 +293,13 @@ def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
 
 @dataclass(slots=True)
 class Trail:
-    """The files that led to the one that is being read, and how many have been read in all."""
+    """The chain of files that include each other down to the current one, and all files read so far."""
 
     files: tuple[Path, ...] = ()
     counted: list[Path] = field(default_factory=list)
 
     def into(self, path: Path) -> Trail:
-        """The trail inside a file."""
+        """Return the trail inside a file."""
         self.counted.append(path)
         return Trail((*self.files, path.resolve()), self.counted)
 
@@ -329,7 +329,7 @@ def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot])
 
 
 def _find(node: Node) -> Path:
-    """A shipped robot by its name, or a file by its path relative to the one that names it."""
+    """Return the file of a shipped robot, or a path relative to the including file."""
     given = node.text("file")
     shipped = [path.stem for path in ROBOTS.glob("*.xml")]
     path = ROBOTS / f"{given}.xml" if given in shipped else node.file.parent / given

@@ -87,7 +87,7 @@ def upgrade_world(root: Node) -> list[Remark]:
 
 
 def _version(root: Node) -> tuple[Version, list[Remark], bool]:
-    """Which version a robot file is of, the remark that says why, and whether it can be of no other."""
+    """Return the version of a robot file, the remark with the reason, and whether that is certain."""
     given = root.optional("version")
     if given in (VERSION, "0.1"):
         return ("2.0" if given == VERSION else "0.1"), [], True
@@ -118,13 +118,13 @@ def _extensions(root: Node) -> Iterator[str]:
 
 
 def _refuse_repairs(root: Node) -> None:
-    """Raise for the first fault of form: only the old programs let them pass."""
+    """Raise the error of the first repaired fault: only the old programs accepted those."""
     if root.repairs:
         raise root.repairs[0].error
 
 
 def _rewrite_0_1(root: Node) -> list[Remark]:
-    """Write the meaning of MoBeE 0.1 in today's words; one warning for each rule that made a difference."""
+    """Rewrite attributes of MoBeE 0.1 into today's grammar; one warning for each rule that made a difference."""
     if root.attributes.get("adjacency") == "published_2014":
         root.attributes["adjacency"] = "recorded_2014"  # what MoBeE 0.1 took for it
     rules: dict[str, list[_Change]] = {}
@@ -182,7 +182,7 @@ def _turned(node: Node) -> Iterator[_Change]:
 
 
 def report(remarks: list[Remark]) -> None:
-    """Warn, with OlderVersion, of everything in a file that was not read as it stands there."""
+    """Warn, with OlderVersion, of everything in a file that was not read literally."""
     for remark in remarks:
         if remark.severity == "warning":
             remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)

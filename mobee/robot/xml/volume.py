@@ -39,7 +39,7 @@ class Volume:
 
 
 def read_volume(node: Node) -> Volume:
-    """The volume of a <sphere>, <capsule>, <cylinder> or <box>; raises RobotFileError."""
+    """Return the volume of a <sphere>, <capsule>, <cylinder> or <box>; raises RobotFileError."""
     centre = node.vector(PLACE)
     kind = KINDS[node.tag]
     if kind == "sphere":
@@ -103,7 +103,7 @@ def direction(node: Node, names: tuple[str, str, str], default: tuple[float, flo
 
 
 def align(source: Array, target: Array) -> Array:
-    """The smallest rotation (3, 3) that takes one unit vector to another; half a turn about x (or z) when they are opposite."""
+    """Return the smallest rotation (3, 3) of one unit vector to another; half a turn about x (or z) if they are opposite."""
     cosine = float(source @ target)
     if cosine < -0.9:  # the division below would lose all but the first digits
         axis = np.cross(source, target)
@@ -116,12 +116,12 @@ def align(source: Array, target: Array) -> Array:
 
 
 def turn_about(axis: Array, angle: float) -> Array:
-    """The rotation (3, 3) about a unit axis by an angle in [rad]."""
+    """Return the rotation (3, 3) about a unit axis by an angle in [rad]."""
     cross = skew(axis)
     turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return turn
 
 
 def skew(v: Array) -> Array:
-    """The matrix (3, 3) of the cross product with v."""
+    """Return the matrix (3, 3) of the cross product with v."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

@@ -81,7 +81,7 @@ def _clause(robot: Robot, clause: Clause) -> ET.Element:
 
 
 def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array) -> None:
-    """Everything on a link and beyond it; the elements stand in the order of the tree, whatever order they are made in."""
+    """Write a link and everything mounted on it, in the order of the tree."""
     waiting = [(into, link, point, 2)]
     while waiting:
         element, here, origin, depth = waiting.pop()
@@ -110,7 +110,7 @@ def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Eleme
 
 
 def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> None:
-    """The mass, the shapes and the markers of a link; the shapes of each part stand in a <bodypart> of that name."""
+    """Write mass, shapes and markers of a link; the shapes of each part in a <bodypart> of its name."""
     element.extend(_mass(body, origin) for body in robot.bodies if body.link == link)
     parts: dict[str, ET.Element] = {}
     for index, shape in enumerate(robot.shapes):
