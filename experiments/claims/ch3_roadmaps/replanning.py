@@ -63,7 +63,7 @@ STEPS = 40
 SOON = 200.0  # ms
 FEW = 10  # crossings with a bump: of fewer no verdict is made
 CLAIMS = (
-    Claim("thesis 4.3.2, fig. 4.7", "when the ball turns solid the hand finds the way around it, to the other side", "immediately"),
+    Claim("thesis 4.3.2, fig. 4.7", "when the ball becomes solid the hand finds the path around it, to the other side", "immediately"),
     Claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms"),
     Claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0"),
 )
@@ -196,17 +196,16 @@ def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[C
     deepest, clear = 1e3 * max(one.deepest for one in crossings), sum(one.deepest == 0.0 for one in crossings)
     return [
         CLAIMS[0].measured(
-            f"{arrived} of {len(bumped)} arrive, {straight} of them straight on; {seconds:.1f} s in all",
+            f"{arrived} of {len(bumped)} arrive, {straight} of them directly; {seconds:.1f} s in all",
             arrived == len(bumped) if enough else None,
         ),
         CLAIMS[1].measured(
-            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints come no nearer to the old goal"
+            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints stop approaching the old goal"
             f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
             bool(command.max() <= SOON) if enough else None,
         ),
         CLAIMS[2].measured(
-            f"{deepest:.1f} mm; none at all in {clear} of {len(crossings)} crossings: the ball turns solid at any time, also about a hand"
-            " that is in it",
+            f"{deepest:.1f} mm; no contact in {clear} of {len(crossings)} crossings: the ball may become solid around the hand",
             bool(deepest <= 1e3 * DEEP) if enough else None,
         ),
     ]
@@ -255,7 +254,7 @@ def plot_times(crossings: Sequence[Measured]) -> Any:
     """Draw the distribution of the times from the bump to the new path."""
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()
-    for name, label in (("command", "a command of the new path is in force"), ("turn", "the joints come no nearer to the old goal")):
+    for name, label in (("command", "a command of the new path is in force"), ("turn", "the joints stop approaching the old goal")):
         values = np.sort([getattr(one, name) for one in crossings if one.bumped])
         axes.step(values, np.arange(1, len(values) + 1) / max(len(values), 1), where="post", label=label)
     axes.axvline(SOON, color="0.5", linestyle="--", linewidth=0.8)

@@ -173,7 +173,7 @@ PERFORM = "experiments.claims.ch3_roadmaps.roadmap_from_scratch:perform"
 CLAIMS = (
     Claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes"),
     Claim("thesis 4.3.1", "small, randomly generated graphs often contain unreachable vertices", "often"),
-    Claim("thesis 4.3.1", "rollback works robustly, so that what was found of an edge stands: tried again from rest it does the same", "-"),
+    Claim("thesis 4.3.1", "rollback works robustly: an edge that is tried again from rest has the same outcome", "-"),
     Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0"),
 )
 MIN_AGREEMENT = 0.95  # share of edges

@@ -150,8 +150,8 @@ MAPS = Claim(
     "thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only"
 )
 VALID = Claim("thesis 3.3", "the task's constraints are built into the map: poses that meet all of them, by python-fcl", "all")
-GRAPH = Claim("thesis 3.3", "a traversable graph: share of the poses in its largest connected part, least of all tasks", "all")
-SIZE = Claim("thesis 4.3.3, fig. 4.8", "the pre-grasp map: so many poses", "approximately 5,000")
+GRAPH = Claim("thesis 3.3", "a traversable graph: share of the poses in its largest connected part, smallest over all tasks", "all")
+SIZE = Claim("thesis 4.3.3, fig. 4.8", "number of poses of the pre-grasp map", "approximately 5,000")
 SOON = Claim("aim of this reproduction", "every other map by evolution within 2 minutes of processor time", f"at most {LARGEST:.0f} s")
 CLAIMS = (MAPS, VALID, GRAPH, SIZE, SOON)
 
