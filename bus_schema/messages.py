@@ -174,7 +174,7 @@ class Motion(Message, frozen=True, kw_only=True):
     )
 
     action_id: Text  # empty: none yet
-    epoch: Count  # goal epoch in force, 0 = nobody owns the goal
+    epoch: Count  # goal epoch in force, 0 = no owner
     status: MotionStatus
     since_k: Count  # tick at which the status began
     start_k: Count  # tick at which the action began

@@ -12,7 +12,7 @@ from services.controller.node import ControllerNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the controller until it is told to end."""
+    """Run the controller until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.controller")
     with explained("services.controller"):
         robot = robot_of(config)

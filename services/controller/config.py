@@ -24,9 +24,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Milliseconds after which robot_sim holds a part that it hears nothing for."""
     terms: list[str] = []
-    """Further forces of the law, each an importable `module:name` of a Term or its function; the model must be told the same."""
+    """Further forces of the law, each an importable `module:name` of a Term or its function; the model needs the same setting."""
     posture: dict[str, list[float]] = {}
-    """Where a part that nobody owns shall be, rad, by part; a part that is not named stays where it is."""
+    """Posture of a part without owner, rad, by part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
         """As ServiceConfig: the robot must be able to take the posture, and the terms must be there."""

@@ -137,7 +137,7 @@ class ControllerNode:
                 action.resume(tick.k)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
-        """Orders to the parts, and their reference (n,); without fresh forces every part that follows is told to hold."""
+        """Orders to the parts, and their reference (n,); without fresh forces every part that follows gets the order to hold."""
         ticks = self._law.count_ticks(tick.k)
         self._counters.ticks += 1
         self._counters.long_gaps += ticks > MAX_TICKS

@@ -12,7 +12,7 @@ from services.model.node import ModelNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the model until it is told to end."""
+    """Run the model until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.model")
     with explained("services.model"):
         robot = robot_of(config)

@@ -14,7 +14,7 @@ from services.monitor.output import open_output, recording_of
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the monitor until it is told to end."""
+    """Run the monitor until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
         robot = robot_of(config)

@@ -1,6 +1,6 @@
 """Serves the page, `python -m services.monitor.page`: becomes Rerun's own program.
 
-Rerun's Python calls listen on every interface; its program can be told to listen on loopback only.
+Rerun's Python calls listen on every interface; its program has an option to listen on loopback only.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ def view(
 ) -> None:
     """Show a motion on a page until the user interrupts or the page's server ends, or save it to a file.
 
-    `tell` is given the page's address when all is there to be seen.  `stretches`: of the motion, RATE poses a second; None: a sweep
+    `tell` is called with the page's address when all data is there.  `stretches`: of the motion, RATE poses a second; None: a sweep
     through all that the robot can do.
     """
     web_port, grpc_port = _free_ports()
@@ -132,7 +132,7 @@ def layout(robot: Robot) -> rrb.Blueprint:
 
 
 def _free_ports() -> tuple[int, int]:
-    """Two ports of loopback that nobody listens on, so that a running system keeps its own."""
+    """Two free ports on the loopback interface."""
     with socket.socket() as first, socket.socket() as second:
         for probe in (first, second):
             probe.bind(("127.0.0.1", 0))

@@ -12,13 +12,13 @@ from services.port_filter.node import FilterNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the filter until it is told to end."""
+    """Run the filter until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.port_filter")
     with explained("services.port_filter"):
         robot = robot_of(config)
         theirs = ServiceConfig(endpoint=config.endpoint, namespace=config.clients, robot=config.robot, mode=config.mode)
         with Service("robot_sim", theirs, robot) as twin, Service("port_filter", config, robot, inbox=twin.inbox) as service:
-            twin.log.disabled = True  # its events are for the clients; people are told by the service
+            twin.log.disabled = True  # its events are for the clients; the service logs them for people
             FilterNode(service, twin, config, robot)
             service.ready()
             twin.ready()

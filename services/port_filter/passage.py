@@ -79,7 +79,7 @@ class Streams:
     def __init__(
         self, service: Service, twin: Service, robot: Robot, epochs: dict[str, int], refusal: Callable[[], str], mark: Callable[[], object]
     ) -> None:
-        """`epochs`: the drive epoch of each part; `refusal` as for DriveDesk; `mark` is called when a position move begins."""
+        """`epochs`: the drive epoch of each part; `refusal` as for DriveServer; `mark` is called when a position move begins."""
         self._service, self._twin, self._robot = service, twin, robot
         self._epochs, self._refusal, self._mark = epochs, refusal, mark
         self._parts: dict[str, PartStatus] = {}

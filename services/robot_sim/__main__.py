@@ -13,7 +13,7 @@ from services.robot_sim.node import Node
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the simulated robot until it is told to end."""
+    """Run the simulated robot until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.robot_sim")
     with explained("services.robot_sim"):
         robot = robot_of(config)

@@ -109,7 +109,7 @@ class BulletBackend:
         q[scene.motors] = [joint[0] for joint in joints]
         motors.adopt(q)
         efforts = motors.efforts
-        exerted = np.array([joint[3] for joint in joints])  # of a constraint that is switched off PyBullet tells the last one
+        exerted = np.array([joint[3] for joint in joints])  # for a constraint that is switched off PyBullet returns the last value
         efforts[scene.motors] = exerted if share is None else np.where(share.free, share.torque, exerted)
         motors.efforts = efforts
 

@@ -61,7 +61,7 @@ class Gears:
         while True:
             at, rest = np.flatnonzero(free), np.flatnonzero(~free)
             mass = now.mass[np.ix_(at, at)] + (INERTIA + h * FRICTION) * np.eye(len(at))
-            # `known` holds the momentum of all joints; those that are not free keep theirs, or change it as they are told to
+            # `known` holds the momentum of all joints; the momentum of those that are not free is given
             found = np.linalg.solve(mass, known[at] - now.mass[np.ix_(at, rest)] @ velocity[rest])
             within = np.clip(found, fastest[0][at], fastest[1][at])
             velocity[at] = within

@@ -277,7 +277,7 @@ class Gate:
         self.force_hold("requested by its owner")
 
     def force_hold(self, why: str) -> None:
-        """Hold at once, whoever owns the part."""
+        """Hold at once, without a request of the owner."""
         if self.state == "armed":
             self._enter("hold", why)
 
@@ -371,7 +371,7 @@ class Gate:
 
     def _check_epoch(self, epoch: int) -> None:
         if self.owner is None or epoch != self.epoch:
-            in_force = f"epoch {self.epoch} does" if self.owner else "nobody does"
+            in_force = f"epoch {self.epoch} does" if self.owner else "no client does"
             raise Refused("epoch", f"{self.part}: epoch {epoch} does not own it, {in_force}; take it first")
 
 

@@ -1,7 +1,7 @@
 """Renders the eye images in a process of its own, `python -m services.robot_sim.renderer`.
 
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects).
-Writes: vision/image/{left,right}, vision/camera/{left,right}; nothing while nobody listens.
+Writes: vision/image/{left,right}, vision/camera/{left,right}; only while there are subscribers.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class RendererNode:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the renderer until it is told to end."""
+    """Run the renderer until a signal or a shutdown call."""
     config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
     with explained("services.robot_sim.renderer"):
         robot = robot_of(config)

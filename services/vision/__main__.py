@@ -12,7 +12,7 @@ from services.vision.node import VisionNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the target locator until it is told to end."""
+    """Run the target locator until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.vision")
     with explained("services.vision"):
         robot = robot_of(config)

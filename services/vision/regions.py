@@ -15,7 +15,7 @@ def label(mask: Mask, diagonal: bool) -> Labels:
     `diagonal`: pixels that share a corner only are connected too.
     """
     height, width = mask.shape
-    line = np.zeros((height, width + 1), dtype=np.int8)  # one pixel more, so that no run goes on in the next row
+    line = np.zeros((height, width + 1), dtype=np.int8)  # one pixel more, so that no run of pixels continues in the next row
     line[:, :width] = mask
     steps = np.diff(line.ravel(), prepend=np.int8(0))
     starts, ends = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
