@@ -6,6 +6,7 @@ import pytest
 import mobee
 from mobee.errors import InvalidValue, UnknownName
 from mobee.roadmap.ik import costs
+from mobee.roadmap.ik.costs import angle_between, lengths, unit_vector, units, vector
 
 
 def turn(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -146,3 +147,87 @@ def test_what_is_not_valid_is_refused(make) -> None:
 def test_an_unknown_marker_is_refused(free: mobee.Model, icub: mobee.Robot) -> None:
     with pytest.raises(UnknownName, match="left_palm"):
         mobee.solve_ik(free, [costs.position("left_plam", [0.0, 0.0, 0.0])])
+
+
+def test_relative_position_is_how_far_a_marker_is_from_a_place_that_goes_with_another(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    place = np.array([0.02, -0.01, -0.2])
+    there = pose.position("left_palm") + (pose.rotation("left_palm") @ place[:, None])[..., 0]
+    missing = costs.relative_position("right_palm", "left_palm", place).residual(pose)
+    np.testing.assert_allclose(missing, np.linalg.norm(pose.position("right_palm") - there, axis=1), atol=1e-14)
+
+
+def test_relative_orientation_is_the_turn_between_two_markers(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    between = pose.rotation("left_palm").swapaxes(-1, -2) @ pose.rotation("right_palm")
+    missing = costs.relative_orientation("right_palm", "left_palm", np.eye(3)).residual(pose)
+    np.testing.assert_allclose(missing, np.arccos((np.trace(between, axis1=1, axis2=2) - 1.0) / 2.0), atol=1e-7)
+    assert costs.relative_orientation("right_palm", "left_palm", between[2]).residual(pose)[2] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_aligned_is_the_angle_between_directions_of_two_markers(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    fingers, thumb = pose.rotation("left_palm")[..., 0], -pose.rotation("right_palm")[..., 1]
+    missing = costs.aligned("left_palm", "right_palm", (3.0, 0.0, 0.0), (0.0, -1.0, 0.0)).residual(pose)
+    np.testing.assert_allclose(missing, np.arccos((fingers * thumb).sum(axis=1)), atol=1e-7)
+
+
+def test_orientation_of_a_direction_of_the_markers_own(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    missing = costs.orientation("right_palm", (0.0, 0.0, 5.0), direction=(-2.0, 0.0, 0.0)).residual(pose)
+    np.testing.assert_allclose(missing, np.arccos(-pose.rotation("right_palm")[:, 2, 0]), atol=1e-7)
+
+
+def test_a_point_of_the_markers_frame_can_be_put_on_a_place(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    points = pose.position("left_palm") + (pose.rotation("left_palm") @ np.array([[0.1], [0.0], [-0.2]]))[..., 0]
+    missing = costs.position("left_palm", points[1], offset=(0.1, 0.0, -0.2)).residual(pose)
+    np.testing.assert_allclose(missing, np.linalg.norm(points - points[1], axis=1), atol=1e-14)
+
+
+def test_across_is_the_angle_to_the_plane_across_an_axis(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    tilted = np.abs(np.pi / 2 - np.arccos(pose.normal("right_palm")[:, 2]))
+    np.testing.assert_allclose(costs.across("right_palm", (0, 0, 3)).residual(pose), tilted, atol=1e-7)
+    fingers = np.abs(np.pi / 2 - np.arccos(pose.rotation("right_palm")[:, 2, 0]))
+    np.testing.assert_allclose(costs.across("right_palm", (0, 0, 3), (1, 0, 0)).residual(pose), fingers, atol=1e-7)
+
+
+def test_plane_is_the_distance_to_it_on_either_side_and_at_most_that_beyond_it(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    heights = pose.position("left_elbow")[:, 2]
+    middle = float(np.median(heights))
+    np.testing.assert_allclose(costs.plane("left_elbow", (0, 0, 2), middle).residual(pose), np.abs(heights - middle), atol=1e-15)
+    beyond = costs.at_most("left_elbow", (0, 0, 2), middle).residual(pose)
+    np.testing.assert_allclose(beyond, np.maximum(heights - middle, 0.0), atol=1e-15)
+    assert (beyond == 0.0).any() and (beyond > 0.0).any()
+
+
+@pytest.mark.parametrize("goal", [np.diag([1.0, 1.0, -1.0]), np.eye(2), [[np.nan] * 3] * 3])
+def test_what_is_no_rotation_is_refused(goal: np.ndarray) -> None:
+    with pytest.raises(InvalidValue, match="goal is no rotation"):
+        costs.relative_orientation("right_palm", "left_palm", goal)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.5, np.pi / 2, 3.0, np.pi - 1e-6, np.pi])
+def test_angles_are_exact_near_their_ends(angle: float) -> None:
+    one, other = np.array([1.0, 0.0, 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
+    assert angle_between(one, other) == pytest.approx(angle, abs=1e-12)
+
+
+def test_directions_have_length_one_and_nothing_stays_nothing(rng: np.random.Generator) -> None:
+    given = rng.standard_normal((20, 3))
+    np.testing.assert_allclose(lengths(units(given)), 1.0)
+    np.testing.assert_allclose(units(given) * lengths(given)[:, None], given)
+    np.testing.assert_array_equal(units(np.zeros(3)), np.zeros(3))
+
+
+@pytest.mark.parametrize("given", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [1.0, np.nan, 0.0]])
+def test_what_is_not_three_finite_numbers_is_told_by_name(given: list[float]) -> None:
+    with pytest.raises(InvalidValue, match="place"):
+        vector("place", given)
+
+
+def test_nothing_is_no_direction() -> None:
+    with pytest.raises(InvalidValue, match="goal.*direction"):
+        unit_vector("goal", [0.0, 0.0, 0.0])
