@@ -1,4 +1,4 @@
-"""Roadmaps on disk: one .npz of plain arrays with the world and the fingerprint of its robot, written whole or not at all."""
+"""Roadmap files: one .npz of plain arrays with the world and digests of robot and world, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DIGITS, _DECIMALS = 16, 9
 
 @per_robot
 def robot_digest(robot: Robot) -> str:
-    """16 hex digits of all that decides which poses a robot has and what touches in them.
+    """Return 16 hex digits of all properties that determine a robot's poses and contacts.
 
     The names of motors and markers count, for costs and tasks speak of them; those of the robot, of its links and of its shapes do
     not, nor does how fast its motors are.
@@ -45,7 +45,7 @@ def robot_digest(robot: Robot) -> str:
 
 
 def world_digest(world: World) -> str:
-    """16 hex digits of the objects that can be touched: their volumes, places and roles, and what carries them.
+    """Return 16 hex digits of the objects that can be touched: shapes, poses, roles, and the links that carry them.
 
     Neither their names nor their order nor their colours count, and ghosts are not there.
     """
@@ -57,12 +57,12 @@ def _shape(shape: Shape) -> bytes:
     return _bytes(shape.kind, shape.role, shape.link, shape.size, shape.position, shape.rotation, vertices)
 
 
-def _object(thing: WorldObject) -> bytes:
-    return _bytes(thing.kind, thing.role, thing.link or "", thing.size, thing.position, thing.rotation)
+def _object(one: WorldObject) -> bytes:
+    return _bytes(one.kind, one.role, one.link or "", one.size, one.position, one.rotation)
 
 
 def _bytes(*values: str | ArrayLike) -> bytes:
-    """Text as it is, numbers rounded, each with its length before it."""
+    """Return text and rounded numbers as bytes, each preceded by its length."""
     found = [value.encode() if isinstance(value, str) else _rounded(value) for value in values]
     return b"".join(len(one).to_bytes(8, "little") + one for one in found)
 
@@ -80,7 +80,7 @@ def _digest(parts: Iterable[bytes]) -> str:
 
 
 def world_as_json(world: World) -> list[dict[str, Any]]:
-    """Its objects, in the order in which they were added."""
+    """Return the objects of a world as plain JSON values, in the order in which they were added."""
     return [
         {
             "name": one.name,
@@ -97,7 +97,7 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
 
 
 def world_from_json(objects: Sequence[dict[str, Any]]) -> World:
-    """A new world of them; raises KeyError and InvalidValue for what is none."""
+    """Return a new world of such objects; raises KeyError or InvalidValue if they are not valid."""
     world = World()
     for one in objects:
         place = {"position": one["position"], "rotation": one["rotation"]}
@@ -115,7 +115,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[str, Any]) -> None:
-    """Write arrays of numbers and notes, plain JSON; whoever reads meanwhile, or after a crash, finds the old file or the new one.
+    """Write arrays of numbers and notes, plain JSON; a reader finds the old file or the new one, also after a crash.
 
     Raises MobeeError where the file cannot be written.
     """
@@ -136,7 +136,7 @@ def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[s
 
 
 def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
-    """What was written: the arrays, and the notes; raises MobeeError, in one line, for any other file."""
+    """Return the arrays and the notes of a file; raises MobeeError for any other file."""
     place = Path(path)
     try:
         with place.open("rb") as raw:

@@ -31,37 +31,37 @@ def require_ompl() -> tuple[Any, Any, Any]:
     return base, geometric, util
 
 
-class Judge(Protocol):
-    """Which poses (d,) and motions of some joints are sound."""
+class ValidityChecker(Protocol):
+    """Decides which poses (d,) and straight motions of some joints are valid."""
 
     @property
     def low(self) -> Array:
-        """(d,) rad: poses are told to OMPL as (q - low) / span."""
+        """Lower limits (d,) rad; OMPL gets poses as (q - low) / span."""
 
     @property
     def span(self) -> Array:
-        """(d,) rad."""
+        """Ranges (d,) rad."""
 
     @property
     def box(self) -> Array:
-        """(d, 2) rad, within which samples are drawn."""
+        """Limits (d, 2) rad of the samples."""
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """Which of the poses (P, d) are."""
+        """Return which of the poses (P, d) are valid."""
 
     def sound_motion(self, start: Array, end: Array) -> bool:
-        """Whether all of the straight way between two poses is."""
+        """Return whether the straight motion between two poses is valid."""
 
 
 class Free:
-    """A Judge of whole poses by a function.
+    """A ValidityChecker that calls a function of whole poses.
 
     Args:
-        free: which of the poses (P, n) rad are sound, (P,).
-        rest: (n,) rad, where motors that do not move are.
-        columns: (d,) those that move.
+        free: returns which of the poses (P, n) rad are valid, (P,).
+        rest: (n,) rad, positions of the motors that do not move.
+        columns: (d,) indices of the motors that move.
         limits: (d, 2) rad.
-        step: of the ranges, between two poses of a motion that are looked at.
+        step: in ranges of the motors, between two poses of a motion that are checked.
     """
 
     def __init__(self, free: Callable[[Array], Any], rest: Array, columns: Ints, limits: Array, step: float) -> None:
@@ -70,17 +70,17 @@ class Free:
         self.low, self.span = limits[:, 0], np.ptp(limits, axis=1)
 
     def whole(self, q: Array) -> Array:
-        """All motors (P, n) from those that move (P, d)."""
+        """Return all motors (P, n) from those that move (P, d)."""
         found = np.repeat(self._rest[None], len(q), axis=0)
         found[:, self.columns] = q
         return found
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See Judge."""
+        """See ValidityChecker."""
         return np.asarray(self._free(self.whole(q)), dtype=bool)
 
     def sound_motion(self, start: Array, end: Array) -> bool:
-        """See Judge; looked at as one batch."""
+        """See ValidityChecker; the poses are checked as one batch."""
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / self._step)))
         shares = np.arange(1, count + 1)[:, None] / count
         return bool(self.sound(start + shares * (end - start)).all())
@@ -94,19 +94,19 @@ class Grown:
     edges: Ints
 
 
-def connected(judge: Judge, start: Array, ends: Array, seed: int, extensions: int = EXTENSIONS) -> Array | None:
-    """RRT-Connect: a sound way from a sound pose (d,) to one of (G, d), as its corners (k, d) rad; None: none was found.
+def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, extensions: int = EXTENSIONS) -> Array | None:
+    """Find a valid path from a valid pose (d,) to one of (G, d) by RRT-Connect; return its corners (k, d) rad, or None.
 
     Where it begins and ends may lie outside the box.  Raises OmplMissing.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_NONE)  # that the seed is set once more; what is made from here on follows it
     util.RNG.setSeed(seed % (2**31 - 1) + 1)
-    low, span = judge.low, judge.span
-    within = (np.concatenate([judge.box.T, start[None], ends]) - low) / span
+    low, span = checker.low, checker.span
+    within = (np.concatenate([checker.box.T, start[None], ends]) - low) / span
     space = _space(base, within.min(axis=0), within.max(axis=0))
-    information = _information(base, space, judge)
-    motions = _motions(base, information, judge)
+    information = _information(base, space, checker)
+    motions = _motions(base, information, checker)
     information.setMotionValidator(motions)
     information.setup()
     problem = base.ProblemDefinition(information)
@@ -130,31 +130,33 @@ def connected(judge: Judge, start: Array, ends: Array, seed: int, extensions: in
     if not problem.hasExactSolution():
         return None
     path = problem.getSolutionPath()
-    return np.array([_pose(judge, path.getState(i)) for i in range(path.getStateCount())])
+    return np.array([_pose(checker, path.getState(i)) for i in range(path.getStateCount())])
 
 
-def grown(kind: str, judge: Judge, milestones: int, neighbours: int | None, seed: int, resolution: float | None = None) -> Grown:
-    """PRM or PRMstar over the box, until it has so many vertices.
+def grown(
+    kind: str, checker: ValidityChecker, milestones: int, neighbours: int | None, seed: int, resolution: float | None = None
+) -> Grown:
+    """Grow a PRM or PRMstar over the box until it has so many vertices.
 
     `neighbours`: the nearest ones that each is tried to be joined with; None: the planner's own rule.  `resolution`: of the ranges,
-    between poses of a motion that OMPL looks at itself, one by one; None: the judge does.  Raises OmplMissing.
+    between poses of a motion that OMPL looks at itself, one by one; None: the checker does.  Raises OmplMissing.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_ERROR)
     rng = np.random.default_rng([seed, 300])
-    low, span = judge.low, judge.span
-    corner, high = (judge.box[:, 0] - low) / span, np.ptp(judge.box, axis=1) / span
+    low, span = checker.low, checker.span
+    corner, high = (checker.box[:, 0] - low) / span, np.ptp(checker.box, axis=1) / span
     space = _space(base, corner, corner + high)
 
     def sample(self: Any, state: Any) -> bool:
         for joint, drawn in enumerate(corner + rng.uniform(size=len(low)) * high):
             state[joint] = float(drawn)
-        return bool(judge.sound(_pose(judge, state)[None])[0])
+        return bool(checker.sound(_pose(checker, state)[None])[0])
 
-    information = _information(base, space, judge)
+    information = _information(base, space, checker)
     # OMPL's own sampler draws what no seed decides but the first of a process.
     information.setValidStateSamplerAllocator(type("Sampler", (base.ValidStateSampler,), {"sample": sample}))
-    motions = _motions(base, information, judge)
+    motions = _motions(base, information, checker)
     if resolution is None:
         information.setMotionValidator(motions)
     else:
@@ -168,7 +170,7 @@ def grown(kind: str, judge: Judge, milestones: int, neighbours: int | None, seed
     planner.growRoadmapPtc(base.PlannerTerminationCondition(lambda: planner.milestoneCount() >= milestones))
     data = base.PlannerData(information)
     planner.getPlannerData(data)
-    vertices = np.array([_pose(judge, data.getVertex(v).getState()) for v in range(data.numVertices())])
+    vertices = np.array([_pose(checker, data.getVertex(v).getState()) for v in range(data.numVertices())])
     edges = [(v, w) for v in range(len(vertices)) for w in data.getEdges(v) if v < w]
     return Grown(vertices, np.array(edges, dtype=np.intp).reshape(-1, 2))
 
@@ -183,23 +185,23 @@ def _space(base: Any, low: Array, high: Array) -> Any:
     return space
 
 
-def _information(base: Any, space: Any, judge: Judge) -> Any:
+def _information(base: Any, space: Any, checker: ValidityChecker) -> Any:
     information = base.SpaceInformation(space)
-    information.setStateValidityChecker(lambda state: bool(judge.sound(_pose(judge, state)[None])[0]))
+    information.setStateValidityChecker(lambda state: bool(checker.sound(_pose(checker, state)[None])[0]))
     return information
 
 
-def _motions(base: Any, information: Any, judge: Judge) -> Any:
-    """Has a whole motion looked at as one batch; whoever sets it must keep it."""
+def _motions(base: Any, information: Any, checker: ValidityChecker) -> Any:
+    """Return a motion validator that checks a motion as one batch; the caller must keep a reference to it."""
 
     def check(self: Any, first: Any, second: Any) -> bool:
-        return judge.sound_motion(_pose(judge, first), _pose(judge, second))
+        return checker.sound_motion(_pose(checker, first), _pose(checker, second))
 
     return type("Motions", (base.MotionValidator,), {"checkMotion": check})(information)
 
 
-def _pose(judge: Judge, state: Any) -> Array:
-    found: Array = judge.low + judge.span * np.array([state[i] for i in range(len(judge.low))])
+def _pose(checker: ValidityChecker, state: Any) -> Array:
+    found: Array = checker.low + checker.span * np.array([state[i] for i in range(len(checker.low))])
     return found
 
 
@@ -223,7 +225,7 @@ def rrt_connect(
     extensions: int = EXTENSIONS,
     step: float = STEP,
 ) -> Array | None:
-    """A way without contacts of solids from a pose to one of several (Kuffner and LaValle 2000).
+    """Find a path without solid contacts from a pose to one of several (Kuffner and LaValle 2000).
 
     Args:
         model: robot and world.
@@ -255,7 +257,7 @@ def prm(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """A probabilistic roadmap of poses and motions without contacts of solids (Kavraki et al. 1996).
+    """Grow a probabilistic roadmap of poses and motions without solid contacts (Kavraki et al. 1996).
 
     Args:
         model: robot and world.
@@ -280,14 +282,14 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """As `prm`, with as many neighbours as make its ways shortest in the limit (Karaman and Frazzoli 2011)."""
+    """Grow a roadmap as `prm`, with so many neighbours that its paths are asymptotically optimal (Karaman and Frazzoli 2011)."""
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 
 def query(
     model: Model, joints: Sequence[str], rest: ArrayLike, seed: int = 0, extensions: int = EXTENSIONS
 ) -> Callable[[Array, Array], Array | None]:
-    """`rrt_connect` over some joints as a `MapExplorer` asks for it, the other motors at `rest` (n,) rad."""
+    """Return `rrt_connect` over some joints in the form that `MapExplorer` needs, the other motors at `rest` (n,) rad."""
     whole = _poses(model, rest)
     columns = np.array([model.robot.motor_index(joint) for joint in joints])
 

@@ -164,7 +164,7 @@ def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int
 
 
 class _Believed:
-    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.Judge`."""
+    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.ValidityChecker`."""
 
     def __init__(self, belief: Belief) -> None:
         self.low, self.span, self.box = belief.limits[:, 0], belief.span, belief.limits
@@ -172,7 +172,7 @@ class _Believed:
         self._belief = belief
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See Judge."""
+        """See ValidityChecker."""
         return self._belief.sound(q)
 
 

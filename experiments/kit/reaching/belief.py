@@ -220,18 +220,18 @@ SHORTCUTS = 60  # attempts
 
 
 class _Believed:
-    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.Judge`."""
+    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.ValidityChecker`."""
 
     def __init__(self, belief: PeerBelief, care: Care) -> None:
         self.low, self.span, self.box = belief.range[:, 0], belief.span, belief.limits
         self._belief, self._care = belief, care
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See Judge."""
+        """See ValidityChecker."""
         return self._belief.sound(q, self._care)
 
     def sound_motion(self, start: Array, end: Array) -> bool:
-        """See Judge."""
+        """See ValidityChecker."""
         return self._belief.sound_motion(start, end, self._care)
 
 

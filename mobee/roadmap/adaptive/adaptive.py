@@ -18,22 +18,22 @@ NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)
 
 
 class AdaptiveRoadmap:
-    """A roadmap without edge checks, and what was observed of its edges.
+    """A roadmap whose edges are not checked in advance, with the observed outcomes of its edges.
 
-    It is a Markov decision process of the simplest kind: states are vertices, actions are edges, and an action ends at
-    its goal or where it began.  So its graph is a `Space`, its knowledge an `OutcomeModel`: `mobee.Planner` and
+    It is a simple Markov decision process: states are vertices, actions are edges, and an action ends at its goal or
+    where it began.  Its graph is a `Space`, its beliefs are an `OutcomeModel`: `mobee.Planner` and
     `mobee.value_iteration` plan on `roadmap.space` and `roadmap.beliefs` as on those of a curious agent.  `plan` finds
-    the same ways faster: an edge of length d that works with probability p costs d / p, for it has to be begun 1 / p times.
+    the same paths faster: an edge of length d that succeeds with probability p costs d / p, since it takes 1 / p tries.
 
     Args:
         space: vertices and edges over joints of one part, e.g. `mobee.Voronoi(robot, joints, 20, neighbours=10)`
             or `mobee.roadmap_space(roadmap)`.
-        mode: what becomes of an edge that failed, "remove" (thesis) or "reweigh"; see `EdgeBeliefs`.
+        mode: how a failed edge is treated, "remove" (thesis) or "reweigh"; see `EdgeBeliefs`.
         forgetting: see `EdgeBeliefs`.
-        both_ways: whether what is observed of an edge is held for true of the way back, too.
+        both_ways: whether an observation of an edge also counts for the opposite direction.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is not valid; the message says what is.
     """
 
     def __init__(self, space: Space, mode: Mode = "remove", forgetting: float = 1.0, both_ways: bool = False) -> None:
@@ -49,14 +49,14 @@ class AdaptiveRoadmap:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the map was made from, as plain JSON values."""
+        """Settings of the map as plain JSON values."""
         beliefs = self.beliefs
         made = {"mode": beliefs.mode, "forgetting": beliefs.forgetting, "both_ways": self.both_ways}
         return made | {"space": self.space.settings}
 
     @property
     def tried(self) -> int:
-        """How many edges were tried."""
+        """Number of edges that were tried."""
         return int((self.beliefs.tried > 0).sum())
 
     @property
@@ -76,15 +76,15 @@ class AdaptiveRoadmap:
 
     @property
     def lengths(self) -> Array:
-        """Of the edges in the joints' space, shape (S, A), in [rad]; 0 where there is no edge."""
+        """Lengths of the edges in joint space, shape (S, A), rad; 0 where there is no edge."""
         space = self.space
         ways = space.samples[space.goals] - space.samples[:, None]
         return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((ways**2).sum(axis=-1)))
 
     def plan(self, start: int, goals: ArrayLike) -> tuple[int, ...]:
-        """The cheapest vertices from a start to one of the goals, both included.
+        """Return the vertices of the cheapest path from a start to one of the goals, both included.
 
-        Raises InvalidValue for no such vertex, MobeeError if no way is left.
+        Raises InvalidValue for a vertex that does not exist, MobeeError if no path is left.
         """
         here = int(target_states(self.space, start)[0])
         targets = set(target_states(self.space, goals).tolist())
@@ -102,7 +102,7 @@ class AdaptiveRoadmap:
         return tuple(path)
 
     def costs(self, goals: ArrayLike) -> Array:
-        """What it costs to come from each vertex to the nearest of the goals, shape (S,), infinite where no way is left."""
+        """Return the cost of the cheapest path from each vertex to a goal, shape (S,), infinite where no path is left."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
@@ -114,9 +114,9 @@ class AdaptiveRoadmap:
         return found
 
     def reward(self, goals: ArrayLike) -> Array:
-        """The reward (S, A) with which value iteration finds the ways of `plan`: minus the length of an edge.
+        """Return the reward (S, A) with which value iteration finds the paths of `plan`: minus the length of an edge.
 
-        -inf takes out what is removed, leads nowhere, or begins in a goal.
+        It is -inf for edges that are removed, lead nowhere, or begin in a goal.
         """
         left = self.costs(goals)
         usable = np.isfinite(self._edge_costs()) & np.isfinite(left)[self.space.goals] & np.isfinite(left)[:, None]
@@ -124,7 +124,7 @@ class AdaptiveRoadmap:
         return np.where(usable, -self.lengths, -np.inf)
 
     def reachable(self, start: int) -> NDArray[np.bool_]:
-        """The vertices to which a way is left from one, itself included, shape (S,)."""
+        """Return which vertices can be reached from one, itself included, (S,) bool."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import breadth_first_order
 
@@ -135,16 +135,16 @@ class AdaptiveRoadmap:
         return found
 
     def next_target(self, start: int, rng: np.random.Generator) -> int | None:
-        """A vertex to explore next from a start, drawn in proportion to its untried edges (thesis 4.3.1).
+        """Draw a vertex to explore next, in proportion to its untried edges (thesis 4.3.1).
 
-        None: of the vertices that can be reached all edges were tried.
+        Returns None if all edges of the reachable vertices were tried.
         """
         untried = np.bincount(self.unexplored[:, 0], minlength=len(self)) * self.reachable(start)
         total = int(untried.sum())
         return int(rng.choice(len(self), p=untried / total)) if total else None
 
     def observe(self, state: int, action: int, arrived: int) -> None:
-        """Take that an edge, begun in a state, ended at vertex `arrived`: its goal, or anything else."""
+        """Observe that an edge, begun in a state, ended at vertex `arrived`: at its goal, or elsewhere."""
         goal = self.space.goal(state, action)
         self.beliefs.observe(state, action, arrived == goal)
         back = self.action(goal, state) if self.both_ways else None
@@ -152,12 +152,12 @@ class AdaptiveRoadmap:
             self.beliefs.observe(goal, back, arrived == goal)
 
     def action(self, state: int, goal: int) -> int | None:
-        """The edge from a vertex to another, None if there is none."""
+        """Return the edge from a vertex to another, None if there is none."""
         found = np.flatnonzero(self.space.actions(state) == goal)
         return int(found[0]) if len(found) else None
 
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
-        """Add poses of the joints (N, d) rad, joined both ways to the nearest vertices; returns their numbers."""
+        """Add poses of the joints (N, d) rad, joined in both directions to the nearest vertices; return their numbers."""
         new = self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
         spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
@@ -171,9 +171,9 @@ class AdaptiveRoadmap:
         return np.arange(old, len(poses))
 
     def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
-        """Add a way from a vertex to another through poses of the joints (K, d) rad, K at least 1; returns their numbers.
+        """Add a path from a vertex to another through poses of the joints (K, d) rad, K at least 1; return their numbers.
 
-        So a vertex without a way out is repaired: with what a planner of single queries finds.
+        This repairs a vertex without usable edges, by a path that a single-query planner found.
         """
         first, last = (int(target_states(self.space, vertex)[0]) for vertex in (state, goal))
         new, old = self._new(samples), len(self)
@@ -183,10 +183,10 @@ class AdaptiveRoadmap:
         return np.arange(old, old + len(new))
 
     def prune(self, start: int) -> Ints:
-        """Take out what cannot be reached from a vertex, and edges that failed where others are left.
+        """Remove the vertices that cannot be reached from one, and failed edges of vertices that have others.
 
-        A vertex always keeps an edge, if need be a new one to the nearest vertex.  Returns the new number of every
-        vertex, -1 of those that are gone, shape (S,).
+        A vertex always keeps an edge, if necessary a new one to the nearest vertex.  Returns the new number of every
+        vertex, -1 for removed ones, shape (S,).
         """
         kept = np.flatnonzero(self.reachable(start))
         if len(kept) < 2:
@@ -218,7 +218,7 @@ class AdaptiveRoadmap:
         return new
 
     def _change(self, samples: Array, edges: Edges, number: Ints) -> None:
-        """Another graph; `number` (S,) says what became of the vertices, and knowledge of edges that are still there stays."""
+        """Replace the graph; `number` (S,) are the new numbers of the vertices; beliefs about remaining edges are kept."""
         before, old = self.beliefs, self.space
         goals = table_of(joined(edges), len(samples))
         self.space = Space(old.robot, old.joints, samples, goals, old.rest)
@@ -234,7 +234,7 @@ class AdaptiveRoadmap:
         self.beliefs = before.moved(self.space.goals, np.array(states), np.array(actions), (np.array(rows), np.array(columns)))
 
     def _edge_costs(self) -> Array:
-        """Length over probability, shape (S, A), infinite for what is no edge or is removed."""
+        """Return length / probability of the edges, shape (S, A), infinite for removed ones and where there is no edge."""
         p, lengths = self.beliefs.success, self.lengths
         costs: Array = np.divide(lengths, p, out=np.full(p.shape, np.inf), where=p > 0.0)
         return costs

@@ -20,11 +20,10 @@ PRIOR = (0.2, 0.01)  # successes and failures that every edge is imagined to hav
 
 
 class EdgeBeliefs:
-    """An `OutcomeModel` of two outcomes: with p the goal of an edge, else the vertex where it began.
+    """An `OutcomeModel` of two outcomes: the goal of an edge, with probability p, or else the vertex where it began.
 
-    "remove": an edge that failed is out until it is seen to work (thesis).  "reweigh": p is the mean of a Beta
-    distribution over weighted counts; with every observation of any edge all counts lose weight, so that what
-    was not seen for long is trusted again.
+    "remove": a failed edge is excluded until it succeeds (thesis).  "reweigh": p is the mean of a Beta distribution over
+    weighted counts; each observation of any edge lowers the weight of all counts, so that old failures are forgotten.
 
     Args:
         goals: (S, A) vertices, NO_ACTION where there is no edge.
@@ -45,9 +44,9 @@ class EdgeBeliefs:
         self.failed: Array = np.zeros(goals.shape)
         """Weighted failures, shape (S, A)."""
         self.tried: Ints = np.zeros(goals.shape, dtype=np.intp)
-        """How often each was observed, shape (S, A)."""
+        """Number of observations of each edge, shape (S, A)."""
         self.last: NDArray[np.bool_] = goals != NO_ACTION
-        """Whether each ended at its goal when it was last observed; True before, shape (S, A)."""
+        """Whether each edge ended at its goal when it was last observed; True before, shape (S, A)."""
 
     @property
     def success(self) -> Array:
@@ -66,12 +65,12 @@ class EdgeBeliefs:
 
     @property
     def probabilities(self) -> Array:
-        """Their probabilities, shape (S, A, 2), all 0 where there is no edge."""
+        """Probabilities of the outcomes, shape (S, A, 2), all 0 where there is no edge."""
         p = self.success
         return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
 
     def observe(self, state: int, action: int, arrived: bool) -> None:
-        """Take what became of an edge."""
+        """Observe the outcome of an edge."""
         if self.forgetting < 1.0:
             self.worked *= self.forgetting
             self.failed *= self.forgetting
@@ -81,7 +80,7 @@ class EdgeBeliefs:
         self.last[state, action] = arrived
 
     def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
-        """The same knowledge in another table of goals: entry (states, actions) there was entry `before` here."""
+        """Return the same beliefs for another table of goals: entry (states, actions) there was entry `before` here."""
         found = EdgeBeliefs(goals, self.mode, self.forgetting)
         for name in ("worked", "failed", "tried", "last"):
             getattr(found, name)[states, actions] = getattr(self, name)[before]
@@ -92,14 +91,14 @@ DECIMALS = 9  # rad: poses that agree to here are one
 
 
 def roadmap_space(roadmap: Roadmap, joints: Sequence[str] | None = None) -> Space:
-    """The states and actions that a roadmap's poses and edges are, in both ways.
+    """Return a space whose states are a roadmap's poses and whose actions are its edges, in both directions.
 
-    States are the vertices of the map's largest connected part, in their order; what is apart from it cannot be come to.
-    Vertices that differ in other motors than the joints alone are one state.  The part's other motors rest where the map has them.
+    States are the vertices of the map's largest connected part, in their order; other parts cannot be reached from it.
+    Vertices that differ only in motors other than the joints are one state.  The part's other motors stay where the map has them.
 
     Args:
         roadmap: e.g. of `mobee.build_roadmap`.
-        joints: motor names of one part; None: those that moved when the map was made.
+        joints: motor names of one part; None: the motors that may move in the map.
 
     Raises:
         InvalidValue, UnknownName: joints of several parts, or less than two states.

@@ -22,7 +22,7 @@ Query = Callable[[Array, Array], Array | None]
 
 
 class MapExplorer(Walker):
-    """A Walker that goes where untried edges are, until all are tried that can be come to.
+    """A Walker that moves to untried edges until all reachable edges were tried.
 
     Where it gets stuck, as a vertex may have feasible edges in and none out, it asks for a single way back to what is left to try,
     and joins that to the map.  An explorer that is started again on its store goes on.
@@ -46,7 +46,7 @@ class MapExplorer(Walker):
         self.seed = seed
         super().__init__(roadmap, plant, near, True, store)
         self.repairs = 0
-        """Ways that the query found since it was started."""
+        """Number of paths that the query has found."""
         self._query, self._draws = query, Draws(f"map of {self.part}")
         self._asked_for: Counter[int] = Counter()
         self._target: int | None = None
@@ -57,7 +57,7 @@ class MapExplorer(Walker):
         return super().settings | {"seed": self.seed}
 
     def explore(self, edges: int | None = None) -> bool:
-        """Try edges, at most so many; whether all were tried that can be come to.  Raises ActionInterrupted if the plant does."""
+        """Try at most so many edges; return whether all reachable ones were tried.  Raises ActionInterrupted if the plant does."""
         done = 0
         while edges is None or done < edges:
             here = self.enter()
@@ -70,7 +70,7 @@ class MapExplorer(Walker):
         return False
 
     def _choice(self, here: int) -> int | None:
-        """Where to go now: along an untried edge if this is where they are looked for, else on to there; None: nothing is left."""
+        """Return the next goal: along an untried edge of this vertex, or towards a vertex with untried edges; None: none is left."""
         draws, roadmap = self._draws.at(self.seed, self.record.transitions), self.roadmap
         untried = roadmap.unexplored
         if self._target is None or self._target == here or not self._is_worth_it(here):
@@ -85,7 +85,7 @@ class MapExplorer(Walker):
         return bool(self.roadmap.reachable(here)[self._target]) and bool((self.roadmap.unexplored[:, 0] == self._target).any())
 
     def _escape(self, here: int) -> bool:
-        """Join this vertex to where something is left to try, by the query; whether it found a way."""
+        """Join this vertex to vertices with untried edges, by the query; return whether it found a path."""
         left = sorted({*self.roadmap.unexplored[:, 0].tolist()} - self.record.joined - {here})
         others = [vertex for vertex in left if self._asked_for[vertex] < QUERIES]
         if self._query is None or not others:

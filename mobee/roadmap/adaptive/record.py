@@ -21,7 +21,7 @@ CREATE TABLE IF NOT EXISTS map_changes (
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """`what`: the method of an AdaptiveRoadmap; `given`: its arguments, as plain JSON values; after `n` transitions."""
+    """A change of a map: `what`, the method of AdaptiveRoadmap; `given`, its arguments as plain JSON values; after `n` transitions."""
 
     n: int
     what: str
@@ -29,7 +29,7 @@ class Change:
 
 
 class MapStore(TransitionStore):
-    """A TransitionStore that keeps the changes of a map between its transitions, too.
+    """A TransitionStore that also records the changes of a map between transitions.
 
     Args:
         path, agent, read_only: of the AgentFile, which says too what is raised.
@@ -42,13 +42,13 @@ class MapStore(TransitionStore):
                 self._db.execute(TABLE)
 
     def changed(self, what: str, **given: Any) -> None:
-        """Commit a change that is made now; it is on disk when this returns."""
+        """Commit a change; it is on disk when this returns."""
         with explained(self.path), transaction(self._db):
             (number,) = self._db.execute("SELECT count(*) FROM map_changes WHERE agent = ?", (self.agent,)).fetchone()
             self._db.execute("INSERT INTO map_changes VALUES (?, ?, ?, ?)", (self.agent, number, self._last, json.dumps([what, given])))
 
     def changes(self) -> list[Change]:
-        """All changes of this agent's map, in order."""
+        """Return all changes of this agent's map, in order."""
         with explained(self.path):
             if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'map_changes'").fetchone() is None:
                 return []
@@ -60,7 +60,7 @@ CHANGES = ("grow", "join", "prune")
 
 
 class MapRecord:
-    """An adaptive map and, if there is one, its store: on one that holds something the map becomes what it was.
+    """An adaptive map and its store, if any: a store with content restores the map.
 
     Raises MobeeError if the store is of another map or other settings.
     """
@@ -68,15 +68,15 @@ class MapRecord:
     def __init__(self, roadmap: AdaptiveRoadmap, store: MapStore | None, settings: dict[str, Any]) -> None:
         self.roadmap, self._store = roadmap, store
         self.transitions = 0
-        """Edges observed, those of the store included."""
+        """Number of observed edges, those of the store included."""
         self.joined: set[int] = set()
-        """Vertices that are there since a way was joined to the map."""
+        """Vertices that were added when a path was joined to the map."""
         if store is not None:
             store.bind(settings)
             self._replay(store)
 
     def observe(self, state: int, action: int, arrived: int, outcome: Outcome) -> None:
-        """Take what became of an edge."""
+        """Observe and record the outcome of an edge."""
         made = Transition(
             n=self.transitions + 1,
             s=state,
@@ -93,7 +93,7 @@ class MapRecord:
         self._learn(made)
 
     def change(self, what: str, **given: Any) -> Any:
-        """Call a method of the map that changes it ("grow", "join", "prune") with plain JSON values; returns what it returns."""
+        """Call a method that changes the map ("grow", "join", "prune") with plain JSON values, record it, and return its result."""
         if what not in CHANGES:
             raise UnknownName("change of a map", what, CHANGES)
         if self._store is not None:

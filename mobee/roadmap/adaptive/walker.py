@@ -22,7 +22,7 @@ TRAIL = 50  # vertices back the way it came that are tried before
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """How a walk ended: whether in a goal, after how many edges, and how many of them failed."""
+    """The result of a walk: whether it ended in a goal, the number of edges tried, and the number that failed."""
 
     arrived: bool
     edges: int
@@ -58,18 +58,18 @@ class Walker:
         self.roadmap, self.plant, self.part = roadmap, plant, roadmap.space.part
         self.near, self.back = near, back
         self.here: int | None = None
-        """The vertex where the part is; None: beside the map, or not known."""
+        """The vertex where the part is; None: off the map, or not known."""
         self._trail: list[int] = []  # the vertices where it was, the last at the end
         self.record = MapRecord(roadmap, store, self.settings)
-        """What was observed and changed; changes go through it, and set `here` to None where vertices may have got new numbers."""
+        """Record of observations and changes; every change goes through it, and sets `here` to None if vertices may be renumbered."""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All that decides what it does, but for the plant, as plain JSON values."""
+        """Settings that determine its behaviour, without the plant, as plain JSON values."""
         return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
 
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
-        """Go to one of the goals, planning anew wherever an edge fails, over at most so many edges.
+        """Move to one of the goals over at most so many edges, with a new plan after each edge that fails.
 
         Raises MobeeError if no way is left, ActionInterrupted if the plant does.
         """
@@ -85,7 +85,7 @@ class Walker:
         return Walk(True, edges, bumps)
 
     def follow(self, state: int, goal: int) -> bool:
-        """Go along one edge from where the part is and observe it; whether it worked.  If not, and `back` says so, go back."""
+        """Move along one edge and observe it; return whether it succeeded.  If not, move back if `back` is set."""
         action = self.roadmap.action(state, goal)
         if action is None:
             raise InvalidValue(f"the map has no edge from {state} to {goal}: valid are {self.roadmap.space.actions(state).tolist()}.")
@@ -100,7 +100,7 @@ class Walker:
         return worked
 
     def enter(self) -> int:
-        """The vertex where the part is; if it is beside the map, the first to which it comes: back the way it came, then of the nearest.
+        """Return the vertex of the part; if it is off the map, move to the last vertex, or else to the nearest ones, until one is reached.
 
         Raises MobeeError if it comes to none.
         """
@@ -125,7 +125,7 @@ class Walker:
         return self._is_at(self._move(vertex).q, vertex)
 
     def _onward(self, state: int, goals: ArrayLike) -> int:
-        """On to the next vertex of the new way, without going back first; back if that fails."""
+        """Move to the next vertex of the new path without moving back first; move back if that fails."""
         way = self.roadmap.plan(state, goals)
         for vertex in (way[1], state):
             if self._comes_to(vertex):
@@ -142,7 +142,7 @@ class Walker:
         return bool(np.abs(q[space.columns] - space.samples[vertex]).max() <= self.near)
 
     def _nearest(self, q: Array) -> list[int]:
-        """All vertices, the nearest first."""
+        """Return all vertices, the nearest first."""
         space = self.roadmap.space
         away = np.abs(space.samples - q[space.columns]).max(axis=1)
         return [int(vertex) for vertex in np.argsort(away, kind="stable")]
