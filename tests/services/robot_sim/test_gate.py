@@ -163,7 +163,7 @@ def test_the_loss_of_the_owner_holds_and_its_epoch_is_worth_nothing() -> None:
     gated.gate.lose_owner()
     gated.tick()
     assert gated.drive.mode == "hold"
-    with pytest.raises(Refused, match="nobody"):
+    with pytest.raises(Refused, match="no client does"):
         gated.gate.arm(gated.gate.epoch)
 
 
