@@ -39,10 +39,10 @@ from mobee.errors import InvalidValue
 
 CHANGES = {"object": "a ball enters", "friction": "the elbow's friction doubles"}
 AGENTS = (("curious", 1.0), ("curious", 0.95), ("curious", 0.8), ("least_tried", 1.0), ("least_tried", 0.8))  # explorer, forgetting
-BEFORE = 3_000  # transitions, and as many after the change
+TRANSITIONS = 3_000  # before the change, and as many after it
 QUICK = 0.3  # of the transitions
-EVERY = 50  # transitions between two checks of the model
-SOON = 500  # transitions after the change, in which tries and values are measured
+CHECK_PERIOD = 50  # transitions between two checks of the model
+WINDOW = 500  # transitions after the change, in which tries and values are measured
 RELEARNED = 0.5  # share of the error at the change, below which the change is relearned
 RADIUS = 0.06  # m, of the ball that enters where the hand is in the middle of the lattice
 MIDDLE = 40
@@ -60,7 +60,7 @@ VALUE = Claim(
 )
 TRIED = Claim(
     "thesis 7.2.6",
-    f"the curious agent tries actions with changed outcomes more often: tries over the mean of all actions in the next {SOON} transitions",
+    f"the curious agent tries actions with changed outcomes more often: tries over the mean of all in the next {WINDOW} transitions",
     "a few times",
 )
 CORRECTED = Claim(
@@ -117,7 +117,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     return [
         Condition(
             f"{name}{change}-{explorer}-f{forgetting:g}",
-            {"change": change, "explorer": explorer, "forgetting": forgetting, "transitions": round(share * BEFORE)},
+            {"change": change, "explorer": explorer, "forgetting": forgetting, "transitions": round(share * TRANSITIONS)},
         )
         for change, (explorer, forgetting) in product(CHANGES, AGENTS)
     ]
@@ -142,8 +142,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
             agent.plant = plant_of(change, True, seed + 1)
             agent.interrupt()
             at_change = float(np.mean(l1(agent.model.debiased(), known[True])[changed]))
-        for _ in range(settings["transitions"] // EVERY):
-            seen.append(explore(agent, EVERY))
+        for _ in range(settings["transitions"] // CHECK_PERIOD):
+            seen.append(explore(agent, CHECK_PERIOD))
             error, value = l1(agent.model.debiased(), known[is_after]), agent.plan()[1]
             series.append([float(np.mean(numbers[which])) for numbers in (error, value) for which in (changed, same)])
     return {
@@ -180,12 +180,12 @@ class Run:
     @property
     def tries_after(self) -> float:
         """The mean of `tries` soon after the change."""
-        return float(self.tries[self.checks_before : self.checks_before + SOON // EVERY].mean())
+        return float(self.tries[self.checks_before : self.checks_before + WINDOW // CHECK_PERIOD].mean())
 
     @property
     def tries_before(self) -> float:
         """The mean of `tries` in a time of the same length before the change."""
-        return float(self.tries[self.checks_before - SOON // EVERY : self.checks_before].mean())
+        return float(self.tries[self.checks_before - WINDOW // CHECK_PERIOD : self.checks_before].mean())
 
     @property
     def value_jump(self) -> float:
@@ -195,11 +195,11 @@ class Run:
     @property
     def value_jump_before(self) -> float:
         """The same in a time of the same length before the change."""
-        return self._jump(self.checks_before - SOON // EVERY)
+        return self._jump(self.checks_before - WINDOW // CHECK_PERIOD)
 
     def _jump(self, check: int) -> float:
         values = self.series[:, 2]
-        return float(values[check : check + SOON // EVERY].max() / values[check - 1])
+        return float(values[check : check + WINDOW // CHECK_PERIOD].max() / values[check - 1])
 
     @property
     def errors(self) -> Array:
@@ -216,12 +216,12 @@ class Run:
     def relearned(self) -> float:
         """Transitions after the change until the error is halved; infinite if it never is."""
         small = np.flatnonzero(self.errors <= RELEARNED)
-        return float(EVERY * (small[0] + 1)) if len(small) else float("inf")
+        return float(CHECK_PERIOD * (small[0] + 1)) if len(small) else float("inf")
 
     @property
     def relearned_within(self) -> float:
         """The smaller of `relearned` and the number of transitions after the change."""
-        return float(min(self.relearned, EVERY * (len(self.series) - self.checks_before)))
+        return float(min(self.relearned, CHECK_PERIOD * (len(self.series) - self.checks_before)))
 
 
 Runs = Mapping[tuple[str, str, float], list[Run]]  # by change, explorer and forgetting
@@ -242,7 +242,7 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each condition; and the claims with numbers if all were run in full."""
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]
-    whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * BEFORE // EVERY
+    whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * TRANSITIONS // CHECK_PERIOD
     rows = {
         f"{CHANGES[change]}; {_agent(explorer, forgetting)}": _row(runs[change, explorer, forgetting])
         for change, explorer, forgetting in keys
@@ -322,7 +322,7 @@ def plot(found: Cells) -> Any:
                 _curves(row, group, style, _agent(explorer, forgetting))
         before = next(group[0].checks_before for key, group in runs.items() if key[0] == change)
         for axes, title in zip(row, COLUMNS, strict=True):
-            axes.axvline(EVERY * before, color="k", linewidth=0.6)
+            axes.axvline(CHECK_PERIOD * before, color="k", linewidth=0.6)
             axes.set_title(f"{CHANGES[change]}: {title}", fontsize=9)
             axes.set(xlabel="transitions", ylim=(0.0, None))
         row[0].legend(fontsize=7)
@@ -333,7 +333,7 @@ def _curves(row: Any, runs: list[Run], style: tuple[str, str], label: str) -> No
     tries = np.mean([_smooth(run.tries) for run in runs], axis=0)
     errors, values = (np.mean([run.series[:, column] for run in runs], axis=0) for column in (0, 2))
     for axes, curve in zip(row, (tries, values, errors), strict=True):
-        axes.plot(EVERY * (np.arange(len(curve)) + 1), curve, style[1], color=style[0], label=label, linewidth=1.0)
+        axes.plot(CHECK_PERIOD * (np.arange(len(curve)) + 1), curve, style[1], color=style[0], label=label, linewidth=1.0)
 
 
 def _smooth(rate: Array) -> Array:

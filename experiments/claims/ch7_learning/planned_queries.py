@@ -26,7 +26,7 @@ SIZE, PLACE = (0.3, 0.4, 0.12), (-0.45, -0.45)  # m: edges; x and y of the table
 DOWN, UP = -0.5, 0.31  # m, height of its top: out of reach, and at the height of the chest, where it blocks many paths of the arm
 PERIOD = 10  # actions after which a moving table is moved
 TESTS = ("down", "moving", "up")  # position of the table while plans are executed; "moving": drawn for every query
-LIMIT = 20  # actions of a query
+MAX_ACTIONS = 20  # actions of a query
 ALONG = np.linspace(0.0, 1.0, 41)  # shares of the straight path between two samples at which it is checked
 
 
@@ -157,9 +157,9 @@ class Followed:
     """Means over the queries."""
 
     success: float
-    """Share of queries that reached their goal within LIMIT actions."""
+    """Share of queries that reached their goal within MAX_ACTIONS actions."""
     actions: float
-    """Actions per query, LIMIT for queries that failed."""
+    """Actions per query, MAX_ACTIONS for queries that failed."""
     touched: float
     """Share of actions that ended in the table's field."""
     met: float
@@ -182,7 +182,7 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
         rival.begin(goal)
         here = plant.measure(PART)[:JOINTS]
         states, before = [space.state_of(here)], touched
-        while states[-1] != goal and len(states) <= LIMIT and (aim := rival.aim(here)) is not None:
+        while states[-1] != goal and len(states) <= MAX_ACTIONS and (aim := rival.aim(here)) is not None:
             target = space.target(goal)
             target[:JOINTS] = aim
             outcome = plant.act(PART, target)
@@ -194,7 +194,7 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
         met += touched > before
     arrived = np.array([path[-1] == goal for path, (_, goal) in zip(paths, pairs, strict=True)])
     needed = np.array([len(path) - 1 for path in paths])
-    mean = float(np.where(arrived, needed, LIMIT).mean())
+    mean = float(np.where(arrived, needed, MAX_ACTIONS).mean())
     return Followed(float(arrived.mean()), mean, touched / max(int(needed.sum()), 1), met / len(paths), tuple(paths))
 
 

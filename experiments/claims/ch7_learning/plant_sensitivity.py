@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import FAILING
-from experiments.claims.ch7_learning.unreachable_states import ASIDE, HARDLY, NEVER
+from experiments.claims.ch7_learning.unreachable_states import DEFLECTED_TO, HARDLY, NEVER
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.learning.arm import DT, LEFT, RANK3, RANK4, arm_space, robot
 from experiments.kit.learning.exploration import begin_anywhere, newest
@@ -233,7 +233,7 @@ def _row(runs: Sequence[Mapping[str, Any]]) -> Row:
         never=float((visits[:, NEVER] == 0).sum(axis=1).mean()),
         hardly=float(visits[:, HARDLY].mean()),
         others=float((np.delete(visits, (*NEVER, *HARDLY), axis=1) == 0).sum(axis=1).mean()),
-        deflected=_share(rank4, four, ASIDE),
+        deflected=_share(rank4, four, DEFLECTED_TO),
         where=" ".join(str(state) for state, _ in where.most_common(1)),
         failing=1.0 - _share(rank3, three, {pair: pair[1] for pair in FAILING}),
         entering=1.0 - _share(rank3, three, {ENTERING: ENTERING[1]}),

@@ -38,7 +38,7 @@ ALIKE = Claim(
     "as near as another offline seed",
 )
 MARGIN = 0.02  # of equivalence: the test must be able to detect a larger difference
-NEAR = 0.01  # distance below which models count as equal, independent of the spread
+EQUAL_DISTANCE = 0.01  # distance below which models count as equal, independent of the spread
 LIVE_SEED = 100  # added to the seed: the live agents are not those of an offline seed
 LEAST_FILE = "least.json"
 TRANSITIONS, MIN_TRIES = 800, 2  # per part; of a state-action that is compared
@@ -125,7 +125,7 @@ def _as_near(value: float, offline: Sequence[float]) -> bool | None:
     most = prediction_bound(offline)
     if not np.isfinite([value, most]).all():
         return None
-    if value > max(most, NEAR):
+    if value > max(most, EQUAL_DISTANCE):
         return False
     return True if most - float(np.mean(offline)) <= MARGIN else None
 

@@ -38,10 +38,10 @@ ARMS = tuple(JOINTS)
 PARTS = ("torso", *ARMS)
 FORWARD_STATES = slice(18, 27)  # of the torso: pitch at its third level
 WINDOW = 50  # transitions of an arm over which the contact rate is the mean
-NEAR = 0.02  # m between a field and the table's surface (paper, fig. 8: hand or elbow "within 2 cm of the table")
+NEAR_DISTANCE = 0.02  # m between a field and the table's surface (paper, fig. 8: hand or elbow "within 2 cm of the table")
 FORWARD = np.deg2rad(30.0)  # rad, torso pitch from which the torso is bent forward
 BATCH = 2000  # poses that are evaluated at once
-TOP = 0.05  # share of the actions
+TOP_SHARE = 0.05  # share of the actions
 BOUT = 2  # lags at which slow changes and bouts explain high values
 PERIODS = 3  # least number of periods in a run: the longest period is a third of it
 DIFFERENT = 0.1  # total variation between the outcomes at the table and at the ghost, from which an action depends on other parts
@@ -70,7 +70,7 @@ def world_around(margin: float) -> World:
     return larger
 
 
-def near_table(q: Array, arm: str, margin: float = NEAR) -> NDArray[np.bool_]:
+def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.bool_]:
     """Return in which poses q (N, n) rad a field of the arm is nearer to the table than the margin [m], (N,)."""
     model, moved = Model(robot(), world_around(margin)), np.array(sorted(links_moved(robot())[arm]))
     near = np.zeros(len(q), dtype=bool)
@@ -244,7 +244,7 @@ def autocorrelation(rate: Array, most: int) -> Array:
 
 def share_of_top(ratios: Array, chosen: NDArray[np.bool_]) -> float:
     """Return the share of chosen actions (S, A) among those with the highest ratios, mean of both arms."""
-    count = max(1, round(TOP * ratios[0].size))
+    count = max(1, round(TOP_SHARE * ratios[0].size))
     return float(np.mean([chosen.ravel()[np.argsort(-ratio, axis=None)[:count]].mean() for ratio in ratios]))
 
 

@@ -37,10 +37,10 @@ from mobee.control.gains import SettleTest
 LEVELS = {"small": RANK4, "stretched": STRETCHED}
 ACTIONS = {"small": 14_597, "stretched": 26_963}
 NEVER, HARDLY = (60, 124, 188, 252), (61, 125, 189, 253)
-ASIDE = {(57, 61): 62, (121, 125): 126, (249, 253): 254}  # (source, goal): where it ends
+DEFLECTED_TO = {(57, 61): 62, (121, 125): 126, (249, 253): 254}  # (source, goal): where it ends
 QUICK = 0.2  # share of the transitions in the short version
 MAX_RARE_VISITS, MIN_DEFLECTED, HANDFUL = 10, 100, 10  # times in a run
-MANY = 0.01  # share of actions with self-contacts from which they are many
+MANY_CONTACTS = 0.01  # share of actions with self-contacts from which they are many
 
 _SMALL, _WIDE = "lattice of 256 states, 20-80 % of the ranges", "lattice of 256 states stretched to 12.5-87.5 %"
 UNREACHED = Claim("thesis 7.3, fig. 7.8", f"{_SMALL}: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
@@ -215,7 +215,7 @@ def findings(found: Cells) -> dict[str, Any]:
         "lattices": {lattice: _row(group) for lattice, group in runs.items()},
         "states never reached": {lattice: _shares(group) for lattice, group in runs.items()},
         "end states of deflected actions, times per run": (
-            {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in ASIDE} if "small" in runs else {}
+            {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in DEFLECTED_TO} if "small" in runs else {}
         ),
         "self-contacts": {lattice: contacts_by_pair(group) for lattice, group in runs.items()},
         "claims": [claim.record() for claim in (measured(runs["small"], runs["stretched"]) if whole else CLAIMS)],
@@ -300,7 +300,7 @@ def _rare(small: list[Run]) -> Claim:
 
 def _deflected(small: list[Run]) -> Claim:
     parts, holds = [], True
-    for (source, goal), end in ASIDE.items():
+    for (source, goal), end in DEFLECTED_TO.items():
         ends = [ends_of(run.space, run.seen, source, goal) for run in small]
         aside = [found.get(end, 0) for found in ends]
         others = [sum(found.values()) - found.get(end, 0) for found in ends]
@@ -325,7 +325,7 @@ def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
         f"{estimate([100.0 * share for share in reached], 0)} % of the actions with a contact reach their goal" if reached else "no contact"
     )
     return [
-        CONTACTS.measured(text, min(few[0], many[0]) > MANY),
+        CONTACTS.measured(text, min(few[0], many[0]) > MANY_CONTACTS),
         MORE.measured(text, many[0] > 2.0 * few[1]),
         DESPITE.measured(despite, bool(reached) and interval(reached)[0] > 0.0),
     ]

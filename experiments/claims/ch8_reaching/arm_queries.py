@@ -19,7 +19,7 @@ BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
 BALLS, RADIUS = 4, 0.03  # m
 SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed position of a ball and of a joint angle
 MAX_MOTIONS = 20_000  # among which the queries are found
-LIMIT = 120.0  # s of plant time per query
+QUERY_TIMEOUT = 120.0  # s of plant time per query
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +129,7 @@ class Answers:
     """The results of Q queries."""
 
     success: NDArray[np.bool_]  # (Q,)
-    seconds: Array  # (Q,) plant time, LIMIT for queries that failed
+    seconds: Array  # (Q,) plant time, QUERY_TIMEOUT for queries that failed
     actions: Ints  # (Q,)
     repairs: Ints  # (Q,)
 
@@ -143,7 +143,7 @@ def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
         first_time, repairs, actions = plant.time, rival.repairs, 0
         rival.begin(int(goal))
         here = plant.measure(PART)[:JOINTS]
-        while lattice.state_of(here) != goal and plant.time - first_time < LIMIT:
+        while lattice.state_of(here) != goal and plant.time - first_time < QUERY_TIMEOUT:
             aim = rival.aim(here)
             if aim is None:
                 break
@@ -153,7 +153,7 @@ def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
             rival.observe(here, end)
             here, actions = end, actions + 1
         success, seconds = lattice.state_of(here) == goal, plant.time - first_time
-        success = success and seconds <= LIMIT
-        rows.append((success, seconds if success else LIMIT, actions, rival.repairs - repairs))
+        success = success and seconds <= QUERY_TIMEOUT
+        rows.append((success, seconds if success else QUERY_TIMEOUT, actions, rival.repairs - repairs))
     success, seconds, actions, repairs = zip(*rows, strict=True)
     return Answers(np.array(success), np.array(seconds), np.array(actions), np.array(repairs))

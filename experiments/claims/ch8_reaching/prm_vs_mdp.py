@@ -37,8 +37,8 @@ from mobee.roadmap.ompl import require_ompl
 
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
-WELL = 0.95  # success in hard queries from which a planner "works well"
-BLOCK = 20  # queries whose mean is one point of a curve
+MIN_SUCCESS = 0.95  # success in hard queries from which a planner "works well"
+BLOCK_SIZE = 20  # queries whose mean is one point of a curve
 NUMBERS = {
     "success": "success",
     "hard": "success in hard queries",
@@ -194,8 +194,8 @@ def summary_of(found: Cells) -> Summary:
 def _row(rival: str, belief: str, measures: dict[str, list[Array]]) -> Row:
     numbers = {name: Number.of(np.array([values.mean() for values in measures[name]])) for name in NUMBERS}
     seconds = measures["seconds"]  # of each seed; a scene may have fewer queries than the settings ask for
-    firsts = range(0, max(map(len, seconds)), BLOCK)
-    blocks = [Number.of(np.array([one[first : first + BLOCK].mean() for one in seconds if len(one) > first])) for first in firsts]
+    firsts = range(0, max(map(len, seconds)), BLOCK_SIZE)
+    blocks = [Number.of(np.array([one[first : first + BLOCK_SIZE].mean() for one in seconds if len(one) > first])) for first in firsts]
     curve = np.array([(b.mean, b.low, b.high) for b in blocks])
     return Row(rival, belief, **numbers, cost=float(np.mean(measures["cost"])), curve=curve)
 
@@ -227,9 +227,9 @@ def measured(summary: Summary) -> list[Claim]:
 
 def _falls_short(roadmap: Row, learned: Row) -> bool | None:
     """Return whether the roadmap does not work well in hard queries, and the MDP does better; False where the roadmap works well."""
-    if roadmap.hard.high < min(WELL, learned.hard.low):
+    if roadmap.hard.high < min(MIN_SUCCESS, learned.hard.low):
         return True
-    return False if roadmap.hard.low >= WELL else None
+    return False if roadmap.hard.low >= MIN_SUCCESS else None
 
 
 def plot(found: Cells) -> Any:
@@ -273,7 +273,7 @@ def _curves(axes: Any, summary: Summary) -> None:
     for rival, color in COLORS.items():
         for row in summary.rows:
             if row.rival == rival and row.belief in ("", SHOWN) and rival != "straight" and "once" not in rival:
-                at = BLOCK * (np.arange(len(row.curve)) + 0.5)
+                at = BLOCK_SIZE * (np.arange(len(row.curve)) + 0.5)
                 axes.plot(at, row.curve[:, 0], ".-", color=color, linewidth=1.2)
                 axes.fill_between(at, row.curve[:, 1], row.curve[:, 2], color=color, alpha=0.1, linewidth=0.0)
     axes.set(xlabel="queries so far", ylabel=f"robot time per query [s], roadmaps' model “{SHOWN}”", ylim=(0.0, None))

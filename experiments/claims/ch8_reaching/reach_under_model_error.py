@@ -49,8 +49,8 @@ FATES = ("reached", "missed", "used up", "no plan")
 """How a try ends: within 2 cm of the target; as planned, but not there; with the actions used up; with no path known."""
 
 HIDDEN = WRONG[1:]
-EVEN, ABOVE = 0.05, 0.2  # of success: a share at most this much lower counts as equal; a lead of this much is the aim
-EQUAL_BY, ABOVE_BY = 200, 800  # tries
+MARGIN, MIN_LEAD = 0.05, 0.2  # of success: a share at most this much lower counts as equal; a lead of this much is the aim
+EQUAL_BY, LEAD_BY = 200, 800  # tries
 PERFECT = 0.9  # share of tries that succeed with a perfect model, if planning is enough
 _AIM = "aim of this reproduction"
 _PEERS = "the replanning peers without memory and with memory of blocked motions"
@@ -61,14 +61,14 @@ _CLAIMED = {
 EQUAL = {
     wrong: Claim(
         _AIM,
-        f"{where}, the reach learner succeeds as often as {_PEERS} (at most {100.0 * EVEN:.0f} points of success below)",
+        f"{where}, the reach learner succeeds as often as {_PEERS} (at most {100.0 * MARGIN:.0f} points of success below)",
         f"by {EQUAL_BY} tries",
     )
     for wrong, where in _CLAIMED.items()
 }
 LEADS = {
     wrong: Claim(
-        _AIM, f"{where}, the reach learner's success is at least {100.0 * ABOVE:.0f} points above {_PEERS}", f"by {ABOVE_BY} tries"
+        _AIM, f"{where}, the reach learner's success is at least {100.0 * MIN_LEAD:.0f} points above {_PEERS}", f"by {LEAD_BY} tries"
     )
     for wrong, where in _CLAIMED.items()
 }
@@ -261,8 +261,8 @@ def measured(done: Cells) -> list[Claim]:
     """Return the claims with our numbers."""
     found = []
     for wrong in HIDDEN:
-        found.append(_against(done, EQUAL[wrong], wrong, EQUAL_BY, -EVEN))
-        found.append(_against(done, LEADS[wrong], wrong, ABOVE_BY, ABOVE))
+        found.append(_against(done, EQUAL[wrong], wrong, EQUAL_BY, -MARGIN))
+        found.append(_against(done, LEADS[wrong], wrong, LEAD_BY, MIN_LEAD))
     return [*found, _perfect(done)]
 
 

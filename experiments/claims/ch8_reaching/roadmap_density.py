@@ -45,7 +45,7 @@ AROUND = 0.03  # m, the radius within which "around" removes edges
 DRAWS = 300  # attempts to draw one query
 SPEED = 0.35  # rad/s, of the fastest motor on an edge
 MODES = ("edge", "around")
-WELL = 0.9  # share of queries that reach the goal, from which replanning "works well"
+MIN_SUCCESS = 0.9  # share of queries that reach the goal, from which replanning "works well"
 
 COMES_PAST = Claim(
     "thesis 4.3.3",
@@ -245,7 +245,7 @@ def measured(groups: Groups) -> list[Claim]:
     bumps = ", ".join(f"{runs[0]['vertices']}: {estimate(numbers(runs, 'edge', 'bumps'), 1)}" for runs in groups.values())
     few, many, around = (numbers(runs, mode, "bumps") for runs, mode in ((first, "edge"), (last, "edge"), (last, "around")))
     return [
-        COMES_PAST.measured(f"{estimate(everything)} of all queries reach their goal", float(np.mean(everything)) >= WELL),
+        COMES_PAST.measured(f"{estimate(everything)} of all queries reach their goal", float(np.mean(everything)) >= MIN_SUCCESS),
         GROWS.measured(f"bumps per query, by number of vertices: {bumps}", _above(interval(many), interval(few))),
         FEWER.measured(
             f"{estimate(around, 1)} instead of {estimate(many, 1)} bumps with {last[0]['vertices']} vertices",

@@ -54,14 +54,14 @@ FIRST = {"first-3000": 3000, "first-1000": 1000}  # curious transitions before t
 CONTACT = "contact"
 VARIANTS = (CONTACT, *FIRST, *BLAMES)
 
-SHARE = 0.9  # of the final score of "model first": the score whose number of actions is compared
-EVEN = 0.05  # of that score: a score at most this much lower counts as equal
+SCORE_SHARE = 0.9  # of the final score of "model first": the score whose number of actions is compared
+MARGIN = 0.05  # of that score: a score at most this much lower counts as equal
 
 _SOURCE = "thesis 9.4.1"
 SOONER = {
     variant: Claim(
         _SOURCE,
-        f"learning transitions and reaches at the same time needs no more actions to {SHARE:.0%} of the final score of {start} first",
+        f"learning transitions and reaches at the same time needs no more actions to {SCORE_SHARE:.0%} of the final score of {start} first",
         "no number",
     )
     for variant, start in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
@@ -69,7 +69,7 @@ SOONER = {
 LEVEL = Claim(
     _SOURCE,
     "with the same total of actions, learning at the same time ends with no lower score than the better of the two that learn transitions "
-    f"first (at most {EVEN:.0%} below)",
+    f"first (at most {MARGIN:.0%} below)",
     "no number",
 )
 CLEAN = Claim(
@@ -241,7 +241,7 @@ def measured(runs: Mapping[str, Runs]) -> list[Claim]:
         return list(CLAIMS)
     found = []
     for variant, claim in SOONER.items():
-        least = SHARE * float(ends[variant].mean())
+        least = SCORE_SHARE * float(ends[variant].mean())
         ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[variant]))
         text = f"actions to a score of {least:.1f}: {_actions_text(ours)}; {LABELS[variant]}: {_actions_text(theirs)}"
         found.append(claim.measured(text, no_more(ours, theirs)))
@@ -288,8 +288,8 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether our scores (N,) are at most EVEN below each of theirs; False if they are farther below one of them."""
-    return all_hold(decides(interval(ours - other), least=-EVEN * float(other.mean())) for other in theirs)
+    """Return whether our scores (N,) are at most MARGIN below each of theirs; False if they are farther below one of them."""
+    return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
 
 
 def _errors(values: Mapping[str, Any], checkpoints: int, truth: Truth | None) -> Array:

@@ -34,11 +34,11 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
     AIM,
     FRESH,
     GAINS,
-    GOOD,
     GRID,
     OBSTACLE_MOVES,
     RATE,
     ROBOT,
+    SUCCESS_DISTANCE,
     TARGET_MOVES,
     TRANSITIONS,
     belief,
@@ -166,7 +166,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 _do(place / name, job, seed, rate)
     blocks, known = _blocks(folder), _touchable()
     targets = grid_targets()
-    left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= GOOD)
+    left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= SUCCESS_DISTANCE)
     return {
         "claims": [claim.record() for claim in measured(blocks, known, left)],
         "tries": table(blocks, known),
@@ -207,7 +207,7 @@ def _nearest(place: tuple[float, float, float]) -> tuple[float, str]:
 def _why(place: tuple[float, float, float]) -> str:
     off, contacts = _nearest(place)
     text = f"offline the best reach from any state ends {1e3 * off:.0f} mm from the surface"
-    return text + (f", with the contacts {contacts} mm" if off > GOOD else "")
+    return text + (f", with the contacts {contacts} mm" if off > SUCCESS_DISTANCE else "")
 
 
 def _blocks(folder: Path) -> list[Block]:
@@ -367,7 +367,7 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
                     color=COLORS[contestant],
                     label=NAMES[contestant],
                 )
-        axes.axvline(1e3 * GOOD, color="0.5", linestyle="--", linewidth=0.8)
+        axes.axvline(1e3 * SUCCESS_DISTANCE, color="0.5", linestyle="--", linewidth=0.8)
         axes.set(title=TITLES[kind], xlabel="true distance of palm and surface at the end [mm]", ylabel="share of tries", ylim=(0.0, 1.02))
         axes.set_xlim(-1.0, 100.0)
         axes.grid(alpha=0.2)

@@ -17,10 +17,10 @@ import numpy as np
 from experiments.claims.ch8_reaching.live_reach.hand import MOVING_TARGET, OBSTACLE, Hand, Mover
 from experiments.claims.ch8_reaching.live_reach.problems import (
     AIM,
-    APART,
-    GOOD,
+    MIN_STATE_DISTANCE,
     RATE,
     REACHES,
+    SUCCESS_DISTANCE,
     TARGET_MOVES,
     WRIST,
     Problem,
@@ -131,10 +131,10 @@ def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem],
 def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, problem: Problem) -> Ended:
     """Go to the state with the highest expected reward, and reach; after a miss, repeat from another state."""
     where = _present(hand, mover, problem)
-    course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), APART)
+    course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), MIN_STATE_DISTANCE)
     ends: list[int] = []
     missing = np.inf
-    while len(ends) < REACHES and missing > GOOD:
+    while len(ends) < REACHES and missing > SUCCESS_DISTANCE:
         course.go()
         missing = hand.reach(PART, MARKER).missing
         ends.append(hand.end)

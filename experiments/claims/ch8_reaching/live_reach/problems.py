@@ -30,19 +30,21 @@ ROBOT, GAINS, RATE = "icub", "default", 50  # Hz
 JOINTS, WRIST = 4, 7  # joints of the lattice; of a reach, and of the planner
 LEVELS, NEIGHBOURS = (0.25, 0.5, 0.75), 16
 PREDICTOR, STRATEGY, FAILURES = "gp", "ucb", "alike"
-GOOD = 0.02  # m from the target's surface
-DEEP = 2e-3  # m, of a solid contact
+SUCCESS_DISTANCE = 0.02  # m from the target's surface
+MIN_DEPTH = 2e-3  # m, of a solid contact
 REACHES = 3  # per try, each from another state
-APART = 0.25  # of the ranges, one step of the lattice: states at most this far from one that missed are not used again in a try
+MIN_STATE_DISTANCE = (
+    0.25  # of the ranges, one step of the lattice: states at most this far from one that missed are not used again in a try
+)
 AIM: Aim = "surface"
 TRANSITIONS = 3000  # curious transitions before the first target (thesis 7.2.2: 2987)
 POSES = 256  # first poses of inverse kinematics
-CLOSE = 5e-3  # m, margin of inverse kinematics
+IK_MARGIN = 5e-3  # m, margin of inverse kinematics
 DRAWS = 1000  # of a target or a first pose
 AWAY = ReachTarget(np.array([0.0, 0.0, 10.0]))
 GRID, FRESH, TARGET_MOVES, OBSTACLE_MOVES = "grid", "fresh", "target moves", "obstacle moves"
 SPEED = 0.03  # m/s, of a moving target or obstacle
-FAR = 0.15  # m that a target moves, and an obstacle to either side
+MOVED_DISTANCE = 0.15  # m that a target moves, and an obstacle to either side
 OBSTACLE, CLEAR = 0.04, 0.05  # m, radius of the obstacle, and distance of its surface from that of the target
 SPARE = 6  # new targets that are drawn per moving problem
 PATHS = 8  # of an obstacle, that are drawn
@@ -106,8 +108,8 @@ def touchable(known: PeerBelief, target: ReachTarget) -> bool:
     known.present(target)
     low, high = known.range.T
     starts = np.random.default_rng(27).uniform(low, high, (POSES, len(known.columns)))
-    poses, missing = approach(known, starts, target.position, target.radius + GOOD - CLOSE, known.range)
-    poses = poses[missing <= CLOSE]
+    poses, missing = approach(known, starts, target.position, target.radius + SUCCESS_DISTANCE - IK_MARGIN, known.range)
+    poses = poses[missing <= IK_MARGIN]
     return len(poses) > 0 and bool(known.sound(poses, "grasping").any())
 
 
@@ -136,7 +138,7 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
     for problem in fresh_problems(seed + 1000, SPARE * count):
         if len(found) < count:
             to = rng.uniform(-1.0, 1.0, 3)
-            other = problem.target.position + FAR * to / np.linalg.norm(to)
+            other = problem.target.position + MOVED_DISTANCE * to / np.linalg.norm(to)
             if touchable(known, ReachTarget(other, aim=AIM)):
                 found.append(structs.replace(problem, kind=TARGET_MOVES, number=len(found), path=[problem.position, other.tolist()]))
         elif len(found) < 2 * count:
@@ -153,7 +155,7 @@ def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> li
     out = target.position - hand
     for _ in range(PATHS):
         across = np.cross(out, rng.normal(size=3))
-        ends = hand + 0.5 * out + FAR * np.array([[1.0], [-1.0]]) * across / np.linalg.norm(across)
+        ends = hand + 0.5 * out + MOVED_DISTANCE * np.array([[1.0], [-1.0]]) * across / np.linalg.norm(across)
         places = ends[0] + np.linspace(0.0, 1.0, 9)[:, None] * (ends[1] - ends[0])
         if np.linalg.norm(places - target.position, axis=1).min() < OBSTACLE + target.radius + CLEAR:
             return None

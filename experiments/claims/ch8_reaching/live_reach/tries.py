@@ -16,8 +16,8 @@ import numpy as np
 from msgspec import Struct
 
 from experiments.claims.ch8_reaching.live_reach.problems import (
-    DEEP,
-    GOOD,
+    MIN_DEPTH,
+    SUCCESS_DISTANCE,
     Problem,
     belief,
     grid_targets,
@@ -106,7 +106,7 @@ class Block(Struct, frozen=True):
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
     """Judge the tries of a launch by the records in its folder."""
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
-    deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > DEEP]
+    deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > MIN_DEPTH]
     done = read_done(folder, Tried)
     problems = {(problem.kind, problem.number): problem for problem in job.problems}
     model = Model(robot())
@@ -125,7 +125,7 @@ def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Mod
         number=tried.number,
         position=position.tolist(),
         off=off,
-        success=off <= GOOD,
+        success=off <= SUCCESS_DISTANCE,
         seconds=(tried.ends[-1] - tried.begin) / rate if tried.ends else 0.0,
         actions=tried.actions,
         reaches=len(tried.ends),
@@ -176,7 +176,7 @@ def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]
         if made.missing < best:
             best, ending = made.missing, whole.copy()
             ending[arm] = made.q
-        if best <= GOOD:
+        if best <= SUCCESS_DISTANCE:
             break
     return best, _contacts(plant, ending)
 
@@ -195,7 +195,7 @@ def main() -> None:
         if touchable(known, target):
             off, contacts = nearest_reach(plant, target)
             where = " | ".join(f"{x:.1f}" for x in target.position)
-            lines.append(f"| {number} | {where} | {1e3 * off:.0f} | {contacts if off > GOOD else ''} |")
+            lines.append(f"| {number} | {where} | {1e3 * off:.0f} | {contacts if off > SUCCESS_DISTANCE else ''} |")
     sys.stdout.write("\n".join(lines) + "\n")
 
 

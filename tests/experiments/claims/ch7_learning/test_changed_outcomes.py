@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch7_learning import changed_outcomes
-from experiments.claims.ch7_learning.changed_outcomes import CHANGES, EVERY, SOON, Run, compare, plant_of, trial
+from experiments.claims.ch7_learning.changed_outcomes import CHANGES, CHECK_PERIOD, WINDOW, Run, compare, plant_of, trial
 from experiments.kit.learning.arm import arm_space
 from experiments.kit.learning.truth import l1, truth_of
 from mobee import TransitionModel
 from mobee.errors import InvalidValue
 
-CHECKS = 4 * SOON // EVERY  # half of them before the change
+CHECKS = 4 * WINDOW // CHECK_PERIOD  # half of them before the change
 
 
 def a_run(errors):
     """Before the change no changed action is tried, afterwards no other."""
     changed = np.zeros(arm_space().goals.shape, dtype=bool)
     changed[0, 0] = True
-    seen = np.zeros((CHECKS * EVERY, 3), dtype=int)
+    seen = np.zeros((CHECKS * CHECK_PERIOD, 3), dtype=int)
     seen[: len(seen) // 2, 1] = 1
     series = np.ones((CHECKS, 4))
     series[CHECKS // 2 :, 0] = errors
@@ -34,12 +34,12 @@ def test_tries_are_over_the_mean_of_all_actions():
 
 def test_relearning_takes_until_the_error_is_halved_or_never_ends():
     errors = np.linspace(1.8, 0.0, CHECKS // 2)
-    assert a_run(errors).relearned == EVERY * (np.flatnonzero(errors <= 1.0)[0] + 1)
+    assert a_run(errors).relearned == CHECK_PERIOD * (np.flatnonzero(errors <= 1.0)[0] + 1)
     assert a_run(np.full(CHECKS // 2, 1.5)).relearned == np.inf
 
 
 def test_an_error_that_is_halved_at_the_first_check_counts():
-    assert a_run(np.full(CHECKS // 2, 0.9)).relearned == EVERY
+    assert a_run(np.full(CHECKS // 2, 0.9)).relearned == CHECK_PERIOD
 
 
 def all_succeed(but=()):
@@ -48,7 +48,7 @@ def all_succeed(but=()):
     return truth_of(space, np.array([[s, a, s if (s, a) in but else space.goals[s, a]] for s, a in np.argwhere(space.goals >= 0).tolist()]))
 
 
-SHORT = {"change": "object", "explorer": "curious", "forgetting": 1.0, "transitions": EVERY}
+SHORT = {"change": "object", "explorer": "curious", "forgetting": 1.0, "transitions": CHECK_PERIOD}
 
 
 def test_the_error_at_the_change_is_that_of_a_model_without_later_observations(monkeypatch):
@@ -56,7 +56,7 @@ def test_the_error_at_the_change_is_that_of_a_model_without_later_observations(m
     monkeypatch.setattr(changed_outcomes, "truths", lambda name: (before, after))
     values = trial(SHORT, 0)
     model = TransitionModel(arm_space())
-    for s, a, reached in values["seen"][:EVERY].tolist():
+    for s, a, reached in values["seen"][:CHECK_PERIOD].tolist():
         model.observe(s, a, reached)
     assert values["changed"].sum() == 3
     assert values["at_change"] == pytest.approx(l1(model.debiased(), after)[values["changed"]].mean())

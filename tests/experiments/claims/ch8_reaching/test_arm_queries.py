@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.arm_queries import LIMIT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
+from experiments.claims.ch8_reaching.arm_queries import QUERY_TIMEOUT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
 from experiments.kit.learning.arm import whole
 from experiments.kit.learning.arm_planners import Straight
 from mobee import Model, load_robot
@@ -33,8 +33,8 @@ def test_balls_and_joints_have_errors_of_the_stated_size(scene):
 
 def test_straight_motions_reach_the_easy_goals_and_failed_queries_last_as_long_as_the_limit(scene):
     got = answer(scene, Straight(space()), 3)
-    assert got.success[~scene.is_hard].all() and (got.seconds[got.success] < LIMIT).all()
-    assert (got.seconds[~got.success] == LIMIT).all() and got.actions.min() >= 1
+    assert got.success[~scene.is_hard].all() and (got.seconds[got.success] < QUERY_TIMEOUT).all()
+    assert (got.seconds[~got.success] == QUERY_TIMEOUT).all() and got.actions.min() >= 1
 
 
 def test_without_cables_the_hard_states_are_believed_to_be_sound():

@@ -3,16 +3,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK, EXPERIMENT, measured, summary_of
+from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK_SIZE, EXPERIMENT, measured, summary_of
 from experiments.kit.cells import Cell, load_cells, write_cell
 from mobee.errors import InvalidValue
 
-HARD = np.tile([True, False], BLOCK)
+HARD = np.tile([True, False], BLOCK_SIZE)
 
 
 def rival(name, share, seconds):
-    success = np.arange(2 * BLOCK) < share * 2 * BLOCK
-    numbers = {"success": success, "seconds": np.full(2 * BLOCK, seconds), "actions": np.full(2 * BLOCK, 3), "repairs": np.zeros(2 * BLOCK)}
+    success = np.arange(2 * BLOCK_SIZE) < share * 2 * BLOCK_SIZE
+    numbers = {
+        "success": success,
+        "seconds": np.full(2 * BLOCK_SIZE, seconds),
+        "actions": np.full(2 * BLOCK_SIZE, 3),
+        "repairs": np.zeros(2 * BLOCK_SIZE),
+    }
     return {f"{name}|{measure}": values for measure, values in numbers.items()} | {f"{name}|cost": np.array(7.0)}
 
 
@@ -47,7 +52,7 @@ def test_a_rival_that_fails_confirms_and_one_that_works_refutes(folder):
 @pytest.mark.parametrize(("once", "mdp", "verdict"), [(0.9, 1.0, "confirmed"), (0.96, 1.0, "refuted"), (0.9, 0.8, "open")])
 def test_a_roadmap_must_be_below_95_percent_and_below_the_mdp(tmp_path, once, mdp, verdict):
     for seed in range(2):
-        all_hard = np.ones(2 * BLOCK, dtype=bool)
+        all_hard = np.ones(2 * BLOCK_SIZE, dtype=bool)
         both = rival("OMPL, planned once", once, 60.0) | rival("OMPL, remembers", once, 20.0)
         write_cell(tmp_path, Cell(f"roadmaps-both-s{seed}", seed, {"belief": "both"}), {"hard": all_hard, **both}, 1.0)
         learned = {"hard": all_hard, **rival("MDP, 4000 learned", mdp, 18.0)}
@@ -57,8 +62,8 @@ def test_a_roadmap_must_be_below_95_percent_and_below_the_mdp(tmp_path, once, md
 
 
 def test_a_scene_with_fewer_queries_counts_in_the_blocks_it_has(folder):
-    few = {key: values[:BLOCK] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
-    write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK], **few}, 1.0)
+    few = {key: values[:BLOCK_SIZE] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
+    write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK_SIZE], **few}, 1.0)
     curve = summary_of(load_cells(folder)).row("MDP, 4000 learned", "").curve
     assert curve[:, 0].tolist() == [19.5, 19.0]
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.reach_under_model_error import ABOVE, CLAIMS, EVEN, LABELS, crossover, findings, measured, verdict
+from experiments.claims.ch8_reaching.reach_under_model_error import CLAIMS, LABELS, MARGIN, MIN_LEAD, crossover, findings, measured, verdict
 from tests.experiments.finished_cells import Cell, finished
 
 TRIES = [100, 200, 800]
@@ -37,10 +37,10 @@ def peers(none=0.5, blocked=0.5, missed=0.9):
 @pytest.mark.parametrize(
     ("none", "blocked", "least", "expected"),
     [
-        (0.3, 0.25, ABOVE, True),
-        (0.3, 0.1, ABOVE, False),  # it must lead both
-        (-0.02, 0.0, -EVEN, True),
-        (-0.1, 0.3, -EVEN, False),
+        (0.3, 0.25, MIN_LEAD, True),
+        (0.3, 0.1, MIN_LEAD, False),  # it must lead both
+        (-0.02, 0.0, -MARGIN, True),
+        (-0.1, 0.3, -MARGIN, False),
     ],
 )
 def test_the_learner_must_lead_both_peers(none, blocked, least, expected):
@@ -50,7 +50,7 @@ def test_the_learner_must_lead_both_peers(none, blocked, least, expected):
 
 def test_a_lead_whose_interval_contains_the_bound_is_open():
     spread = np.array([0.0, 0.4, 0.1, 0.3, 0.05, 0.35])
-    assert verdict({"none": spread, "blocked": np.full(SEEDS, 0.5)}, ABOVE) is None
+    assert verdict({"none": spread, "blocked": np.full(SEEDS, 0.5)}, MIN_LEAD) is None
 
 
 def test_each_claim_is_about_its_own_number_of_tries():

@@ -7,8 +7,8 @@ import pytest
 
 from experiments.claims.ch8_reaching.simultaneous_learning import (
     CLAIMS,
-    EVEN,
     LABELS,
+    MARGIN,
     VARIANTS,
     BlamingPlant,
     Runs,
@@ -85,8 +85,8 @@ def test_an_interval_that_contains_the_bound_leaves_the_comparison_open():
 
 def test_scores_are_level_with_the_best_of_the_others():
     ours, theirs = np.full(SEEDS, 10.0), np.full(SEEDS, 10.0)
-    assert level(ours, [theirs, theirs * (1.0 + EVEN)]) is True
-    assert level(ours, [theirs, theirs * (1.1 + EVEN)]) is False
+    assert level(ours, [theirs, theirs * (1.0 + MARGIN)]) is True
+    assert level(ours, [theirs, theirs * (1.1 + MARGIN)]) is False
 
 
 def test_the_claims_hold_where_learning_at_the_same_time_by_contact_does_better():
