@@ -43,7 +43,7 @@ def test_terms_are_imported_by_name() -> None:
     ):
         with pytest.raises(InvalidValue, match=f"term {wrong!r}: .*{said}"):
             load_terms([wrong])
-    with pytest.raises(InvalidValue, match="there is one of that name"):
+    with pytest.raises(InvalidValue, match="the name is taken"):
         load_terms([f"{HERE}:lift", f"{HERE}:lift"])
 
 
