@@ -79,7 +79,7 @@ def stage(tmp_path: Path) -> Iterator[Stage]:
             controller.close()
 
 
-def test_every_transition_is_on_disk_before_the_next_goal_and_told_as_it_is_stored(stage: Stage) -> None:
+def test_every_transition_is_on_disk_before_the_next_goal_and_published_as_stored(stage: Stage) -> None:
     stored: list[int] = []
     stage.controller.on_goal = lambda goal: stored.append(len(stage.rows()))
     stage.controller.touched = ["table"]
@@ -114,7 +114,7 @@ def test_a_timeout_is_an_observation_too(stage: Stage) -> None:
     assert [(t.settled, row["settled"]) for t, row in zip(stage.made(3), stage.rows(), strict=True)] == [(False, 0)] * 3
 
 
-def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_goes_on_later(stage: Stage) -> None:
+def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_continues_later(stage: Stage) -> None:
     agent = stage.agent()
     stage.made(2)
     stage.controller.ending = "held"
@@ -134,7 +134,7 @@ def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_goes_on_later(sta
     assert agent.is_running
 
 
-def test_a_new_controller_is_asked_anew(stage: Stage) -> None:
+def test_a_new_controller_is_asked_again(stage: Stage) -> None:
     stage.agent()
     stage.made(2)
     stage.controller.lasts = 1_000_000
@@ -173,7 +173,7 @@ def test_an_answer_that_gets_lost_does_not_make_a_second_action(stage: Stage) ->
     assert stage.told("interrupted") == []
 
 
-def test_after_each_kill_it_goes_on_where_it_was(stage: Stage, rng: np.random.Generator) -> None:
+def test_after_each_kill_it_continues(stage: Stage, rng: np.random.Generator) -> None:
     first: list[dict[str, Any]] = []
     for _ in range(3):
         agent, count = stage.agent(), len(stage.transitions)
@@ -209,7 +209,7 @@ def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_pa
     assert [(t.s, t.a, t.s_next, t.reward, t.value) for t in stage.made(14)] == whole
 
 
-def test_an_agent_with_a_goal_goes_there_and_keeps_what_it_was_told_on_record(stage: Stage) -> None:
+def test_an_agent_with_a_goal_goes_there_and_records_its_settings(stage: Stage) -> None:
     given = ("--goal", "26", "--beliefs", "debiased", "--divergence", "kl", "--forgetting", "0.9", "--tolerance", "0.001")
     assert stage.agent(*given, "--transitions", "8").wait(30.0) == 0
     assert any(t.s == 26 for t in stage.made(8))
@@ -264,7 +264,7 @@ def test_its_numbers_count_from_the_mark(stage: Stage) -> None:
 # What it is told, and how it ends
 
 
-def test_a_run_directory_that_is_not_there_is_told_in_one_line(stage: Stage) -> None:
+def test_an_absent_run_directory_is_reported_in_one_line(stage: Stage) -> None:
     code, says = stage.refused("--part", "torso", "--run-dir", str(stage.folder / "none"))
     assert code == 1
     assert says.count("\n") == 1
@@ -272,7 +272,7 @@ def test_a_run_directory_that_is_not_there_is_told_in_one_line(stage: Stage) -> 
     assert "check that its folder exists" in says
 
 
-def test_a_run_of_other_settings_is_not_gone_on_with(stage: Stage) -> None:
+def test_a_run_of_other_settings_is_not_continued(stage: Stage) -> None:
     stage.agent("--transitions", "2").wait(30.0)
     code, says = stage.refused("--part", "torso", "--run-dir", str(stage.folder), "--explorer", "random")
     assert code == 1
@@ -288,13 +288,13 @@ def test_a_run_of_other_settings_is_not_gone_on_with(stage: Stage) -> None:
         (("--part", "torso", "--levels", "0.5", "0.25"), "levels"),
     ],
 )
-def test_a_wrong_setting_is_told_in_one_line(stage: Stage, arguments: tuple[str, ...], says: str) -> None:
+def test_a_wrong_setting_is_reported_in_one_line(stage: Stage, arguments: tuple[str, ...], says: str) -> None:
     code, text = stage.refused(*arguments)
     assert code == 2
     assert says in text
 
 
-def test_a_second_agent_of_a_part_gives_up_and_the_first_goes_on(stage: Stage) -> None:
+def test_a_second_agent_of_a_part_gives_up_and_the_first_continues(stage: Stage) -> None:
     first = stage.agent()
     stage.made(2)
     stage.controller.period = 0.01
@@ -307,7 +307,7 @@ def test_a_second_agent_of_a_part_gives_up_and_the_first_goes_on(stage: Stage) -
     assert stage.controller.takes == 1
 
 
-def test_it_waits_for_a_controller_and_ends_at_once_when_told(tmp_path: Path) -> None:
+def test_it_waits_for_a_controller_and_ends_at_once_when_stopped(tmp_path: Path) -> None:
     with rig(tmp_path, ROBOT) as made:
         agent = made.start("services.agents", "agent_torso", "--part", "torso")
         assert made.stat("agent_torso").numbers["transitions"] == 0

@@ -98,7 +98,7 @@ def test_every_action_is_on_disk_before_the_next_and_targets_take_turns(stage: t
     assert [asked.position for asked in controller.reaches] == controller.presented
 
 
-def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, FakeReaches]) -> None:
+def test_transitions_are_published_with_the_model_of_them(stage: tuple[Rig, FakeReaches]) -> None:
     made, _ = stage
     transitions = made.record(Transition, "right_arm")
     learned = made.record(Learned, "right_arm")
@@ -117,7 +117,7 @@ def test_transitions_are_told_with_what_is_learned_of_them(stage: tuple[Rig, Fak
     assert value.max() > 0.0 and told.agent == "right_arm"
 
 
-def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeReaches]) -> None:
+def test_a_killed_agent_continues_with_its_model(stage: tuple[Rig, FakeReaches]) -> None:
     made, controller = stage
     events = made.record(Event, "agent_right_arm")
     first = agent(made)
@@ -130,7 +130,7 @@ def test_a_killed_agent_goes_on_with_what_it_had_learned(stage: tuple[Rig, FakeR
     wait_for(lambda: [event.code for event in events] == ["resumed"], "the event")
 
 
-def test_a_predictor_that_there_is_none_of_is_told_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:
+def test_an_unknown_predictor_is_reported_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:
     made, _ = stage
     program = made.spawn(
         "-m", "services.agents", "--endpoint", made.endpoint, "--part", "right_arm", "--targets", *PLACES, "--predictor", "wieghted"

@@ -39,7 +39,7 @@ def test_deciding_and_observing_are_two_plain_steps():
         agent.observe(Outcome(space.target(0), True, 1.0))
 
 
-def test_the_state_is_read_in_the_part_s_order_whatever_the_lattice_s():
+def test_the_state_is_read_in_the_order_of_the_part():
     robot = toy_robot()
     space = Lattice(robot, list(TORSO)[::-1], neighbours=8)
     agent = CuriousAgent(space, InstantPlant(robot, {"torso": space.target(2)}))
@@ -108,7 +108,7 @@ def test_agents_of_different_parts_draw_differently_under_one_seed():
     assert actions("l") != actions("r")
 
 
-def test_an_explorer_of_ones_own_is_asked_and_recorded_by_where_it_is_defined():
+def test_an_explorer_of_the_user_is_called_and_recorded_by_its_module():
     space = arm()
     agent = CuriousAgent(space, InstantPlant(space.robot), explorer=last_action)
     agent.run(5)
@@ -238,7 +238,7 @@ def test_a_store_made_on_another_plant_is_refused(tmp_path):
         on_a_table(path, fails=True)
 
 
-def test_a_record_that_does_not_say_on_which_plant_it_was_made_is_not_gone_on_with_where_that_is_known(tmp_path):
+def test_a_record_without_plant_settings_is_not_continued_on_a_plant_that_has_some(tmp_path):
     path = tmp_path / "run.sqlite"
     CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(path, "torso")).run(2)
     assert CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(path, "torso")).transitions == 2
@@ -257,7 +257,7 @@ def test_an_interrupted_action_is_not_observed_and_the_agent_measures_again(tmp_
     assert agent.last.s == 0 and agent.transitions == 2
 
 
-def test_a_run_goes_on_after_interruptions():
+def test_a_run_continues_after_interruptions():
     agent = CuriousAgent(torso(), Interrupting(toy_robot(), {1, 3, 4}))
     agent.run(5)
     assert agent.transitions == 5 and agent.plant.actions == 8

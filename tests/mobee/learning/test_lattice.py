@@ -134,7 +134,7 @@ def test_a_space_that_cannot_be_is_refused_with_what_is_valid(joints, options, m
         Lattice(toy_robot(), joints, **options)
 
 
-def test_a_small_space_has_all_other_states_as_neighbours_unless_told():
+def test_a_small_space_has_all_other_states_as_neighbours_by_default():
     small = Lattice(toy_robot(), ["l_elbow", "l_shoulder_pitch"])
     assert (small.neighbours, small.settings["neighbours"], small.goals.shape) == (8, 8, (9, 8))
     assert Lattice(toy_robot(), ["l_elbow", "l_shoulder_pitch"], np.linspace(0, 1, 5)).neighbours == 16
@@ -174,7 +174,7 @@ def test_each_joint_may_have_levels_of_its_own():
 
 
 @given(st.lists(st.sets(st.integers(0, 20), min_size=2, max_size=4), min_size=1, max_size=4), st.integers(0, 9))
-def test_samples_lie_in_their_own_states_and_goals_are_the_nearest_others_whatever_the_levels(levels, tie_seed):
+def test_samples_lie_in_their_own_states_and_goals_are_the_nearest_others_for_any_levels(levels, tie_seed):
     joints = [f"l_{name}" for name in SHOULDER_ELBOW][: len(levels)]
     fractions = [sorted(n / 20 for n in one) for one in levels]
     space = Lattice(toy_robot(), joints, fractions, tie_seed=tie_seed)

@@ -65,7 +65,7 @@ def test_an_interrupted_decision_leaves_no_trace_in_later_plans():
     assert one.last == other.last
 
 
-def test_plans_cannot_be_changed_by_who_reads_them():
+def test_plans_are_read_only():
     values, _ = agent().plan()
     with pytest.raises(ValueError, match="read-only"):
         values[0] = 1.0

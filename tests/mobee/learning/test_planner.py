@@ -98,7 +98,7 @@ def test_the_nearest_of_several_targets_is_taken_and_at_a_target_there_is_nothin
     assert (there.path, there.actions, there.success, there.steps, there.shortest) == ((80,), (), 1.0, 0.0, 0)
 
 
-def test_where_no_way_leads_the_states_are_named():
+def test_without_a_path_the_error_names_the_states():
     table = Table(SPACE, {(s, 80): 1.0 for s in range(81) if 80 in SPACE.actions(s)})
     with pytest.raises(MobeeError, match=r"from state 0 of left_arm to \[80\]"):
         Planner(SPACE, table, [80]).plan(0)
@@ -145,6 +145,6 @@ def test_chances_are_those_of_ending_at_the_goal():
         assert chance == pytest.approx(world.probabilities[state, action][at_goal].sum())
 
 
-def test_the_best_way_in_and_out_of_a_state_counts():
+def test_the_best_actions_into_and_out_of_a_state_count():
     assert passing({(0, 1): 0.5, (3, 1): 0.8, (1, 2): 0.9, (1, 4): 0.2}) == {1: pytest.approx(0.72)}
     assert passing({(0, 1): 0.5}) == {}

@@ -113,7 +113,7 @@ def test_what_cannot_be_rebuilt_is_named(run, tmp_path):
     assert not (tmp_path / "other.sqlite").exists()
 
 
-def test_a_store_without_a_space_on_record_is_told(tmp_path):
+def test_a_store_without_a_recorded_space_is_refused(tmp_path):
     with TransitionStore(tmp_path / "own.sqlite", "torso") as store:
         store.bind({"mine": json.dumps(1)})
         store.append(Transition(1, 0, 0, 1, 0.1, True, 1.0, (0.0,)))

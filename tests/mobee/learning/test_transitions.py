@@ -145,7 +145,7 @@ def test_a_forgetting_out_of_range_is_refused(forgetting):
         TransitionModel(arm(), forgetting=forgetting)
 
 
-def test_plain_kl_depends_on_the_number_of_states_and_tells_no_success_from_failure():
+def test_plain_kl_depends_on_the_number_of_states_and_is_equal_for_success_and_failure():
     few, many = TransitionModel(torso(), divergence="kl"), TransitionModel(arm(), divergence="kl")
     assert few.reward[0, 0] == few.gain(0, 0, 0) == few.gain(0, 0, few.space.goal(0, 0)) == few.gain(0, 0, 26)
     assert few.reward[0, 0] == pytest.approx(kl_divergence([2] + [1] * 26, [1] * 27))
@@ -231,7 +231,7 @@ def test_an_action_that_never_failed_is_believed_where_the_counts_doubt_it():
 
 
 @given(observations, observations, st.sampled_from(["50-50", "60-40"]), st.sampled_from([1.0, 0.9]))
-def test_it_is_the_real_counts_over_the_prior_whenever_it_is_asked_for(before, after, initial, forgetting):
+def test_it_is_always_the_real_counts_over_the_prior(before, after, initial, forgetting):
     model = TransitionModel(arm(neighbours="equidistant"), initial, forgetting=forgetting)
     for one in before:
         model.observe(*one)

@@ -90,7 +90,7 @@ def test_it_reads_the_tables_of_a_model_where_they_are(monkeypatch):
     assert seen == [one.__array_interface__["data"][0] for one in (model.probabilities, model.outcomes, model.reward)]
 
 
-def test_a_model_that_tells_where_its_tables_are_is_planned_with_as_one_that_does_not():
+def test_plans_are_equal_with_and_without_cached_tables():
     model = TransitionModel(arm(neighbours="equidistant"))
     rng = np.random.default_rng(7)
     for number in range(300):

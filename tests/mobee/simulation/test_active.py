@@ -57,7 +57,7 @@ def test_the_rest_of_the_robot_stands_still_and_is_read_without_noise() -> None:
     assert (trace.encoders[:, ~still].std(axis=0) > 0.0).all()
 
 
-def test_a_quiet_arm_goes_the_way_it_goes_in_a_whole_quiet_robot() -> None:
+def test_an_arm_without_noise_moves_as_in_a_whole_robot_without_noise() -> None:
     robot = load_robot("icub")
     low, high = robot.limits[robot.parts["left_arm"].slice].T
     target = low + 0.6 * (high - low)

@@ -120,7 +120,7 @@ def test_pushes_and_forces_of_a_client_act_as_with_the_controller_alone() -> Non
     assert np.abs(plant.run(400).velocity[-1]).max() < 1e-3
 
 
-def test_the_forces_of_the_last_tick_can_be_asked_for() -> None:
+def test_the_forces_of_the_last_tick_can_be_read() -> None:
     model = Model(ICUB, load_world("table"))
     plant = OfflinePlant(model, 3, dt=0.02)
     pressing(plant)

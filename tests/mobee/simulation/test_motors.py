@@ -29,7 +29,7 @@ def run(m: Motors, seconds: float) -> np.ndarray:
     return np.array(path)
 
 
-def test_ideal_motors_do_what_they_are_told_at_once() -> None:
+def test_ideal_motors_follow_commands_at_once() -> None:
     m = motors()
     m.command(ALL, "velocity", np.array([0.5, -0.2, 0.0]))
     assert run(m, 0.1)[-1] == pytest.approx([0.05, -0.02, 0.0])
@@ -186,7 +186,7 @@ def test_parts_can_be_in_different_modes() -> None:
     assert run(m, 1.0)[-1] == pytest.approx([0.2, 0.2, -0.3], abs=1e-3)
 
 
-def test_what_is_on_its_way_when_the_mode_changes_is_not_read_in_the_wrong_unit() -> None:
+def test_delayed_commands_are_not_read_in_the_unit_of_a_new_mode() -> None:
     m = motors(replace(IDEAL, delay=0.02))
     m.command(ALL, "torque", np.full(3, 1.0))
     run(m, 0.1)
@@ -198,7 +198,7 @@ def test_what_is_on_its_way_when_the_mode_changes_is_not_read_in_the_wrong_unit(
     assert m.velocities == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_friction_takes_its_velocity_and_holds_what_is_told_less() -> None:
+def test_friction_subtracts_its_velocity_and_stops_slower_motors() -> None:
     m = motors(replace(IDEAL, lag=0.05, friction=(0.0, 0.2, 0.2)))
     m.command(ALL, "velocity", np.array([0.5, 0.5, -0.15]))
     run(m, 1.0)

@@ -246,7 +246,7 @@ def test_who_is_called_now_and_then_moves_the_target_and_the_hand_follows() -> N
     assert len(called) == count
 
 
-def test_a_target_is_not_taken_away_from_who_reaches_for_it() -> None:
+def test_a_target_cannot_be_removed_during_a_reach() -> None:
     plant = bent()
     plant.present(NEAR)
     plant.begin_reach("arm", "tip")

@@ -21,7 +21,7 @@ def cube(x: float = 1.0) -> World:
     return world
 
 
-def test_plants_made_alike_are_the_same_whatever_their_seed_and_survive_json() -> None:
+def test_equal_plants_have_equal_records_for_any_seed_and_survive_json() -> None:
     one = settings(world=cube(), seed=0)
     assert one == settings(world=cube(), seed=1) == json.loads(json.dumps(one))
     assert one["gains"]["settle"]["timeout"] == 20.0 and one["world"]["cube"]["position"] == [1.0, 0.0, 0.0]

@@ -32,7 +32,7 @@ def test_nothing_is_expected_to_fail_at_first():
     assert Failures(3, 4, 0.01).rewards(HERE).tolist() == np.zeros((3, 4)).tolist()
 
 
-def test_a_lone_failure_tells_less_of_targets_far_away():
+def test_a_single_failure_counts_less_for_distant_targets():
     failures = Failures(3, 4, 0.01)
     failures.add(2, 1, HERE, -10.0)
     assert failures.rewards(HERE)[2, 1] == pytest.approx(-5.0)
@@ -127,7 +127,7 @@ def test_what_was_tried_on_a_target_is_worth_the_average_of_its_rewards_and_a_0(
     assert failures.rewards(ORIGIN)[6, 1] == 0.0
 
 
-def test_a_failure_is_a_hint_to_the_way_back_and_none_to_targets_elsewhere():
+def test_a_failure_counts_for_the_opposite_transition_and_not_for_distant_targets():
     goal = int(SPACE.goals[5, 2])
     back = SPACE.actions(goal).tolist().index(5) if 5 in SPACE.actions(goal) else None
     assert back is not None

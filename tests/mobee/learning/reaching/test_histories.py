@@ -93,7 +93,7 @@ def test_an_array_that_is_long_enough_is_kept_and_another_grows_twice_as_long():
 
 
 @pytest.mark.parametrize(("most", "left"), [(4, "abc"), (3, "bc"), (1, "")])
-def test_what_was_put_in_first_is_forgotten_until_there_is_room_for_one_more(most, left):
+def test_the_oldest_entries_are_deleted_until_one_more_fits(most, left):
     found = {letter.encode(): 0 for letter in "abc"}
     forget(found, most)
     assert list(found) == [letter.encode() for letter in left]

@@ -38,12 +38,12 @@ def test_a_failed_transition_is_gone_around_or_not_taken():
     assert action_values[1] == pytest.approx([0.27, 0.81 - 5.0, 0.0])
 
 
-def test_where_reaching_is_out_of_the_question_the_plan_goes_on():
+def test_the_plan_continues_in_states_where_reaching_is_excluded():
     values, _ = corridor().values(np.array([-np.inf, -np.inf, 1.0, -np.inf]), 0.0)
     assert values == pytest.approx([0.81, 0.9, 1.0, 0.9])
 
 
-def test_beliefs_are_taken_over_when_told():
+def test_refresh_copies_the_beliefs():
     model = TransitionModel(ROW)
     planning = ReachPlanning(ROW, model.debiased(), 0.9)
     worth = np.array([0.0, 1.0, 0.0, 0.0])

@@ -121,7 +121,7 @@ def test_the_least_tried_problems_come_first():
     assert reacher.problems.tries[-1] == 1 and len(reacher.problems) == 28
 
 
-def test_seeds_decide_and_are_told_apart():
+def test_different_seeds_give_different_predictors():
     def path(seed):
         reacher = agent(seed)
         reacher.learn(TARGETS, 20)
@@ -195,7 +195,7 @@ def test_learning_the_model_too_a_failure_that_touched_the_world_is_the_problems
     assert reacher.last.reach_state == 0  # there is no other way
 
 
-def test_an_interrupted_action_is_no_step_and_the_try_goes_on():
+def test_an_interrupted_action_is_no_step_and_the_try_continues():
     class Held(ReachTable):
         held = 3
 

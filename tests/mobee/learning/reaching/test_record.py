@@ -62,7 +62,7 @@ def test_which_part_has_to_be_said_where_there_are_several(tmp_path):
     assert load_reaches(path, plant(), "left_arm", hands=HANDS).tries == 2
 
 
-def test_what_is_not_there_is_told(tmp_path):
+def test_absent_files_and_parts_are_reported(tmp_path):
     with pytest.raises(MobeeError, match="no such file"):
         load_reaches(tmp_path / "none.sqlite", plant())
     with TransitionStore(tmp_path / "run.sqlite", PART) as store:

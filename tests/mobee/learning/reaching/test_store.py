@@ -59,7 +59,7 @@ def resumed(path, until, **options) -> ReachAgent:
 
 
 @pytest.mark.parametrize("strategy", ["random", "intrinsic"])
-def test_stopped_at_any_step_it_goes_on_as_if_it_had_not(tmp_path, strategy):
+def test_after_a_stop_at_any_step_it_continues_as_if_it_had_not_stopped(tmp_path, strategy):
     whole = resumed(tmp_path / "whole.sqlite", 55, strategy=strategy)
     for end in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         parted = resumed(tmp_path / "parted.sqlite", end, strategy=strategy)
@@ -135,7 +135,7 @@ def test_a_record_is_bound_to_its_marker_scale_and_space(tmp_path):
             ReachAgent(SPACE, plant(), marker="foot", hands=HANDS, store=store)
 
 
-def test_another_learner_goes_on_with_what_is_on_record(tmp_path):
+def test_another_learner_continues_the_record(tmp_path):
     with ReachStore(tmp_path / "run.sqlite", PART) as store:
         first = agent(store=store, strategy="random")
         first.learn(TARGETS, 5)

@@ -116,7 +116,7 @@ def test_some_tries_reach_from_a_state_drawn_at_random():
     assert {one.index(1.0) for one in single} == {0, 1, 2}
 
 
-def test_writing_into_what_was_told_changes_nothing():
+def test_writing_into_returned_arrays_changes_nothing():
     progress = progress_of(0.1, 0.4)
     progress.rewards(SPOT, np.random.default_rng(STEADY))[:] = 5.0
     assert np.isclose(interest(progress)[0], 0.3)

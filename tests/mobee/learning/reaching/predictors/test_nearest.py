@@ -25,7 +25,7 @@ def test_the_mean_is_that_of_the_five_nearest_pairs_found_by_looking_at_all():
             np.testing.assert_allclose(nearest.mean(target)[state], total / (PRIOR_WEIGHT + sum(weights)), rtol=1e-9)
 
 
-def test_neighbours_of_a_target_asked_about_all_along_are_those_found_at_once():
+def test_neighbours_of_a_target_are_the_same_with_and_without_earlier_queries():
     made, seen, target = reaches(), drawn(reaches(), 60), np.array([0.02, 0.1, -0.1])
     asked = Nearest(made)
     for state, place, value in seen:

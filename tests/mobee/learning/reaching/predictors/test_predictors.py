@@ -43,7 +43,7 @@ def test_what_was_tried_often_is_known_better_than_what_was_not(name):
 
 
 @pytest.mark.parametrize("name", UNSURE)
-def test_draws_have_the_mean_and_deviation_that_were_told(name):
+def test_draws_have_the_predicted_mean_and_deviation(name):
     made, where = reaches(), places()
     predictor, rng = taught(PREDICTORS[name](made), drawn(made, 25)), np.random.default_rng(0)
     samples = np.stack([predictor.sample(where[2], rng) for _ in range(4000)])
@@ -93,7 +93,7 @@ def test_a_target_far_from_all_others_is_expected_to_be_like_the_average_and_kno
 
 
 @pytest.mark.parametrize("name", PREDICTORS)
-def test_a_mean_that_was_told_is_not_changed_by_who_writes_into_it(name):
+def test_writing_into_a_returned_mean_changes_nothing(name):
     made = reaches()
     predictor = taught(PREDICTORS[name](made), drawn(made, 10))
     told = predictor.mean(places()[0])
