@@ -17,7 +17,7 @@ def test_the_shipped_numbers_are_those_of_the_shipped_robot():
     assert MotorParameters.identified("icub") == MotorParameters(**found)
 
 
-def test_results_come_in_the_order_of_the_seeds():
+def test_numbers_come_in_the_order_of_the_given_motors():
     motors = tuple(reversed(ROBOT.motors))
     assert load_identified("icub", motors)["lag"].tolist() == load_identified("icub")["lag"][::-1].tolist()
 

@@ -121,7 +121,7 @@ def test_the_least_tried_problems_come_first():
     assert reacher.problems.tries[-1] == 1 and len(reacher.problems) == 28
 
 
-def test_different_seeds_give_different_predictors():
+def test_the_seed_decides_what_is_learned():
     def path(seed):
         reacher = agent(seed)
         reacher.learn(TARGETS, 20)
