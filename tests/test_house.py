@@ -263,8 +263,14 @@ def test_versions_agree() -> None:
     assert citation["license"] == PROJECT["license"].split(" AND ")[0]  # that of the code; the format of the citation has no AND
 
 
-RETIRED = r"goes without saying|\bovertures?\b|\blimps?\b|\bdawdl|\bfor ever\b|\boutset\b|told_world|world_told"
-"""Words that stood for: is redundant, start-up status, is degraded, inject a delay, indefinitely, search schedule, world from JSON."""
+RETIRED = (
+    r"goes without saying|\bovertures?\b|\blimps?\b|\bdawdl|\bfor ever\b|\boutset\b|told_world|world_told|told_terms"
+    r"|still_nears|ToldContacts|way_to_reach|state_of_part|edges_told|made_alike|\bdear to\b|\bdearer\b"
+    r"|go on with --resume|take another seed|goaldesk|worlddesk|drivedesk"
+)
+"""Words that stood for: is redundant, start-up status, is degraded, inject a delay, indefinitely, search schedule, world from JSON,
+published terms, is approaching, published contacts, plan a reach, state of a part's pose, expensive, continue the run, use another
+seed."""
 
 HISTORY = {"CHANGELOG.md", "docs/decisions.md"}  # these say what was, in the words of their time
 

@@ -20,7 +20,7 @@ class MatplotlibMissing(MobeeError):
 def new_figure(width: float, height: float) -> Any:
     """Return an empty matplotlib Figure of a size in inches; raises MatplotlibMissing, and InvalidValue for a size of 0."""
     if not (width > 0.0 and height > 0.0):
-        raise InvalidValue("none of the runs that the figure shows is finished: go on with --resume.")
+        raise InvalidValue("none of the runs that the figure shows is finished: continue the run with --resume.")
     try:
         from matplotlib.figure import Figure
     except ImportError:

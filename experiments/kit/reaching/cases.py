@@ -76,7 +76,7 @@ def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bo
             found.append(case)
         if len(found) == count:
             return found
-    raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {MAX_DRAWS} draws: take another seed.")
+    raise InvalidValue(f"only {len(found)} of {count} cases of {scene!r} in {MAX_DRAWS} draws: use another seed.")
 
 
 def _case(scene: str, target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Case | None:
