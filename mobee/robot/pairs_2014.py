@@ -112,7 +112,7 @@ def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[fro
 def _passed(
     elements: Sequence[Element], here: int, start: int, bearing: Collection[int], link: bool, joint: bool
 ) -> tuple[bool, bool] | None:
-    """Whether a link and a joint have been passed on a descent that has come to an element; None where the descent ends before it."""
+    """Return whether the search down the tree has passed a link and a joint when it leaves an element; None where it ends before it."""
     element, carrier = elements[here], elements[here].parent
     if carrier <= 0 or carrier == elements[start].parent:
         return link, joint
@@ -126,7 +126,11 @@ def _passed(
 
 
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Pairs of elements that meet on a descent by the recorded reading; `bearing`: the elements that bear a shape of the role."""
+    """Return the pairs of elements between which the recorded reading counts no contacts: neighbours in the tree.
+
+    From each element and from each of its siblings it goes down the tree, and ends a branch behind the first link and the first joint
+    that have a shape.  `bearing`: the elements that have a shape of the role.
+    """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
         children.setdefault(element.parent, []).append(index)

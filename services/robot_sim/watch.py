@@ -53,7 +53,7 @@ class Stops:
         return time, distance
 
     def forget(self) -> None:
-        """A new run."""
+        """Discard the commands of the last run, when a new one begins."""
         self._commanded.clear()
 
 

@@ -197,7 +197,11 @@ class Program:
 
 
 def special_euler(axis: Array, angle: float) -> Array:
-    """Return the orientation of a volume by its height axis: x about y, then y to the axis, then about the axis."""
+    """Return the rotation that gives a volume its height axis, as the program computed it.
+
+    First a turn about y brings x to the axis' projection on the x-z plane; then the shortest turn brings y to the axis; the last turn, by
+    `angle`, is about the axis.
+    """
     turn = np.eye(3)
     flat = np.array([axis[0], 0.0, axis[2]])
     if np.linalg.norm(flat) > 1e-6:

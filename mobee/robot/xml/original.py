@@ -367,5 +367,5 @@ def _mark_base(root: Node) -> None:
 
 
 def vector_texts(names: tuple[str, str, str], vector: Array) -> dict[str, str]:
-    """Three numbers as attributes, without those that are 0; a whole vector of 0 keeps none."""
+    """Return the components of a vector as XML attributes; components that are 0 are left out."""
     return {name: number(float(value)) for name, value in zip(names, vector, strict=True) if value != 0}
