@@ -206,7 +206,7 @@ class Reach(Message, frozen=True, kw_only=True):
 
 
 class Targets(Message, frozen=True, kw_only=True):
-    """Positions, at tick re_k, of the objects that are reached for; an object without position is not in the model's world."""
+    """Positions at tick re_k of the targets of all reaches; a target that is not in the model's world has no position."""
 
     stream: ClassVar[Stream] = Stream("model/targets", "CONTROL", writer="model, every tick during a reach", readers="controller")
 

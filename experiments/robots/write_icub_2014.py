@@ -50,7 +50,7 @@ class Tree:
         return sorted(mine, key=lambda node: PARTS.index(node["body_part"]))
 
     def joint_name(self, node: dict[str, Any]) -> str:
-        """Return the motor's name, with a number where it drives several joints, and with a side where these are the eyes'."""
+        """Return the name of the joint's motor, with a number if it drives several joints, and with a side for the eyes."""
         motor = self.axis[node["motor"]]
         joints = self.joints[motor]
         if motor.startswith("eyes"):
@@ -59,7 +59,7 @@ class Tree:
 
 
 def main(data_path: str, out: str | Path = OUT) -> None:
-    """Write the file."""
+    """Write the robot file `out` from the JSON data at `data_path`."""
     tree = Tree(json.loads(Path(data_path).read_text(encoding="utf-8")))
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName="icub_2014", adjacency="recorded_2014")
     torso = element(root, "bodypart", name="torso")

@@ -52,7 +52,7 @@ class Volumes:
             raise RuntimeError("the library's volumes have another layout than these")
 
     def place(self, at: int, kind: str, half: Sequence[float] | Reals, position: Reals, rotation: Reals) -> None:
-        """Set one; `half`: (radius,), (radius, half height) or half edges (3,); of a hull nothing, see `hull`."""
+        """Set the volume at index `at`; `half`: (radius,), (radius, half height), half edges (3,), or () for a hull, see `hull`."""
         row = self.table[at]
         size = np.zeros(3)
         size[: len(half)] = half
@@ -65,7 +65,7 @@ class Volumes:
             row["inverse"] = 1.0 / row["squared"] if row["squared"] > 0.0 else 0.0
 
     def hull(self, at: int, corners: Reals, neighbours: Sequence[Sequence[int]] | None = None) -> None:
-        """Give a hull its corners (v, 3) m and, if `neighbours` are given, which others an edge joins each one to."""
+        """Set the corners (v, 3) m of the hull at index `at`; `neighbours`: for each corner, those to which an edge joins it."""
         corners = np.ascontiguousarray(corners, dtype=np.float64)
         row = self.table[at]
         row["corners"], row["count"], row["bound"] = address(corners), len(corners), np.linalg.norm(corners, axis=1).max()
@@ -77,7 +77,7 @@ class Volumes:
             self._kept += [starts, edges]
 
     def taken(self, at: NDArray[np.int64]) -> Volumes:
-        """Some of them, in this order."""
+        """Return the volumes at these indices, in this order."""
         taken = Volumes(0)
         taken.table, taken._kept = self.table[at], self._kept
         return taken
@@ -95,7 +95,7 @@ def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
 
 
 def distances(first: Volumes, second: Volumes) -> Reals:
-    """How far they are apart (p,) m."""
+    """Return the distance of each of the first from the same of the second, (p,) m."""
     apart = np.empty(len(first))
     _distance(*_pairs(first, second), address(apart))
     return apart

@@ -1,4 +1,4 @@
-"""The constraint forces of the law, by name, as the model publishes them in every tick; checks of forces."""
+"""The constraint forces of the law by name, as the model publishes them in every tick, and checks of force values."""
 
 from __future__ import annotations
 

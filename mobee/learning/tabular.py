@@ -68,7 +68,7 @@ class TabularPlant:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A digest of the table, as plain JSON values."""
+        """A hash of the table of transitions, as a plain JSON value."""
         reached = np.where(self._probabilities > 0.0, self._outcomes, NO_ACTION).astype("<i8")
         return {"table": hashlib.sha256(reached.tobytes() + np.round(self._probabilities, 9).tobytes()).hexdigest()[:16]}
 

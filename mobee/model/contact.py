@@ -156,12 +156,12 @@ def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
 
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
-    """Return the names, sorted, of the world objects in contact (fields included) with a link that the part moves; for one pose."""
+    """Return the sorted names of the world objects in contact (fields included) with a link that the part moves; for one pose."""
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
-    """Return the names, sorted, of the world objects in contact with these links, from the contacts of one pose."""
+    """Return the sorted names of the world objects that touch a link of `moved`; `table` holds the contacts of one pose."""
     rows = table.numbers.tolist()
     found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}
     return tuple(sorted(map(table.name, found)))

@@ -81,7 +81,7 @@ def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -
     commanded = np.where(position, servo(s, s.reference, fastest), commanded)
     s.line = [*s.line[1:], commanded]
     asked = np.array([s.line[-1 - late][i] for i, late in enumerate(substeps_late(robot, parameters, dt))])
-    velocity = np.where(torque, turned(s, asked, friction, fastest, hardest, dt), responded(s, asked, lag, friction, dt))
+    velocity = np.where(torque, torque_response(s, asked, friction, fastest, hardest, dt), velocity_response(s, asked, lag, friction, dt))
     velocity = np.where(s.mode == "hold", held(s, fastest, hardest * dt), velocity)
     s.motor_velocity = velocity
     s.motor_q = s.motor_q + velocity * dt
@@ -94,14 +94,17 @@ def servo(s: MotorState, position: Array, fastest: Array) -> Array:
     return np.clip(SERVO_GAIN * (position - s.motor_q), -fastest, fastest)
 
 
-def responded(s: MotorState, asked: Array, lag: Array, friction: Array, dt: float) -> Array:
-    """Return the velocity after a substep under the command u: lag dv/dt = u - v - friction sign(v), solved exactly."""
+def velocity_response(s: MotorState, asked: Array, lag: Array, friction: Array, dt: float) -> Array:
+    """Return the velocity after a substep dt under the velocity command `asked`: lag dv/dt = u - v - friction sign(v), solved exactly."""
     share = np.where(lag > 0.0, 1.0 - np.exp(-dt / np.where(lag > 0.0, lag, 1.0)), 1.0)
     return nearer_to_zero(s.motor_velocity + share * (asked - s.motor_velocity), share * friction)
 
 
-def turned(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
-    """Return the velocity after a substep under a torque: I dv/dt = tau - load - B v - B friction sign(v), within the motor's limits."""
+def torque_response(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
+    """Return the velocity after a substep dt under the torque `asked`, within the motors' limits on velocity and acceleration.
+
+    I dv/dt = tau - load - B v - B friction sign(v)
+    """
     push = np.clip((asked - s.load - VISCOUS * s.motor_velocity) / INERTIA, -hardest, hardest)
     slowed = nearer_to_zero(s.motor_velocity + push * dt, VISCOUS * friction / INERTIA * dt)
     return np.clip(slowed, -fastest, fastest)

@@ -36,11 +36,11 @@ class ValidityChecker(Protocol):
 
     @property
     def low(self) -> Array:
-        """Lower limits (d,) rad; OMPL gets poses as (q - low) / span."""
+        """Lower limits of the joints, (d,) rad; OMPL receives poses as (q - low) / span."""
 
     @property
     def span(self) -> Array:
-        """Ranges (d,) rad."""
+        """Widths of the joints' ranges, upper minus lower limits, (d,) rad."""
 
     @property
     def box(self) -> Array:
@@ -154,7 +154,7 @@ def grown(
         return bool(checker.sound(_pose(checker, state)[None])[0])
 
     information = _information(base, space, checker)
-    # OMPL's own sampler draws what no seed decides but the first of a process.
+    # Only the first seed set in a process affects OMPL's own sampler.
     information.setValidStateSamplerAllocator(type("Sampler", (base.ValidStateSampler,), {"sample": sample}))
     motions = _motions(base, information, checker)
     if resolution is None:
@@ -212,7 +212,7 @@ def _state(space: Any, values: Array) -> Any:
     return state
 
 
-STEP = 0.02  # of a motor's range, between two poses of a motion that are looked at
+STEP = 0.02  # of a motor's range, between two poses of a motion that are checked
 MILESTONES, NEIGHBOURS = 300, 10
 
 
@@ -230,22 +230,22 @@ def rrt_connect(
     Args:
         model: robot and world.
         start: (n,) rad, all motors.
-        goals: (n,) or (G, n) rad; of motors that may not move, the start counts.
+        goals: (n,) or (G, n) rad; values of motors that may not move are ignored.
         motors: names of motors or parts that may move; None: all.
-        seed: decides everything.
-        extensions: of the trees, after which the search is given up.
-        step: of each motor's range, between poses of a motion that are looked at.
+        seed: determines the result.
+        extensions: of the trees, after which the search ends without a path.
+        step: of each motor's range, between two poses of a motion that are checked.
 
     Returns:
-        Poses (K, n) rad from the start to a goal, or None: no way was found.
+        Poses (K, n) rad from the start to a goal, or None: no path was found.
 
     Raises:
         OmplMissing, InvalidValue, UnknownName: with what is valid, and what to do.
     """
     free, first = _free(model, motors, start, step)
     ends = np.atleast_2d(_poses(model, goals))[:, free.columns]
-    way = connected(free, first[free.columns], ends, seed, extensions)
-    return None if way is None else free.whole(way)
+    path = connected(free, first[free.columns], ends, seed, extensions)
+    return None if path is None else free.whole(path)
 
 
 def prm(
@@ -262,10 +262,10 @@ def prm(
     Args:
         model: robot and world.
         motors: names of motors or parts that move; None: all.
-        milestones: how many poses, at least.
-        neighbours: with how many nearest ones each is tried to be joined.
-        rest: (n,) rad, where the other motors are; None: at home.
-        seed: of the samples.
+        milestones: smallest number of poses.
+        neighbours: number of nearest poses to which the planner tries to connect each pose.
+        rest: (n,) rad, positions of the other motors; None: at home.
+        seed: seed of the samples.
         step: as in `rrt_connect`.
 
     Raises:
@@ -282,7 +282,7 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap as `prm`, with so many neighbours that its paths are asymptotically optimal (Karaman and Frazzoli 2011)."""
+    """Grow a roadmap as `prm` does, with enough neighbours for asymptotically optimal paths (Karaman and Frazzoli 2011)."""
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 
@@ -296,8 +296,8 @@ def query(
     def ask(start: Array, goals: Array) -> Array | None:
         ends = np.repeat(whole[None], len(goals) + 1, axis=0)
         ends[:, columns] = np.concatenate([start[None], goals])
-        way = rrt_connect(model, ends[0], ends[1:], joints, seed, extensions)
-        return None if way is None else way[:, columns]
+        path = rrt_connect(model, ends[0], ends[1:], joints, seed, extensions)
+        return None if path is None else path[:, columns]
 
     return ask
 

@@ -50,7 +50,7 @@ class ReachClient:
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
-        """Reach for an object of the model's world, also when it moves; returns it as a target at its present position.
+        """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
         Raises UnknownName; InvalidValue if its role is not target, because it then repels hands.
         """
@@ -81,7 +81,7 @@ class ReachClient:
         }
 
     def has_ended(self, part: str, action_id: str) -> bool:
-        """Whether the end of a reach's force is known."""
+        """Return whether the controller has reported the end of a reach's force."""
         reach = self._reaches.get(part)
         return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
 
@@ -207,7 +207,7 @@ class BusPlant:
         self._reaches.present(target)
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
-        """Reach for an object of the model's world, also when it moves; returns it as a target at its present position.
+        """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
         Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted as `present`.
         """

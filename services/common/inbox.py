@@ -71,7 +71,7 @@ class Inbox:
             self._calls.put(None)
 
     def handle(self, handler: Handler) -> None:
-        """Run the handler in this thread if the main thread waits in `serve` and no other handler is waiting; else as put.
+        """Run the handler in this thread if the main thread waits in `serve` and no handler is queued; otherwise queue it as `put` does.
 
         An exception of the handler is raised in the main thread.
         """
@@ -89,7 +89,10 @@ class Inbox:
             self._turn.release()
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """As put, but return False and count it while `crowd` handlers are waiting, so that a flood does not fill the memory."""
+        """Queue the handler as `put` does; while `crowd` handlers are waiting, drop and count it, and return False.
+
+        So a flood of messages does not fill the memory.
+        """
         if self._queue.qsize() >= crowd:
             self.dropped += 1
             return False
@@ -97,7 +100,7 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """As offer, but without waking the main thread: the handler runs before the one that is put next."""
+        """As `offer`, but do not wake the main thread: the handler runs before the next one that `put` queues."""
         if len(self._later) >= crowd:
             self.dropped += 1
             return False

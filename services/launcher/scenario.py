@@ -1,4 +1,4 @@
-"""Reads a scenario from TOML, the services and their settings, and checks it before any service starts."""
+"""Reads a scenario (services and their settings) from a TOML file, and checks it before any service starts."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class _File(Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Part:
-    """A service of the scenario and its whole configuration."""
+    """A service of the scenario, with all its settings."""
 
     who: str
     entry: Entry
     config: ServiceConfig
-    given: frozenset[str]  # settings that the scenario names
+    given: frozenset[str]  # names of the settings that the scenario file sets
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ def shipped() -> dict[str, Path]:
 
 
 def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Sequence[str] = ()) -> Scenario:
-    """The scenario of that shipped name or path, with `table.field=value` settings on top.
+    """Read the scenario with a shipped name or at a path; each of `settings`, "table.field=value", replaces a value of the file.
 
-    Raises ConfigError in one line: place, field, and the nearest valid name.
+    Raises ConfigError with one line: the place, the field, and the nearest valid name.
     """
     path = _find(name_or_path)
     try:

@@ -58,7 +58,7 @@ class Shown:
 
 
 def shown_of(robot: Robot) -> Shown:
-    """The page of a robot; the iCub is seen together with its table."""
+    """Return the view of a robot; that of the iCub includes its table."""
     parts = tuple(colors_of(robot.parts))
     if robot.name in AT_TABLE:
         return Shown("iCub", parts, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
@@ -66,7 +66,7 @@ def shown_of(robot: Robot) -> Shown:
 
 
 def blueprint(shown: Shown, page: str = TABS[0]) -> rrb.Blueprint:
-    """Two tabs, the one called `page` open: the robot and what moves it, and what the agents know; no side panels."""
+    """Make two tabs, one of the robot and its forces and one of the agents' knowledge, without side panels; `page` is the open one."""
     return rrb.Blueprint(
         rrb.Tabs(_robot(shown), _learning(shown.parts), active_tab=TABS.index(page)),
         rrb.BlueprintPanel(state="hidden"),
@@ -79,7 +79,7 @@ def blueprint(shown: Shown, page: str = TABS[0]) -> rrb.Blueprint:
 
 
 def _robot(shown: Shown) -> rrb.Horizontal:
-    """The robot large, its pictures and the log below it, plots on the right."""
+    """The tab of the robot: a large view of it, the camera pictures and the log below, plots on the right."""
     left = rrb.Vertical(_scene(shown), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
     plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in shown.parts]
     learning = rrb.Tabs(
@@ -93,7 +93,7 @@ def _robot(shown: Shown) -> rrb.Horizontal:
 
 
 def _learning(parts: Sequence[str]) -> rrb.Horizontal:
-    """A column an agent: its space with the actions that surprised it, and bars over all its state-actions."""
+    """One column for each agent: its state space, with the actions whose outcomes surprised it coloured, and bar charts of all state-actions."""
     shares = [1.0 if part == "torso" else 1.4 for part in parts]
     return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name=TABS[1])
 

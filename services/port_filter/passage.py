@@ -26,7 +26,7 @@ class MoveDetector:
         self._moving = False
 
     def begins(self, command: Command, t: int) -> bool:
-        """Whether this command begins a position move; t ns of the bus clock."""
+        """Return whether this command, received at bus time t [ns], begins a position move."""
         if command.mode != "position":
             self._reference, self._moving = None, False
             return False
@@ -38,7 +38,7 @@ class MoveDetector:
         return begins
 
     def forget(self) -> None:
-        """The client does not control the part any more."""
+        """Forget the reference: the client no longer controls the part."""
         self._reference, self._moving = None, False
 
 
@@ -46,7 +46,10 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Commands of one part to robot_sim, from a client or from the reflex, numbered together; remembers the client's numbers."""
+    """Publishes the commands of one part to robot_sim, from a client or from the reflex, in one sequence of numbers.
+
+    It remembers the number that the client gave to each of its commands.
+    """
 
     def __init__(self, bus: Bus, part: str) -> None:
         self._stream = bus.publisher(Command, part)
@@ -66,7 +69,7 @@ class CommandStream:
         self._seq += 1
 
     def client_seq(self, seq: int) -> int:
-        """The client's number of the command with number `seq` at robot_sim; -1 if it was not a client's."""
+        """Return the client's number of the command that robot_sim knows as `seq`; -1 if no client sent it."""
         return self._client_seq.get(seq, -1)
 
 
@@ -97,7 +100,7 @@ class Streams:
             service.on_newest(State, partial(self._publish_state, part), part)
 
     def note(self, tick: Tick) -> None:
-        """A tick begins, with the body as it is."""
+        """Store the state of the robot at the start of a tick."""
         self._parts, self._q = tick.parts, np.array(tick.q)
         self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > MAX_STATE_AGE
 
@@ -107,7 +110,7 @@ class Streams:
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
     def q(self) -> Array:
-        """Motor positions as the encoders say, (n,) rad."""
+        """Return the motor positions that the encoders measured, (n,) rad."""
         return self._q
 
     def follows(self, part: str) -> bool:
@@ -157,7 +160,7 @@ class Streams:
             self.answered(commands, commands.answer)
 
     def _publish_state(self, part: str, state: State) -> None:
-        """Publish the robot's state, as the clients should see it."""
+        """Publish a state of the robot to the clients, with their command numbers."""
         self._twin.bus.run = self._service.bus.run
         shown = self._for_clients(part, state)
         self._streams[part].put(

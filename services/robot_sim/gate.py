@@ -25,7 +25,7 @@ from services.common.service import CallRefused
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Per motor of a part, each (n,)."""
+    """Limits of the motors of a part, each of shape (n,)."""
 
     lower: Array  # rad
     upper: Array  # rad

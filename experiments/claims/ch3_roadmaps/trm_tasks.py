@@ -157,7 +157,7 @@ def raise_glass() -> Example:
 def bimanual_inspect() -> Example:
     """Look at an object in both hands from all sides: the hands stay, the head moves (thesis figs. 3.4; 3.1, centre).
 
-    Both hands keep their place and orientation, the face stays turned to what they hold; the task space is where the head is: left and
+    Both hands keep their position and orientation, and the gaze stays on the object.  The task space is the position of the head: left and
     right, forward and back.
     """
     width = 0.20  # m, from palm to palm

@@ -55,7 +55,7 @@ SWITCHING = ("naive", "mended")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add angles, places and repetitions."""
+    """Add the options --angles, --spots and --repeat."""
     parser.add_argument("--angles", nargs="+", type=positive_number, default=list(ANGLES), metavar="DEG", help="of the approach, degrees")
     parser.add_argument("--spots", type=positive_whole, default=10, metavar="N", help="places on the table (default: 10)")
     parser.add_argument("--repeat", type=positive_whole, default=3, metavar="N", help="trials at each place, other noise (default: 3)")

@@ -206,7 +206,7 @@ def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, i
 
 
 def _plan(space: Lattice, beliefs: OutcomeModel, start: int, goal: int) -> Plan | None:
-    """Return the plan, or None where no path is known."""
+    """Return the plan from a state to the goal state, or None if the beliefs contain no path."""
     try:
         return Planner(space, beliefs, [goal]).plan(start)
     except MobeeError:

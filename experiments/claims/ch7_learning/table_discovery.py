@@ -240,7 +240,7 @@ def measured(runs: Runs) -> list[Claim]:
 
 
 def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: float = -np.inf) -> Claim:
-    """Judge whether a number of the curious agents at the table is above that of all controls, and above `least`."""
+    """Judge whether `number`, computed for each run, is larger for the curious agents at the table than for all controls and `least`."""
     values = {key[1:]: [number(run) for run in group] for key, group in runs.items() if key[0] == "tree"}
     text = ", ".join(f"{NAMES[explorer]} at the {world} {estimate(group, digits)}" for (explorer, world), group in values.items())
     ours = interval(values["curious", "table"])[0]

@@ -2,10 +2,12 @@
 
 Claim: a predictor that generalises over poses and targets reaches at least .80 of an oracle's score after 200 problem-tries, .90 after
 400 and .97 after 1600, and .80 after 800 on targets that were never tried; the published predictor reaches much less.
-Source: aims of this reproduction, to thesis 8.5 and 9.4.4 ("a more powerful function approximator").  Published: no numbers.
+Source: the numbers are aims of this reproduction; thesis 8.5 and 9.4.4 propose "a more powerful function approximator".
+Published: no numbers.
 Run time: 20 minutes on 2 cores.
 
-Arm, targets and evaluations are those of the experiment reach-exploration; learners have the same seeds, problems and transition models.
+The arm, the targets and the evaluations are those of the experiment reach-exploration.  All learners have the same seeds, problems and
+transition models.
 The oracle plans as the learners do, but knows the mean reward of every reach and which transitions a target blocks; both are measured by
 5 tries of each on the plant (truth.npz in the run's folder).  Scores are divided by the oracle's mean score over all seeds, so that a
 fraction can exceed 1 by chance.  The targets that are never tried lie in the middle of the grid's eight cells.  "spread", "local" and

@@ -83,7 +83,7 @@ class Roadmap:
         return pose
 
     def add(self, pose: Array, neighbours: int) -> int:
-        """Add a vertex and its motions to and from the nearest ones that are `reachable`; returns its number."""
+        """Add a vertex, with edges to and from the nearest vertices that are `reachable`; return its number."""
         joined = self.reachable(pose, neighbours)
         self.vertices = np.concatenate([self.vertices, pose[None]])
         self._costs.append({})
@@ -92,11 +92,14 @@ class Roadmap:
         return len(self.vertices) - 1
 
     def nearest(self, pose: Array, count: int) -> list[int]:
-        """Return the `count` nearest vertices by distance in fractions of the ranges."""
+        """Return the `count` vertices nearest to a pose; distances are fractions of the joints' ranges."""
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Return those of the nearest vertices to which the straight motion is sound; without any, ignore cables; without any, all."""
+        """Return those of the nearest vertices to which the straight motion is sound.
+
+        If there is none, ignore the cable constraints; if there is still none, return all nearest ones.
+        """
         near = self.nearest(pose, neighbours)
         for cables in (True, False):  # a pose that violates the cable constraints may still be reached
             found = [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v], cables)]

@@ -84,7 +84,10 @@ class Compared:
 
 
 def compared(folder: Path, task: str, least: int) -> Compared:
-    """Compare the records in the folder of a run; raises InvalidValue if it has fewer than two offline seeds."""
+    """Compare the outcomes that the live robots and the offline seeds of a run recorded for a task.
+
+    `folder` is the folder of the run.  Raises InvalidValue if fewer than two offline seeds have finished.
+    """
     results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
     if len(results) < 2:
         raise InvalidValue(

@@ -238,15 +238,15 @@ class _Believed:
 def rrt_connect(
     belief: PeerBelief, start: Array, ends: Array, seed: int, care: Care = "solids", extensions: int = EXTENSIONS
 ) -> Array | None:
-    """Return the corners (k, d) rad of a sound path from a sound pose (d,) to one of the poses (G, d); None if none was found.
+    """Return the waypoints (k, d) rad of a sound path from a sound pose (d,) to one of the poses (G, d); None if none was found.
 
-    Raises OmplMissing.
+    "Sound" is defined by `PeerBelief`.  Raises OmplMissing.
     """
     return connected(_Believed(belief, care), start, ends, seed, extensions)
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
-    """Return the path (k, d) with corners cut where that is sound: between random points on it, then from each corner as far as it goes."""
+    """Return a path (k, d) shortened by sound shortcuts: first between random points on it, then from each waypoint as far as possible."""
     found = _straightened(belief, list(path), care)
     for _ in range(SHORTCUTS if len(found) > 2 else 0):
         first, second = np.sort(rng.uniform(0.0, len(found) - 1, 2))
@@ -260,7 +260,7 @@ def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: C
 
 
 def _straightened(belief: PeerBelief, path: list[Array], care: Care) -> list[Array]:
-    """Return only the needed corners, chosen greedily from the start."""
+    """Return only the waypoints that are needed, chosen greedily from the start."""
     corners, at = [path[0]], 0
     while at < len(path) - 1:
         at = next(k for k in range(len(path) - 1, at, -1) if k == at + 1 or belief.sound_motion(path[at], path[k], care))

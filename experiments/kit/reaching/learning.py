@@ -79,7 +79,7 @@ def learn(
 
 
 def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """Return the evaluations on a set as arrays."""
+    """Return the evaluations on the problem set `name` as the arrays that `learn` returns for it."""
     return {
         f"rewards_{name}": np.array([one.rewards for one in evaluations]),
         f"states_{name}": np.array([one.states for one in evaluations], dtype=np.int16),

@@ -49,7 +49,7 @@ class ReachTable(TabularPlant):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A digest of the table of transitions and the noise, as plain JSON values; the function `world` is not recorded."""
+        """A hash of the table of transitions, and the noise, as plain JSON values; they do not cover the function `world`."""
         return super().settings | {"noise": self._noise}
 
     def present(self, target: ReachTarget | None) -> None:

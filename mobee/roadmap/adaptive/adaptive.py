@@ -157,7 +157,7 @@ class AdaptiveRoadmap:
         return int(found[0]) if len(found) else None
 
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
-        """Add poses of the joints (N, d) rad, joined in both directions to the nearest vertices; return their numbers."""
+        """Add poses of the joints (N, d) rad as vertices, with edges to and from the nearest ones; return their numbers."""
         new = self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
         spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
@@ -171,9 +171,9 @@ class AdaptiveRoadmap:
         return np.arange(old, len(poses))
 
     def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
-        """Add a path from a vertex to another through poses of the joints (K, d) rad, K at least 1; return their numbers.
+        """Add a path in both directions between two vertices, through K >= 1 new poses of the joints (K, d) rad.
 
-        This repairs a vertex without usable edges, by a path that a single-query planner found.
+        Returns the numbers of the new vertices.  This repairs a vertex without usable edges by a path that a single-query planner found.
         """
         first, last = (int(target_states(self.space, vertex)[0]) for vertex in (state, goal))
         new, old = self._new(samples), len(self)

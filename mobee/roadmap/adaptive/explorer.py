@@ -16,7 +16,7 @@ from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
 from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import NEAR, Walker
 
-QUERIES = 3  # ways to one vertex that are asked for, before it is given up
+QUERIES = 3  # largest number of queries that may end at one vertex
 
 Query = Callable[[Array, Array], Array | None]
 
@@ -24,14 +24,14 @@ Query = Callable[[Array, Array], Array | None]
 class MapExplorer(Walker):
     """A Walker that moves to untried edges until all reachable edges were tried.
 
-    Where it gets stuck, as a vertex may have feasible edges in and none out, it asks for a single way back to what is left to try,
-    and joins that to the map.  An explorer that is started again on its store goes on.
+    A vertex may have feasible edges that lead in but none that lead out.  From there it queries a path to a vertex with untried edges,
+    and adds this path to the map.  An explorer that is started again with its store continues where it ended.
 
     Args:
-        roadmap, plant, near, store: see Walker; it always goes back where an edge failed.
-        seed: of its choices.
-        query: finds a way where the map has none: from a pose of the joints (d,) to one of several (G, d), as poses (K, d)
-            from the first to the last, or None; e.g. of `mobee.roadmap.ompl.rrt_connect`.  None: it stays where it is stuck.
+        roadmap, plant, near, store: see Walker; after a failed edge it always moves back.
+        seed: seed of its choices.
+        query: finds a path where the map has none: from a pose of the joints (d,) to one of several (G, d).  It returns poses (K, d)
+            from the first to the last, or None; see `mobee.roadmap.ompl.query`.  Without a query exploration ends at such a vertex.
     """
 
     def __init__(

@@ -330,7 +330,7 @@ def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tol
 
 
 def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Keep a marker in the plane of all x with normal . x = offset [m]; with (0, 0, 1) it is a height."""
+    """Keep a marker in the plane of all x with normal . x = offset [m]; for the normal (0, 0, 1), `offset` is its height."""
     across = unit_vector("normal", normal)
 
     def residual(pose: Pose) -> Array:
@@ -344,7 +344,7 @@ def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METR
 
 
 def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Let a marker be no further in a direction (3,) than direction . x = most [m]; with (0, 0, 1) it stays below a height."""
+    """Keep a marker at x with direction . x <= most [m]; for the direction (0, 0, 1), `most` is its largest height."""
     along = unit_vector("direction", direction)
 
     def residual(pose: Pose) -> Array:

@@ -107,13 +107,13 @@ class Problem:
         self.evaluations = 0
 
     def whole(self, samples: Array) -> Array:
-        """Return all motors (N, n) from the free ones (N, d)."""
+        """Return poses of all motors (N, n) from those of the free motors (N, d)."""
         q = np.repeat(self.start[None], len(samples), axis=0)
         q[:, self.free] = samples
         return q
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Return the costs (N,) of poses q (N, n), and which are within all tolerances, (N,) bool."""
+        """Return the costs (N,) of poses q (N, n), and whether each is within all tolerances, (N,) bool."""
         pose = self.model.evaluate(q)
         self.evaluations += len(q)
         total, good = np.zeros(len(q)), np.ones(len(q), dtype=bool)
@@ -154,7 +154,7 @@ def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:
 
 
 def named(terms: Sequence[Term]) -> dict[str, Term]:
-    """Return the terms by name; equal names get a number."""
+    """Return the terms by name; a name that occurs again gets a number, as in "plane 2"."""
     found: dict[str, Term] = {}
     for one in terms:
         name, number = one.name, 1

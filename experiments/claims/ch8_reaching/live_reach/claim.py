@@ -306,7 +306,7 @@ def _no_worse(rivals: Mapping[str, Sequence[Judged]]) -> bool | None:
 
 
 def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:
-    """Return a row per contestant and set of targets."""
+    """Return the table of results: one row for each agent and set of targets, with the success rate and the costs of its tries."""
     sets = {
         f"{len(touchable)} of the 27 that can be reached": (GRID, touchable),
         f"the {27 - len(touchable)} others": (GRID, frozenset(range(27)) - touchable),

@@ -1,4 +1,4 @@
-"""The live arm with the ticks of its reaches, and the mover of a target or an obstacle while the arm reaches."""
+"""Times the reaches of the live arm, and moves a target or an obstacle during a reach."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Hand(BusPlant):
 
     @property
     def tick(self) -> int:
-        """The present tick; in lockstep a service without a turn receives only messages of its part."""
+        """The current tick, the newer of the bus and of the part's motion: in lockstep only messages of its part arrive."""
         motion = self._motion.get(PART)
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
 
     def watch_commands(self) -> None:
-        """Time the first motion of reaches from now on; takes time in every tick."""
+        """Measure the time to the first motion of each following reach; this costs time in every tick."""
         self._link.on_each(Commands, self._note_commands)
 
     def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
@@ -57,7 +57,7 @@ class Hand(BusPlant):
         self.end = reach.end_k
 
     def _note_commands(self, commands: Commands) -> None:
-        """Find the first command that moves: commands of tick k act from tick k + 1 on, and those of the tick after a request know it."""
+        """Find the first command that moves: a command of tick k acts from tick k + 1 on, and can respond to requests before tick k."""
         reference = np.array(commands.ref[self._where])
         if commands.re_k <= self.asked:
             self._before = reference

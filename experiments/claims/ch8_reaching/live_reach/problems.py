@@ -149,7 +149,10 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
 
 
 def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> list[list[float]] | None:
-    """Return the ends of an obstacle's path across the middle between hand and target, clear of the target and, at its ends, of the arm."""
+    """Return the ends of an obstacle's path that crosses the middle between hand and target; None if no path was found.
+
+    The whole path is clear of the target; its ends are clear of the robot.
+    """
     start = np.array(problem.start)[: len(known.columns)]
     target, hand = problem.target, known.model.evaluate(known.whole(start)).position(known.marker)
     out = target.position - hand
@@ -171,7 +174,10 @@ def _is_clear(known: PeerBelief, start: Array, place: Array) -> bool:
 
 
 def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: np.random.Generator) -> Problem:
-    """Return a problem with a random first pose in which no field has a contact, also not with the target unless that lies in the body."""
+    """Return a problem with a random first pose without contacts of fields.
+
+    If no such pose is found (the target may lie inside the body), contacts with the target are ignored.
+    """
     low, high = known.limits.T
     for there in (target, AWAY):
         known.present(there)
