@@ -36,16 +36,16 @@ def check_edges(
 ) -> Flags:
     """Return which edges (E, 2) between poses q (V, n) rad are free of contacts, (E,) bool.
 
-    Every vertex is looked at once.  Of each edge the middle comes first, and the first pose that touches is the last that is looked
-    at; give each edge once, for it is the same in both directions.  Nearest to each other are edges in the order of a map's.
+    Every vertex is checked once.  The check of an edge begins at its middle and ends at the first pose with contacts.  Give each edge
+    once: both directions have the same result.  The check is fastest if edges are sorted, as those of a Roadmap are.
 
     Args:
-        model: whose solids are felt, in its world as it is now.
+        model: its solid shapes are checked, in the present state of its world.
         q: as of a Roadmap.
         edges: as of a Roadmap.
-        step: how far the marker moves from one pose to the next, at most [m], along a straight line.
-        marker: None: whatever shape of the robot moves farthest.
-        threads: how many share the edges; the result is the same for any number.
+        step: largest straight distance that the marker moves between successive poses [m].
+        marker: None: the shape of the robot that moves farthest.
+        threads: number of threads; the result does not depend on it.
         reaching: markers whose hands may touch targets, as of `Model.evaluate`.
     """
     return checked(model, q, edges, step, marker, threads, reaching).free
@@ -67,8 +67,8 @@ def checked(
     free: Flags = stands[ends[:, 0]] & stands[ends[:, 1]]
     left = np.flatnonzero(free)
     poses = between(solid, q, ends[left], step, marker)
-    free[left], looked = _sweep(solid, q, ends[left], poses, threads, reaching)
-    return Checked(free, len(vertices) + looked)
+    free[left], count = _sweep(solid, q, ends[left], poses, threads, reaching)
+    return Checked(free, len(vertices) + count)
 
 
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
@@ -107,7 +107,7 @@ def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int, reach
     return sweep([one.enter(snapshot, hands) for one in users], q, np.ascontiguousarray(edges, dtype=np.int64), poses)
 
 
-_LONGER = 1.1  # than the straight lines over the middle is the way of a shape, at most: its motors turn by no more than about 1 rad
+_LONGER = 1.1  # largest ratio of a shape's path to the two straight lines through its middle, for motors that turn by up to about 1 rad
 _MARGIN = 1e-6  # m
 
 
@@ -127,7 +127,7 @@ class EdgeWatch:
         self._middles = points(solid, q)[meets]
         half = points(solid, 0.5 * (q[edges[:, 0]] + q[edges[:, 1]]))[meets]
         first, second = self._middles[:, edges[:, 0]], self._middles[:, edges[:, 1]]
-        self._half_ways = 0.5 * _LONGER * (lengths(half - first) + lengths(second - half)) + _MARGIN
+        self._half_paths = 0.5 * _LONGER * (lengths(half - first) + lengths(second - half)) + _MARGIN
         self._seen = model.world.snapshot
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
@@ -146,28 +146,28 @@ class EdgeWatch:
         self.free[again] = check_edges(self._model, self._q, self._edges[again], self._step, self._marker, self._threads)
         return again
 
-    def near(self, thing: WorldObject) -> Flags:
+    def near(self, item: WorldObject) -> Flags:
         """Return along which edges the robot could touch an object, (E,) bool.
 
-        A shape on its way is never farther from both of its ends than half of that way.
+        Each point of a shape's path is within half of the path's length of one of its two ends.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
-        for middles, radius, ways in zip(self._middles, self._bounds, self._half_ways, strict=True):
-            gap = apart(middles, thing) - radius
-            found |= np.minimum(gap[self._edges[:, 0]], gap[self._edges[:, 1]]) < ways
+        for middles, radius, half_path in zip(self._middles, self._bounds, self._half_paths, strict=True):
+            gap = apart(middles, item) - radius
+            found |= np.minimum(gap[self._edges[:, 0]], gap[self._edges[:, 1]]) < half_path
         return found
 
 
-def apart(places: Array, thing: WorldObject) -> Array:
+def apart(places: Array, item: WorldObject) -> Array:
     """Return the distances of points (N, 3) from a free object, (N,) m, 0 inside."""
-    local = np.abs((places - thing.position) @ thing.rotation)
-    size = thing.size
-    if thing.kind == "box":
+    local = np.abs((places - item.position) @ item.rotation)
+    size = item.size
+    if item.kind == "box":
         return lengths(np.maximum(local - 0.5 * np.array(size), 0.0))
-    if thing.kind == "cylinder":
+    if item.kind == "cylinder":
         beyond = np.stack([np.hypot(local[:, 0], local[:, 1]) - size[0], local[:, 2] - 0.5 * size[1]], axis=1)
         return lengths(np.maximum(beyond, 0.0))
-    if thing.kind == "capsule":
+    if item.kind == "capsule":
         local[:, 2] = np.maximum(local[:, 2] - 0.5 * size[1], 0.0)
     found: Array = np.maximum(lengths(local) - size[0], 0.0)
     return found

@@ -19,7 +19,7 @@ from mobee.roadmap.edges import check_edges
 def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each vertex to the `count` nearest others, by task coordinates y (V, m) in units of spacing.
 
-    As of all edges the lower vertex comes first, each is there once, and they are sorted.
+    Each edge occurs once, its lower vertex first, and the edges are sorted.
     """
     if count < 1:
         raise InvalidValue(f"{count} neighbours: each vertex needs at least 1.")
@@ -31,21 +31,23 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
     places = y / np.asarray(spacing)
     found = KDTree(places).query(places, most + 1)[1]
     own = np.arange(len(y))
-    others = [row[row != vertex][:most] for vertex, row in enumerate(found)]  # of equal places the own need not be the first
+    others = [
+        row[row != vertex][:most] for vertex, row in enumerate(found)
+    ]  # vertices at equal places may be sorted before the vertex itself
     return sorted_edges(np.stack([np.repeat(own, most), np.concatenate(others)], axis=1))
 
 
 def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each vertex to the `count` nearest earlier ones, as in thesis Algorithm 4.
 
-    So joined, a map is in one piece, and with as many neighbours as task coordinates it is made of simplices.
+    The resulting map is connected. With as many neighbours as task coordinates it consists of simplices.
     """
     places = y / np.asarray(spacing)
     edges = [np.empty((0, 2), dtype=np.intp)]
     for vertex in range(1, len(y)):
         apart = ((places[:vertex] - places[vertex]) ** 2).sum(axis=1)
         found = np.arange(vertex)
-        if count < vertex:  # a sort of all of them would take most of the time of a map by least squares
+        if count < vertex:  # sorting all distances would take most of the time to build a map by least squares
             near = np.flatnonzero(apart <= np.partition(apart, count - 1)[count - 1])
             found = near[np.argsort(apart[near], kind="stable")[:count]]
         edges.append(np.stack([found, np.full(len(found), vertex)], axis=1))
@@ -79,11 +81,11 @@ class Graph:
     def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
         """Return the vertices of the shortest path from one to the other, both included; None if there is no path.
 
-        `without`: edges that are not gone, the lower vertex first.
+        `without`: edges that the path must not use, the lower vertex first.
         """
         if self.components[start] != self.components[goal]:
             return None
-        ahead = np.linalg.norm(self.q - self.q[goal], axis=1).tolist()  # never more than the way that is left
+        ahead = np.linalg.norm(self.q - self.q[goal], axis=1).tolist()  # lower bounds of the remaining lengths
         best, before = [inf] * len(self.q), [-1] * len(self.q)
         best[start] = 0.0
         queue = [(ahead[start], 0.0, start)]
@@ -94,10 +96,10 @@ class Graph:
             if here > best[vertex]:
                 continue
             for other, length in zip(self.neighbours[vertex], self.lengths[vertex], strict=True):
-                way = here + length
-                if way < best[other] and not (without and (min(vertex, other), max(vertex, other)) in without):
-                    best[other], before[other] = way, vertex
-                    heappush(queue, (way + ahead[other], way, other))
+                total = here + length
+                if total < best[other] and not (without and (min(vertex, other), max(vertex, other)) in without):
+                    best[other], before[other] = total, vertex
+                    heappush(queue, (total + ahead[other], total, other))
         if best[goal] == inf:
             return None
         path = [goal]
@@ -133,20 +135,20 @@ def components(count: int, edges: Ints) -> Ints:
     return found
 
 
-ENTRIES, EXITS = 24, 8  # vertices at which the map is tried to be entered and left
-LAZY = 30  # searches after which all the edges that are left are checked at once
+ENTRIES, EXITS = 24, 8  # numbers of vertices that are tried as the first and the last of a path
+MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked at once
 
 
-def free_way(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
-    """Return the vertices of a path without contacts from the posture `start` (n,) rad, by the nearest vertex that can be reached.
+def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
+    """Return the vertices of a path without contacts from a posture `start` (n,) rad, which enters the map at the nearest reachable vertex.
 
-    `to_enter`, `to_leave`: (V,) how far each vertex is from the start, and from the goal; infinite: it is none.  Raises MobeeError
-    where no way is free, with why.
+    `to_enter`, `to_leave`: (V,) distances of the vertices from the start and from the goal; infinite: the vertex is not used.
+    Raises MobeeError with the reason if every path has contacts.
     """
     exits = _nearest(to_leave, EXITS)
     exits = exits[np.asarray(model.evaluate(roads.q[exits]).count) == 0]
     if not len(exits):
-        raise MobeeError("no free way: something touches in all poses of the map that are near the goal.")
+        raise MobeeError("no path without contacts: all poses of the map near the goal have contacts.")
     search = _Search(model, roads, edges)
     entered = 0
     for first in _nearest(to_enter, ENTRIES).tolist():
@@ -154,13 +156,15 @@ def free_way(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Ar
             continue
         entered += 1
         for goal in exits.tolist():
-            if (way := search.way(first, goal)) is not None:
-                return way
+            if (path := search.path(first, goal)) is not None:
+                return path
     if not entered:
-        raise MobeeError(f"no free way: the straight ones from the start to the {ENTRIES} nearest poses of the map all touch something.")
+        raise MobeeError(
+            f"no path without contacts: the straight lines from the start to the {ENTRIES} nearest poses of the map all have contacts."
+        )
     raise MobeeError(
-        f"no free way: {len(search.touching)} of {len(edges)} edges touch something, and without them none leads from the {entered} poses "
-        f"near the start that can be reached to the {len(exits)} near the goal."
+        f"no path without contacts: {len(search.touching)} of {len(edges)} edges have contacts, and the other edges do not connect the "
+        f"{entered} reachable poses near the start with the {len(exits)} poses near the goal."
     )
 
 
@@ -174,23 +178,24 @@ class _Search:
         self._searches = 0
         self._known: Graph | None = None  # of the free edges, once all are known
 
-    def way(self, start: int, goal: int) -> list[int] | None:
+    def path(self, start: int, goal: int) -> list[int] | None:
+        """Return the vertices of the shortest path without contacts; None if there is none."""
         if self._known is None and self._graph.components[start] == self._graph.components[goal]:
-            way = self._lazily(start, goal)
-            if way is not None:
-                return way
+            path = self._lazily(start, goal)
+            if path is not None:
+                return path
             self._check_all()
         return None if self._known is None else self._known.shortest(start, goal)
 
     def _lazily(self, start: int, goal: int) -> list[int] | None:
         """Return a path without contacts; None if there is none, or if checking all edges is faster."""
-        while self._searches < LAZY and (way := self._graph.shortest(start, goal, self.touching)) is not None:
-            steps = {(min(a, b), max(a, b)) for a, b in zip(way, way[1:], strict=False)}
+        while self._searches < MAX_LAZY_SEARCHES and (path := self._graph.shortest(start, goal, self.touching)) is not None:
+            steps = {(min(a, b), max(a, b)) for a, b in zip(path, path[1:], strict=False)}
             if steps <= self._free:
-                return way
+                return path
             self._searches += 1
             hit = self._check(steps)
-            while hit:  # what is in the way of an edge is likely to be in that of its neighbours
+            while hit:  # an obstacle on one edge is probably on the edges beside it too
                 hit = self._check({pair for edge in hit for vertex in edge for pair in self._around(vertex)})
         return None
 

@@ -36,11 +36,11 @@ class ValidityChecker(Protocol):
 
     @property
     def low(self) -> Array:
-        """Lower limits of the joints, (d,) rad; OMPL receives poses as (q - low) / span."""
+        """Lower limits (d,) rad; OMPL gets poses as (q - low) / span."""
 
     @property
     def span(self) -> Array:
-        """Widths of the joints' ranges, upper minus lower limits, (d,) rad."""
+        """Ranges (d,) rad."""
 
     @property
     def box(self) -> Array:
@@ -139,7 +139,7 @@ def grown(
     """Grow a PRM or PRMstar over the box until it has so many vertices.
 
     `neighbours`: the nearest ones that each is tried to be joined with; None: the planner's own rule.  `resolution`: of the ranges,
-    between poses of a motion that OMPL looks at itself, one by one; None: the checker does.  Raises OmplMissing.
+    between poses of a motion that OMPL checks itself, one by one; None: the checker checks motions.  Raises OmplMissing.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_ERROR)
@@ -154,7 +154,7 @@ def grown(
         return bool(checker.sound(_pose(checker, state)[None])[0])
 
     information = _information(base, space, checker)
-    # Only the first seed set in a process affects OMPL's own sampler.
+    # OMPL's own sampler draws what no seed decides but the first of a process.
     information.setValidStateSamplerAllocator(type("Sampler", (base.ValidStateSampler,), {"sample": sample}))
     motions = _motions(base, information, checker)
     if resolution is None:
@@ -212,7 +212,7 @@ def _state(space: Any, values: Array) -> Any:
     return state
 
 
-STEP = 0.02  # of a motor's range, between two poses of a motion that are checked
+STEP = 0.02  # fraction of a motor's range, between two checked poses of a motion
 MILESTONES, NEIGHBOURS = 300, 10
 
 
@@ -230,11 +230,11 @@ def rrt_connect(
     Args:
         model: robot and world.
         start: (n,) rad, all motors.
-        goals: (n,) or (G, n) rad; values of motors that may not move are ignored.
+        goals: (n,) or (G, n) rad; of motors that may not move, the start counts.
         motors: names of motors or parts that may move; None: all.
-        seed: determines the result.
-        extensions: of the trees, after which the search ends without a path.
-        step: of each motor's range, between two poses of a motion that are checked.
+        seed: decides everything.
+        extensions: of the trees, after which the search is given up.
+        step: fraction of each motor's range between the checked poses of a motion.
 
     Returns:
         Poses (K, n) rad from the start to a goal, or None: no path was found.
@@ -262,10 +262,10 @@ def prm(
     Args:
         model: robot and world.
         motors: names of motors or parts that move; None: all.
-        milestones: smallest number of poses.
-        neighbours: number of nearest poses to which the planner tries to connect each pose.
-        rest: (n,) rad, positions of the other motors; None: at home.
-        seed: seed of the samples.
+        milestones: how many poses, at least.
+        neighbours: with how many nearest ones each is tried to be joined.
+        rest: (n,) rad, positions of the other motors; None: the home posture.
+        seed: of the samples.
         step: as in `rrt_connect`.
 
     Raises:
@@ -282,7 +282,7 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap as `prm` does, with enough neighbours for asymptotically optimal paths (Karaman and Frazzoli 2011)."""
+    """Grow a roadmap as `prm`, with so many neighbours that its paths are asymptotically optimal (Karaman and Frazzoli 2011)."""
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 

@@ -43,9 +43,9 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
     problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)
     low, high = problem.limits.T
     drawn = np.random.default_rng(seed).uniform(low, high, (STARTS, len(low)))
-    ends, missing = Descent(problem).ends(np.concatenate([problem.start[None], problem.whole(drawn)]))
-    best = int(missing[:, 0].argmin())
-    return Nearest(ends[best], model.evaluate(ends[best]).position(marker), float(missing[best, 0]))
+    ends, errors = Descent(problem).ends(np.concatenate([problem.start[None], problem.whole(drawn)]))
+    best = int(errors[:, 0].argmin())
+    return Nearest(ends[best], model.evaluate(ends[best]).position(marker), float(errors[best, 0]))
 
 
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
@@ -64,11 +64,11 @@ def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Ar
     Within FAR, on shells that are SHELL apart; None if there is none.
     """
     where = np.asarray(position, dtype=np.float64)
-    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    directions = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     nearest = nearest_posture(model, part, marker, where, q).distance
     for distance in np.arange(max(nearest, SHELL), FAR, SHELL):
-        for place in where + distance * ways:
+        for place in where + distance * directions:
             if body_at(model, part, place, q) is None and nearest_posture(model, part, marker, place, q).distance < SHELL:
                 return np.asarray(place)
     return None

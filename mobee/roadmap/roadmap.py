@@ -13,7 +13,7 @@ from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.archive import read, robot_digest, world_as_json, world_digest, world_from_json, write
-from mobee.roadmap.graph import Graph, free_way, graph
+from mobee.roadmap.graph import Graph, free_path, graph
 from mobee.roadmap.ik.problem import chosen
 from mobee.robot.load import load_robot, shipped_robots
 from mobee.robot.robot import Robot
@@ -47,7 +47,7 @@ class Roadmap:
         if len(self.edges) and not (0 <= self.edges.min() and self.edges.max() < len(self.q)):
             raise InvalidValue(f"edges name the vertices {self.edges.min()} to {self.edges.max()}; valid are 0 to {len(self.q) - 1}.")
         if not (self.edges[:, 0] < self.edges[:, 1]).all():
-            raise InvalidValue("of an edge the lower vertex must come first; each is there once, for both ways.")
+            raise InvalidValue("the lower vertex of an edge must come first; one edge serves both directions.")
         object.__setattr__(self, "graph", graph(self.q, self.edges))
 
     @property
@@ -69,15 +69,15 @@ class Roadmap:
         """Return the vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than MAX_GOAL_DISTANCE."""
         return int(self._to(y_goal).argmin())
 
-    def way(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
-        """Return the vertices of the `path`, from the first to the last one in the map."""
+    def vertex_path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
+        """Return the vertices of the path that `path` returns as poses; arguments and errors are the same."""
         if free:
-            return free_way(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
+            return free_path(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
         start, goal = self.entry(q_from), self.exit(y_goal)
-        way = self.graph.shortest(start, goal)
-        if way is None:
+        vertices = self.graph.shortest(start, goal)
+        if vertices is None:
             raise MobeeError(self._apart(start, goal))
-        return way
+        return vertices
 
     def path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> Array:
         """Return the shortest path through the map from a posture to the vertex nearest to a goal, as poses (K, n) rad.
@@ -95,7 +95,7 @@ class Roadmap:
             MobeeError: start and goal are in unconnected parts of the map, or every path has contacts.
         """
         start = self._posture(q_from)
-        poses = self.q[self.way(start, y_goal, free)]
+        poses = self.q[self.vertex_path(start, y_goal, free)]
         return poses if np.array_equal(start, poses[0]) else np.concatenate([start[None], poses])
 
     def __repr__(self) -> str:
@@ -111,7 +111,7 @@ class Roadmap:
             {"settings": self.settings | digests(model), "world": world_as_json(model.world)},
         )
 
-    def told(self, y: Array) -> str:
+    def format_coordinates(self, y: Array) -> str:
         """Return task coordinates (m,) with their names as text."""
         return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
@@ -140,8 +140,8 @@ class Roadmap:
         nearest = int(apart.argmin())
         if apart[nearest] > MAX_GOAL_DISTANCE:
             raise InvalidValue(
-                f"nothing of the map is at {self.told(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
-                f"is at {self.told(self.y[nearest])}; ask for that, or for what is within {MAX_GOAL_DISTANCE:g} spacings of one."
+                f"the map has no vertex near {self.format_coordinates(goal)}: the nearest vertex, {apart[nearest]:.1f} spacings away, "
+                f"is at {self.format_coordinates(self.y[nearest])}; choose a goal within {MAX_GOAL_DISTANCE:g} spacings of a vertex."
             )
         return np.where(apart > MAX_GOAL_DISTANCE, np.inf, apart)
 
@@ -153,9 +153,9 @@ class Roadmap:
         label = self.graph.components
         mine, other = (int((label == label[one]).sum()) for one in (start, goal))
         return (
-            f"no edges lead from vertex {start} ({self.told(self.y[start])}) to vertex {goal} ({self.told(self.y[goal])}): the map is in "
-            f"{label.max() + 1} parts, and they are in those of {mine} and {other} vertices. Start elsewhere, or build it with more "
-            f"neighbours or a larger `longest`."
+            f"no path leads from vertex {start} ({self.format_coordinates(self.y[start])}) to vertex {goal} "
+            f"({self.format_coordinates(self.y[goal])}): the map has {label.max() + 1} unconnected parts, and the two vertices are "
+            f"in parts of {mine} and {other} vertices. Start elsewhere, or build the map with more neighbours or a larger `longest`."
         )
 
 

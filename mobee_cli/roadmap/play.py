@@ -124,7 +124,7 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     moving = "" if found["rested"] else ", still moving"
     held = f", held off by {found['held_by']}" if found["held_by"] and found["missing"] > MIN_ERROR else ""
     away = f"{marker} {1e3 * found['markers'][marker]:.0f} mm from it, {found['farthest']} {found['missing']:.3f} rad from its goal{held}"
-    lines = wrapped(f"{verdict} at {trm.told(np.array(found['place']))} after {found['seconds']:.1f} s{moving}: {away}.")
+    lines = wrapped(f"{verdict} at {trm.format_coordinates(np.array(found['place']))} after {found['seconds']:.1f} s{moving}: {away}.")
     off, lag = found["off"], found["lag"]
     lines += wrapped(f"Largest distance of a motor from the path: {off:.3f} rad; from its planned position at the time: {lag:.3f} rad.")
     if found["solid"] > 0.0:

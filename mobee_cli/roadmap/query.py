@@ -53,7 +53,7 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     trm = replace(trm, q=np.where(stay, start, trm.q))
     why = ""
     try:
-        vertices = trm.way(start, goal, free=True)
+        vertices = trm.vertex_path(start, goal, free=True)
     except InvalidValue:
         raise
     except MobeeError as error:
@@ -79,7 +79,7 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
 
 def _shortest(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
     try:
-        return trm.way(start, goal)
+        return trm.vertex_path(start, goal)
     except InvalidValue:
         raise
     except MobeeError as error:
@@ -91,7 +91,8 @@ def path_text(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     vertices, place = found["vertices"], np.array(found["place"])
     count = len(vertices)
     lines = wrapped(
-        f"To {trm.told(place)}, {max(found['missing']):.2f} spacings from the goal: over {count} {'pose' if count == 1 else 'poses'} "
+        f"To {trm.format_coordinates(place)}, {max(found['missing']):.2f} spacings from the goal: over {count} "
+        f"{'pose' if count == 1 else 'poses'} "
         f"of the map, {found['length']:.2f} rad, no step of a motor above {found['largest_step']:.2f} rad, {found['seconds']:.1f} s."
     )
     if found["entry"] > 0.0:
@@ -99,7 +100,7 @@ def path_text(trm: Roadmap, found: dict[str, Any]) -> list[str]:
             f"From the start to the nearest pose of the map a motor turns by {found['entry']:.2f} rad; no edge covers this motion."
         )
     shown = vertices if count <= MAX_LISTED else [*vertices[: MAX_LISTED // 2], None, *vertices[-MAX_LISTED // 2 :]]
-    lines += [f"  {'...' if one is None else f'{one:>6}  {trm.told(trm.y[one])}'}"[:COLUMNS] for one in shown]
+    lines += [f"  {'...' if one is None else f'{one:>6}  {trm.format_coordinates(trm.y[one])}'}"[:COLUMNS] for one in shown]
     if not found["free"]:
         return lines + wrapped(f"The path has contacts: {found['why']}")
     detour = "" if found["shortest"] else "The shortest path has contacts: this one avoids them. "

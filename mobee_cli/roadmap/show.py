@@ -103,7 +103,7 @@ def tour(trm: Roadmap, places: int = TOUR_PLACES) -> list[Stretch]:
         nearest = np.minimum(nearest, np.linalg.norm(y - y[chosen[-1]], axis=1))
     stretches = []
     for start, goal in zip(inside[chosen], inside[chosen[1:]], strict=False):
-        way = trm.graph.shortest(int(start), int(goal))
-        motion = timed(trm.model.robot, trm.q[way], Gains.default(), dt=1.0 / RATE)
-        stretches.append(Stretch(f"to {trm.told(trm.y[goal])}", motion.q))
+        vertices = trm.graph.shortest(int(start), int(goal))
+        motion = timed(trm.model.robot, trm.q[vertices], Gains.default(), dt=1.0 / RATE)
+        stretches.append(Stretch(f"to {trm.format_coordinates(trm.y[goal])}", motion.q))
     return stretches or [Stretch("the only pose", trm.q[inside[:1]])]

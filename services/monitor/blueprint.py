@@ -93,7 +93,7 @@ def _robot(shown: Shown) -> rrb.Horizontal:
 
 
 def _learning(parts: Sequence[str]) -> rrb.Horizontal:
-    """One column for each agent: its state space, with the actions whose outcomes surprised it coloured, and bar charts of all state-actions."""
+    """One column for each agent: its state space, with surprising actions coloured, and bar charts of all state-actions."""
     shares = [1.0 if part == "torso" else 1.4 for part in parts]
     return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name=TABS[1])
 

@@ -96,7 +96,7 @@ def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> No
     np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], [[-0.9, 0.6], [-0.1, 1.4]], atol=1e-5)
 
 
-def test_query_tells_the_way(say: Say, free: Path) -> None:
+def test_query_prints_the_path(say: Say, free: Path) -> None:
     code, out, _ = say("query", free, "--from", 0, 0, "--to", 0.4, 0.2)
     assert code == 0
     assert "To yaw 0.4, elbow 0.2, 0.00 spacings from the goal: over 7 poses" in _flat(out)
@@ -125,7 +125,7 @@ def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: P
     start = mobee.load_roadmap(blocked).q[12]
     assert mobee.load_roadmap(blocked).model.evaluate(start).count and len(start) == len(robot.motors)
     code, out, _ = say("query", blocked, "--from", *start, "--to", 0.2, 0.3)
-    assert code == 1 and "The path has contacts: no free way: the straight ones" in _flat(out)
+    assert code == 1 and "The path has contacts: no path without contacts: the straight lines" in _flat(out)
     code, out, err = say("play", blocked, "--from", *start, "--to", 0.2, 0.3)
     assert code == 1 and out == "" and "--anyway" in err
 

@@ -78,8 +78,8 @@ class AdaptiveRoadmap:
     def lengths(self) -> Array:
         """Lengths of the edges in joint space, shape (S, A), rad; 0 where there is no edge."""
         space = self.space
-        ways = space.samples[space.goals] - space.samples[:, None]
-        return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((ways**2).sum(axis=-1)))
+        steps = space.samples[space.goals] - space.samples[:, None]
+        return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((steps**2).sum(axis=-1)))
 
     def plan(self, start: int, goals: ArrayLike) -> tuple[int, ...]:
         """Return the vertices of the cheapest path from a start to one of the goals, both included.
@@ -91,8 +91,8 @@ class AdaptiveRoadmap:
         left, edges = self.costs(goals), self._edge_costs()
         if not np.isfinite(left[here]):
             raise MobeeError(
-                f"no way is left in the map from vertex {here} to {sorted(targets)}: what failed was taken out. "
-                "Grow the map, repair it by a single query, or let it reweigh edges instead of removing them."
+                f"the map has no path from vertex {here} to {sorted(targets)}, because edges that failed were removed. "
+                "Grow the map, join its parts by a single query, or change the costs of failed edges instead of removing them."
             )
         path = [here]
         while path[-1] not in targets:
@@ -108,8 +108,8 @@ class AdaptiveRoadmap:
 
         edges = self._edge_costs()
         states, actions = np.nonzero(np.isfinite(edges))
-        back = (self.space.goals[states, actions], states)
-        graph = csr_array((edges[states, actions], back), shape=(len(self), len(self)))
+        reverse = (self.space.goals[states, actions], states)
+        graph = csr_array((edges[states, actions], reverse), shape=(len(self), len(self)))
         found: Array = dijkstra(graph, indices=target_states(self.space, goals), min_only=True)
         return found
 

@@ -16,7 +16,7 @@ from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
 from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import NEAR, Walker
 
-QUERIES = 3  # largest number of queries that may end at one vertex
+MAX_QUERIES = 3  # single queries for a path to one vertex
 
 Query = Callable[[Array, Array], Array | None]
 
@@ -24,14 +24,14 @@ Query = Callable[[Array, Array], Array | None]
 class MapExplorer(Walker):
     """A Walker that moves to untried edges until all reachable edges were tried.
 
-    A vertex may have feasible edges that lead in but none that lead out.  From there it queries a path to a vertex with untried edges,
-    and adds this path to the map.  An explorer that is started again with its store continues where it ended.
+    A vertex may have feasible edges that lead to it and none that leave it.  There the explorer queries a path to a vertex with
+    untried edges, and adds this path to the map.  An explorer that is started again with its store continues.
 
     Args:
-        roadmap, plant, near, store: see Walker; after a failed edge it always moves back.
-        seed: seed of its choices.
-        query: finds a path where the map has none: from a pose of the joints (d,) to one of several (G, d).  It returns poses (K, d)
-            from the first to the last, or None; see `mobee.roadmap.ompl.query`.  Without a query exploration ends at such a vertex.
+        roadmap, plant, near, store: see Walker; the part always moves back after an edge failed.
+        seed: of its random choices.
+        query: finds a path where the map has none: from a pose of the joints (d,) to one of several (G, d), as poses (K, d)
+            from the first to the last, or None; see `mobee.roadmap.ompl.query`.  None: the explorer stops there.
     """
 
     def __init__(
@@ -87,17 +87,17 @@ class MapExplorer(Walker):
     def _escape(self, here: int) -> bool:
         """Join this vertex to vertices with untried edges, by the query; return whether it found a path."""
         left = sorted({*self.roadmap.unexplored[:, 0].tolist()} - self.record.joined - {here})
-        others = [vertex for vertex in left if self._asked_for[vertex] < QUERIES]
+        others = [vertex for vertex in left if self._asked_for[vertex] < MAX_QUERIES]
         if self._query is None or not others:
             return False
         space = self.roadmap.space
-        way = self._query(self.plant.measure(self.part)[space.columns], space.samples[others])
-        if way is None:
-            self._asked_for.update(QUERIES * others)
+        path = self._query(self.plant.measure(self.part)[space.columns], space.samples[others])
+        if path is None:
+            self._asked_for.update(MAX_QUERIES * others)
             return False
-        goal = others[int(np.abs(space.samples[others] - way[-1]).max(axis=1).argmin())]
+        goal = others[int(np.abs(space.samples[others] - path[-1]).max(axis=1).argmin())]
         self._asked_for[goal] += 1
-        between = way[1:-1] if len(way) > 2 else 0.5 * (way[:1] + way[-1:])
+        between = path[1:-1] if len(path) > 2 else 0.5 * (path[:1] + path[-1:])
         self.record.change("join", state=here, samples=between.tolist(), goal=goal)
         self.repairs += 1
         return True
@@ -109,8 +109,8 @@ class MapExplorer(Walker):
             if self._query is None:
                 raise
         space = self.roadmap.space
-        way = self._query(self.plant.measure(self.part)[space.columns], space.samples[near])
-        for pose in () if way is None else way[1:]:
+        path = self._query(self.plant.measure(self.part)[space.columns], space.samples[near])
+        for pose in () if path is None else path[1:]:
             target = space.target(near[0])
             target[space.columns] = pose
             q = self.plant.act(self.part, target).q

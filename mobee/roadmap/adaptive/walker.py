@@ -15,9 +15,9 @@ from mobee.plant import Outcome, Plant
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
 from mobee.roadmap.adaptive.record import MapRecord, MapStore
 
-NEAR = 0.15  # rad: within so much of a vertex in every joint the part is there
-DOORS = 5  # nearest vertices that are tried when it is beside the map
-TRAIL = 50  # vertices back the way it came that are tried before
+NEAR = 0.15  # rad: the part is at a vertex if every joint is within this distance of it
+DOORS = 5  # number of nearest vertices that are tried if the part is off the map
+TRAIL = 50  # number of vertices visited last that are tried first
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,20 +32,20 @@ class Walk:
 class Walker:
     """Moves one part along the edges of an adaptive map.
 
-    An edge is whatever motion comes of the command to go to its goal.  It worked if the part comes to rest within `near` of the
-    goal; else the part goes back to where it began (thesis 4.1: the reflex), the map learns of it, and the way is planned anew.
+    To move along an edge, the part is commanded to the edge's goal.  The edge succeeds if the part comes to rest within `near` of the
+    goal.  Otherwise the part moves back to its start (thesis 4.1: the reflex), the map records the failure, and a new path is planned.
 
     Args:
-        roadmap: which it changes.
-        plant: through which it acts; its robot must be the map's.
-        near: rad, in every joint of the map.
-        back: whether it always goes back first; False: it goes on at once to the next vertex of the new way, and back only
-            if it does not come there.
-        store: where what is observed goes, and comes from: on a store that holds something the walker goes on.
+        roadmap: the map, which the walker changes.
+        plant: executes the actions; its robot must be that of the map.
+        near: largest distance from a vertex, in every joint of the map [rad].
+        back: whether the part always moves back after a failure; False: it moves directly to the next vertex of the new path, and back
+            only if it does not arrive there.
+        store: receives the observations; if it already has some, the walker continues from them.
 
     Raises:
-        InvalidValue: a plant of another robot.
-        MobeeError: the store is of another map.
+        InvalidValue: the plant has another robot.
+        MobeeError: the store belongs to another map.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Walker:
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
         """Move to one of the goals over at most so many edges, with a new plan after each edge that fails.
 
-        Raises MobeeError if no way is left, ActionInterrupted if the plant does.
+        Raises MobeeError if no path is left, ActionInterrupted if the plant does.
         """
         targets = set(target_states(self.roadmap.space, goals).tolist())
         edges, bumps = 0, 0
@@ -119,15 +119,15 @@ class Walker:
         for vertex in near[:DOORS]:
             if self._comes_to(vertex):
                 return vertex
-        raise MobeeError(f"{self.part} is beside the map, and comes to none of the vertices {near[:DOORS]}: add samples near it.")
+        raise MobeeError(f"{self.part} is off the map, and reaches none of the vertices {near[:DOORS]}: add samples near it.")
 
     def _comes_to(self, vertex: int) -> bool:
         return self._is_at(self._move(vertex).q, vertex)
 
     def _onward(self, state: int, goals: ArrayLike) -> int:
         """Move to the next vertex of the new path without moving back first; move back if that fails."""
-        way = self.roadmap.plan(state, goals)
-        for vertex in (way[1], state):
+        path = self.roadmap.plan(state, goals)
+        for vertex in (path[1], state):
             if self._comes_to(vertex):
                 self.here = vertex
                 break

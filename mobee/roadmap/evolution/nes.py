@@ -52,7 +52,7 @@ def path_rates(dimensions: int, population: int, separable: bool = False) -> Pat
 
 
 def published_utilities(population: int) -> Array:
-    """What each sample counts in the published forms, (population,), best first; they sum up to 0 (Glasmachers et al. 2010)."""
+    """Return the utilities of the samples in the published forms, (population,), best first; their sum is 0 (Glasmachers et al. 2010)."""
     better = np.maximum(0.0, math.log(population / 2 + 1) - np.log(np.arange(1, population + 1)))
     utilities: Array = better / better.sum() - 1.0 / population
     return utilities
@@ -108,7 +108,7 @@ METHODS: tuple[str, ...] = get_args(Method)
 
 
 class NES:
-    """A search distribution; `ask` for a generation, `tell` what its samples cost.
+    """A search distribution; `ask` returns a generation, `tell` takes the costs of its samples.
 
     The same seed gives the same samples.  Only the order of the costs counts, so that f and any growing function of f give the
     same search.
@@ -170,7 +170,7 @@ class NES:
         return deviation
 
     def ask(self) -> Array:
-        """The next generation, (population, d); asked again before `tell`, another one."""
+        """Return the next generation, (population, d); a second call before `tell` draws another one."""
         self._z = self._rng.standard_normal((self.population, len(self.mean)))
         samples: Array = self.mean + self.sigma * self._scale * stretched(self.shape, self._z)
         return samples
@@ -206,7 +206,7 @@ class NES:
         self.shape = turned(self.shape, directions, np.concatenate([[rates.rank_one], rates.rank_all * weights]), shrink)
 
     def _follow_published(self, z: Array) -> None:
-        """The published forms: the trace of the gradient is the step size's, the rest the shape's."""
+        """Update by the published forms: the trace of the gradient changes the step size, the remainder the shape."""
         u, d = self._utilities, len(self.mean)
         self.mean = self.mean + self.sigma * self._scale * stretched(self.shape, u @ z)
         if self.shape.ndim == 1:

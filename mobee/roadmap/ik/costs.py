@@ -146,8 +146,8 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
     """Turn two markers' normals to each other: each points along the line to the other marker; the residual is the larger angle."""
 
     def residual(pose: Pose) -> Array:
-        way = units(pose.position(second) - pose.position(first))
-        found: Array = np.maximum(angle_between(pose.normal(first), way), angle_between(pose.normal(second), -way))
+        between = units(pose.position(second) - pose.position(first))
+        found: Array = np.maximum(angle_between(pose.normal(first), between), angle_between(pose.normal(second), -between))
         return found
 
     def aims(robot: Robot) -> tuple[Aim, ...]:
@@ -177,7 +177,7 @@ def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS
 
 
 def collision(by: str = "depth", weight: float | None = None) -> Term:
-    """No solid contacts: by their summed depth [m], which tells the way out, or by their number |K| (table 3.1)."""
+    """No solid contacts: costs are their summed depth [m], whose gradient leads out of contact, or their number |K| (table 3.1)."""
     if by not in ("depth", "count"):
         raise InvalidValue(f"collision by {by!r}: valid are 'depth' and 'count'.")
 
@@ -231,10 +231,10 @@ def constraints(weight: float = PER_RAD) -> Term:
     """Keep the robot's own linear constraints (thesis eqs. 5.14-5.17): the sum of what its clauses miss, rad."""
 
     def residual(pose: Pose) -> Array:
-        missing: Array = np.zeros(pose.q.shape[:-1])
+        distance: Array = np.zeros(pose.q.shape[:-1])
         for clause in pose.robot.clauses:
-            missing = missing + np.maximum(0.0, -(pose.q @ clause.a.T + clause.b).max(axis=-1))
-        return missing
+            distance = distance + np.maximum(0.0, -(pose.q @ clause.a.T + clause.b).max(axis=-1))
+        return distance
 
     return checked_term("constraints", residual, weight, 0.0)
 
@@ -322,8 +322,8 @@ def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tol
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 
     def residual(pose: Pose) -> Array:
-        way = pose.normal(marker) if own is None else pose.rotation(marker) @ own
-        found: Array = np.arcsin(np.minimum(np.abs(way @ along), 1.0))
+        axis = pose.normal(marker) if own is None else pose.rotation(marker) @ own
+        found: Array = np.arcsin(np.minimum(np.abs(axis @ along), 1.0))
         return found
 
     return checked_term(f"across {marker}", residual, weight, tolerance)

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 
 import mobee
 from mobee.errors import InvalidValue, MobeeError
-from mobee.roadmap import graph as free_way
+from mobee.roadmap import graph as graph_module
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.graph import components, graph, nearest, nearest_before, short, sorted_edges
 from mobee.roadmap.roadmap import Roadmap
@@ -27,13 +27,13 @@ def test_the_way_is_as_short_as_dijkstra_says(seed: int, count: int, edges: int)
     there = {(int(a), int(b)) for a, b in pairs}
     roads = graph(q, pairs)
     for start, goal in rng.integers(0, count, (4, 2)).tolist():
-        way = roads.shortest(start, goal)
-        if way is None:
+        path = roads.shortest(start, goal)
+        if path is None:
             assert apart[start, goal] == np.inf
             continue
-        assert way[0] == start and way[-1] == goal
-        assert all((min(a, b), max(a, b)) in there for a, b in zip(way, way[1:], strict=False))
-        assert np.linalg.norm(np.diff(q[way], axis=0), axis=1).sum() == pytest.approx(apart[start, goal], abs=1e-12)
+        assert path[0] == start and path[-1] == goal
+        assert all((min(a, b), max(a, b)) in there for a, b in zip(path, path[1:], strict=False))
+        assert np.linalg.norm(np.diff(q[path], axis=0), axis=1).sum() == pytest.approx(apart[start, goal], abs=1e-12)
 
 
 def test_components_are_numbered_by_size() -> None:
@@ -120,53 +120,53 @@ def put(trm: Roadmap, vertex: int, radius: float = 0.01) -> None:
     trm.model.world.add(f"block {vertex}", mobee.sphere(radius), position=place)
 
 
-def steps(way: list[int]) -> np.ndarray:
-    return np.sort(np.stack([way[:-1], way[1:]], axis=1), axis=1)
+def steps(path: list[int]) -> np.ndarray:
+    return np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
 
 
-def test_where_nothing_is_in_the_way_the_free_way_is_the_shortest(trm: Roadmap) -> None:
-    assert trm.way(trm.q[0], trm.y[-1], free=True) == trm.way(trm.q[0], trm.y[-1])
+def test_without_obstacles_the_free_path_is_the_shortest(trm: Roadmap) -> None:
+    assert trm.vertex_path(trm.q[0], trm.y[-1], free=True) == trm.vertex_path(trm.q[0], trm.y[-1])
     np.testing.assert_array_equal(trm.path(trm.q[0], trm.y[-1], free=True), trm.path(trm.q[0], trm.y[-1]))
 
 
-@pytest.mark.parametrize("lazy", [free_way.LAZY, 0], ids=["lazily", "all at once"])
-def test_it_goes_round_what_touches_and_no_farther_than_it_must(trm: Roadmap, lazy: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(free_way, "LAZY", lazy)
+@pytest.mark.parametrize("lazy", [graph_module.MAX_LAZY_SEARCHES, 0], ids=["lazily", "all at once"])
+def test_the_free_path_is_the_shortest_around_an_obstacle(trm: Roadmap, lazy: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(graph_module, "MAX_LAZY_SEARCHES", lazy)
     put(trm, MIDDLE)
     start, goal = MIDDLE - 3, MIDDLE + 3
     free = check_edges(trm.model, trm.q, trm.edges)
-    way = trm.way(trm.q[start], trm.y[goal], free=True)
-    assert way[0] == start and way[-1] == goal and MIDDLE not in way
-    assert check_edges(trm.model, trm.q, steps(way)).all()
+    path = trm.vertex_path(trm.q[start], trm.y[goal], free=True)
+    assert path[0] == start and path[-1] == goal and MIDDLE not in path
+    assert check_edges(trm.model, trm.q, steps(path)).all()
     best = graph(trm.q, trm.edges[free]).shortest(start, goal)
-    assert best is not None and len(way) == len(best) > len(trm.way(trm.q[start], trm.y[goal]))
+    assert best is not None and len(path) == len(best) > len(trm.vertex_path(trm.q[start], trm.y[goal]))
 
 
-def test_it_enters_and_leaves_the_map_where_it_can(trm: Roadmap) -> None:
+def test_a_free_path_enters_and_leaves_the_map_at_vertices_without_contacts(trm: Roadmap) -> None:
     put(trm, MIDDLE)
     beside = trm.q[0] - 0.01
-    assert trm.way(beside, trm.y[MIDDLE])[-1] == MIDDLE
-    way = trm.way(beside, trm.y[MIDDLE], free=True)
-    assert np.abs(trm.y[way[-1]] - trm.y[MIDDLE]).max() <= 1.0 and way[-1] != MIDDLE
-    assert check_edges(trm.model, trm.q, steps(way)).all()
+    assert trm.vertex_path(beside, trm.y[MIDDLE])[-1] == MIDDLE
+    path = trm.vertex_path(beside, trm.y[MIDDLE], free=True)
+    assert np.abs(trm.y[path[-1]] - trm.y[MIDDLE]).max() <= 1.0 and path[-1] != MIDDLE
+    assert check_edges(trm.model, trm.q, steps(path)).all()
 
 
-def test_a_first_step_that_touches_is_gone_round(trm: Roadmap) -> None:
+def test_a_first_line_with_contacts_is_avoided(trm: Roadmap) -> None:
     put(trm, MIDDLE, 0.002)
     start = trm.q[MIDDLE] + 0.4 * (trm.q[MIDDLE + 1] - trm.q[MIDDLE])
-    way = trm.way(start, trm.y[0], free=True)
-    assert trm.way(start, trm.y[0])[0] == MIDDLE != way[0]
+    path = trm.vertex_path(start, trm.y[0], free=True)
+    assert trm.vertex_path(start, trm.y[0])[0] == MIDDLE != path[0]
     assert trm.model.evaluate(start).count == 0
-    assert check_edges(trm.model, np.stack([start, trm.q[way[0]]]), np.array([[0, 1]])).all()
+    assert check_edges(trm.model, np.stack([start, trm.q[path[0]]]), np.array([[0, 1]])).all()
 
 
-def test_where_no_way_is_free_it_says_why(trm: Roadmap) -> None:
+def test_if_every_path_has_contacts_the_error_gives_the_reason(trm: Roadmap) -> None:
     put(trm, 0, 0.05)
-    with pytest.raises(MobeeError, match="the straight ones from the start to the 24 nearest poses of the map all touch"):
-        trm.way(trm.q[0], trm.y[-1], free=True)
-    with pytest.raises(MobeeError, match="in all poses of the map that are near the goal"):
-        trm.way(trm.q[-1], trm.y[0] - 1.0, free=True)
+    with pytest.raises(MobeeError, match="the straight lines from the start to the 24 nearest poses of the map all have contacts"):
+        trm.vertex_path(trm.q[0], trm.y[-1], free=True)
+    with pytest.raises(MobeeError, match="all poses of the map near the goal have contacts"):
+        trm.vertex_path(trm.q[-1], trm.y[0] - 1.0, free=True)
     for row in range(SIDE):
         put(trm, row * SIDE + 3, 0.03)
-    with pytest.raises(MobeeError, match=r"\d+ of 84 edges touch something, and without them none leads"):
-        trm.way(trm.q[SIDE * 3 + 6], trm.y[SIDE * 5], free=True)
+    with pytest.raises(MobeeError, match=r"\d+ of 84 edges have contacts, and the other edges do not connect"):
+        trm.vertex_path(trm.q[SIDE * 3 + 6], trm.y[SIDE * 5], free=True)

@@ -41,9 +41,9 @@ def test_a_path_leads_from_the_posture_over_the_map_to_the_goal() -> None:
     np.testing.assert_array_equal(path[1], trm.q[0])
     np.testing.assert_array_equal(path[-1], trm.q[-1])
     assert len(path) == 1 + 2 * SIDE - 1
-    assert {tuple(sorted(pair)) for pair in zip(trm.way(start, [0.5, 1.0]), trm.way(start, [0.5, 1.0])[1:], strict=False)} <= {
-        tuple(edge) for edge in trm.edges.tolist()
-    }
+    assert {
+        tuple(sorted(pair)) for pair in zip(trm.vertex_path(start, [0.5, 1.0]), trm.vertex_path(start, [0.5, 1.0])[1:], strict=False)
+    } <= {tuple(edge) for edge in trm.edges.tolist()}
 
 
 def test_a_path_from_a_vertex_begins_with_it_once() -> None:
@@ -68,7 +68,7 @@ def test_the_exit_is_the_nearest_in_spacings() -> None:
 
 def test_a_goal_that_the_map_does_not_have_is_told_with_the_nearest_vertex() -> None:
     trm = square(table())
-    with pytest.raises(InvalidValue, match=r"nothing of the map is at up -0.2, side 1: .* 2.0 spacings away, is at up 0, side 1;"):
+    with pytest.raises(InvalidValue, match=r"the map has no vertex near up -0.2, side 1: .* 2.0 spacings away, is at up 0, side 1;"):
         trm.path(trm.q[0], [-0.2, 1.0])
     with pytest.raises(InvalidValue, match=r"y_goal has shape \(3,\); it must be \(2,\) finite numbers: up, side"):
         trm.path(trm.q[0], [0.0, 0.0, 0.0])
@@ -78,7 +78,7 @@ def test_a_goal_that_the_map_does_not_have_is_told_with_the_nearest_vertex() -> 
 
 def test_parts_that_are_not_connected_are_told() -> None:
     trm = square(table(), cut=True)
-    with pytest.raises(MobeeError, match="the map is in 2 parts, and they are in those of 18 and 18 vertices"):
+    with pytest.raises(MobeeError, match="the map has 2 unconnected parts, and the two vertices are in parts of 18 and 18 vertices"):
         trm.path(trm.q[0], trm.y[-1])
 
 

@@ -44,7 +44,7 @@ def test_an_edge_that_failed_is_out_and_the_other_way_is_taken_at_once():
     assert roadmap.plan(1, 0) == (1, 0)
     roadmap.observe(0, 1, 0)
     assert roadmap.stuck.tolist() == [0]
-    with pytest.raises(mobee.MobeeError, match=r"no way is left in the map from vertex 0 to \[1\].*[Gg]row"):
+    with pytest.raises(mobee.MobeeError, match=r"the map has no path from vertex 0 to \[1\].*[Gg]row"):
         roadmap.plan(0, 1)
 
 

@@ -12,7 +12,7 @@ from tests.mobee.roadmap.toy_map import SQUARE, BlockedPlant, random_map, square
 A, B, C, D = SQUARE
 
 
-def test_where_an_edge_fails_it_goes_back_and_takes_the_other_way():
+def test_after_a_failed_edge_the_part_moves_back_and_takes_another_path():
     plant = BlockedPlant(A, wall(A, B))
     walk = Walker(square(), plant).go(1)
     assert (walk.arrived, walk.edges, walk.bumps) == (True, 4, 1)
@@ -54,7 +54,7 @@ def test_it_gives_up_after_so_many_edges_and_where_no_way_is_left():
     walker = Walker(square(), BlockedPlant(A, lambda q, target: False))
     assert not walker.go(2, most=1).arrived
     nowhere = Walker(square(), BlockedPlant(A, lambda q, target: np.allclose(q, A)))
-    with pytest.raises(mobee.MobeeError, match="no way is left"):
+    with pytest.raises(mobee.MobeeError, match="the map has no path"):
         nowhere.go(2)
 
 
