@@ -151,7 +151,7 @@ def motor_of(joint: str) -> str:
 
 
 def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, float] | None:
-    """Return the joint's interval [deg], or None where it is the motor's."""
+    """Return the range of the joint [deg]; None if it equals the range of its motor."""
     finger = name.partition("_hand_")[2]
     if finger in SPREAD:
         return SPREAD[finger]

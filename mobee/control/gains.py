@@ -147,9 +147,9 @@ class Gains:
 
     @classmethod
     def published_2014(cls) -> Gains:
-        """Return the numbers of the 2014 program, which show the published findings; it gives them in degrees.
+        """Return the gains of the 2014 program, converted from its degrees; with them the published findings appear.
 
-        Fingers and eyes do not move. Contacts go centimetres deep into the fields of the robot model.
+        Fingers and eyes do not move. Contacts are centimetres deep in the fields of the robot model.
         """
         return cls(
             law="published_2014",

@@ -140,7 +140,7 @@ class World:
             self._snapshot = changed(self._snapshot, placed(old, link_pose(self._followed, old.link)))
 
     def follow(self, pose: LinkPoses) -> None:
-        """Use this pose, one and no batch, as where the robot is now: `attach` and `detach` take the places of links from it."""
+        """Set the present pose of the robot (one pose, not a batch), from which `attach` and `detach` take the positions of links."""
         self._followed = pose
 
     def _get(self, name: str) -> WorldObject:

@@ -1,4 +1,4 @@
-"""Helpers of the writers of robot files: the drive of each joint, and numbers as text that reads back as the same numbers."""
+"""Shared by the writers of robot files: which motor drives each joint, and numbers as text without loss of precision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The life cycle of a service: session, calls, liveliness, and a quick end in every state."""
+"""The life cycle of a service: it opens the session, answers calls, shows that it is alive, and ends quickly in every state."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 
 @dataclass
 class Reach:
-    """The last reach of a part.  From `q` on the fields are of the tick `end_k`, in which the force ended."""
+    """The last reach of a part.  `q` and the fields after it are those of the tick `end_k`, in which the force ended."""
 
     action_id: str
     marker: str

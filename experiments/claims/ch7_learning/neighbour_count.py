@@ -183,7 +183,7 @@ def measured(grouped: Groups) -> list[Claim]:
 
 
 def _sooner(times: Mapping[int, list[int]], seeds: int) -> Claim:
-    """Compare learning times; open if a run did not try everything, because those that did are the quicker ones."""
+    """Compare learning times; the claim is open if a run did not try every action, because the runs that finished are the faster ones."""
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}
     text = ", ".join(f"{graph} neighbours: {time:.0f}" for graph, time in middle.items())
     unfinished = sum(seeds - len(found) for found in times.values())

@@ -1,1 +1,1 @@
-"""Shared by experiments that run the live system."""
+"""Code that is shared by the experiments that run the live system."""

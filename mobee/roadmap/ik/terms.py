@@ -76,7 +76,7 @@ def checked_term(
 
 
 def direction_frame(direction: Array) -> Array:
-    """Return a direction as the frame of an aim: its first three numbers."""
+    """Return a direction (3,) as the nine numbers of an aim's frame: the direction, then zeros."""
     return np.concatenate([direction, np.zeros(6)])
 
 
