@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The contract between the processes: key expressions, messages, codec, version."""
 
 from bus_schema.codec import Refused, decode, encode, encoding_of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Encodes messages as msgpack; decodes them typed, versioned, length-checked and finite, or refuses them with a reason."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keys of calls and of liveliness tokens, as functions; the keys of streams stand beside their messages.
 
 The robot's name is the namespace of the session, so it is not part of them.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The messages on the bus: one struct each, with its key and delivery class, and with the unit of each field beside it.
 
 Vectors over a part's motors are `PartVector`, over the robot's motors `RobotVector`: the receiver checks their lengths.  Angles are in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write the tables of docs/bus.md from the messages: `python -m bus_schema.page`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Requests and replies of calls, and the table of all calls; a request id makes a repeated call harmless."""
 
 from __future__ import annotations

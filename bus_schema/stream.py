@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a message travels on the bus: its key, its delivery class, the services that write and read it."""
 
 from __future__ import annotations

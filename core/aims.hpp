@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What least squares can aim at, and how it changes with the motors.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Arrays that own their memory, and views of those of others.  The library links no C++ runtime: there is neither `new` nor std::vector.
 #pragma once
 

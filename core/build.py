@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build the native core: one shared library for each level of x86-64 processors, one in all elsewhere.
 
     python core/build.py [--only x86-64-v3 | --here] [--into FOLDER] [--sanitize] [--no-strict] [--force] [--check]

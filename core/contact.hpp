@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contacts of one pose, and what they do to the motors.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finding the contacts of one pose among the pairs that may touch, and what they do to the motors.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether straight motions from pose to pose touch anything: the middle of each first, and no pose more after the first that touches.
 //
 // What is found in a pose does not depend on the poses before, so threads change nothing.

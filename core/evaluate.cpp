@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contacts of many poses at once.  One pose is a batch of one, and threads share a batch in blocks: all give the same bits.
 #include "contacts.hpp"
 #include "interface.hpp"

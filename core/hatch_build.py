@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The build hook of the native core: hatchling calls it before it packs a wheel or makes the project importable in place.
 
 It is not part of the library; pyproject.toml names this file.

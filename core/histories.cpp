@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sums over what happened before, weighted by how near it was.
 
 #include <cmath>

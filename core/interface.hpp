@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The C interface: what Python calls, through ctypes.
 //
 // Every function has C linkage and the prefix mobee_.  It takes and gives numbers, pointers to contiguous arrays of doubles and

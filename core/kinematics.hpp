@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Forward kinematics: the product of exponentials over the tree (Gupta's zero reference position, thesis 2.3.1).
 #pragma once
 

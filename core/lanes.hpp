@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Four or eight numbers in one register, or in several where the processor has none so wide: the results are the same bits.
 #pragma once
 

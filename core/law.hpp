@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The control law: a spring to the attractor, damping, and the forces that constrain the robot (thesis eq. 5.7).
 //
 // It rounds as it is written: the same numbers as a program in Python that does these operations in this order.  Positions are in

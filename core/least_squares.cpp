@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Damped least squares from many starts, for what has a derivative: places, directions and distances of points on links.
 //
 // Levenberg and Marquardt: the damping falls after a step that helped and grows after one that did not; a motor at its limit that would

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far shapes may have moved since an earlier pose: as seen from the base, and as seen from a link that carries them.
 #pragma once
 

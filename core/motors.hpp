@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The motors of a simulated robot: lag, delay, backlash, friction, hard stops, and the noise of the encoders.
 //
 // It rounds as it is written.  A motor has two sides with play between them: the motor side follows what is commanded and drags the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A list is of use until two volumes together may have moved by the skin since it was made; until then a pair is looked at only when
 // what its two volumes have moved adds up to what was between them, and of two shapes of one hand also only when the joints between
 // them have turned enough.  What has not moved at all is neither placed nor tested again.  Where poses are far apart a list does not

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contacts of poses that follow each other closely, by a list of neighbours (Verlet).
 #pragma once
 

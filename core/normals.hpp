@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Standard normals that are a pure function of seed, tick and motor: who knows these draws the same (Box and Muller).
 #pragma once
 

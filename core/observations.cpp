@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is known of the outcomes of actions, what an observation was worth, and what the next ones may be (thesis 6.4).
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which pairs of volumes may touch in a pose, found in three steps: balls about clusters, balls about volumes, and the sieve.
 #pragma once
 

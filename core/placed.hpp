@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A robot as it stands in one pose: its links, its shapes, and balls about clusters of shapes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The offline plant: encoders, model, law and motors of one robot, tick after tick.
 #include <algorithm>
 #include <cmath>

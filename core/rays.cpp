@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures of convex volumes: a ray through the middle of each pixel, and the volume that it enters first.
 #include <cmath>
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the marker of a reach is, how each motor moves it, and the published force (thesis eqs. 5.1 and 5.5).
 #include "reach.hpp"
 

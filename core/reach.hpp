@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reaching: the motors of a part draw a marker to a target, against their attractor (thesis 5.1 and 8.2).
 //
 // It rounds as it is written, as the law does.  In the frame of the target a Jacobian has three rows, or six where the marker's

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The default reach law: the marker comes nearer at one rate in every direction, wherever the arm is.
 //
 // The force on the marker is (J E J^T + damping)^-1 times what is missing, E how much each motor gives way, and so weak that the bend

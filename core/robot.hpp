@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A robot as the core reads it: joints, motors, shapes, and which of them are tested against each other.  It never changes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts as Python gets them, see ContactTable in mobee/model/contact.py: two arrays of numbers, a row a contact.
 #pragma once
 

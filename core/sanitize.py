@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run a command with the core that stops at the first wrong address or undefined operation.
 
     python core/sanitize.py [--fuzzer] COMMAND [ARGUMENT ...]

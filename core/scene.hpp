@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A robot among the free objects of one state of the world.  It never changes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Drops most pairs whose balls overlap though the volumes do not.
 //
 // A pair is only dropped when a separating direction or the exact distance says so by a margin; what is left, the narrow phase decides.

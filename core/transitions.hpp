@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the actions of a state lead: tables over states, actions and bins, one bin for each outcome of a state-action.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The value of being in each state and of each action there (thesis Algorithm 7), and modified policy iteration.
 //
 // Sums have one order, so that values of actions of which the same is known are the same to the last bit: ties stay ties.

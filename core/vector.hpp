@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Vectors, rotations and frames of three dimensions, as plain numbers.
 #pragma once
 

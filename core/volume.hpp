@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A volume of the robot or of the world, placed in the root frame.
 #pragma once
 

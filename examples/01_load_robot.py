@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a robot is: parts, motors, limits, markers, shapes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the hand is and how it moves: poses and Jacobians, of one q or of a thousand."""
 
 from __future__ import annotations

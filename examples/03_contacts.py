@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the robot touches, in a world whose objects come and go."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reactive layer: an attractor inside the table pulls, the contact's force stops the hand above it.
 
 The controller is a dynamical system, M q" + C q' + L(K (q - q*)) = sum of forces (thesis eq. 5.7). The motors here follow it

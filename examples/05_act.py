@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One action on a plant: go there, and say where you got.
 
 An agent acts through `plant.act(part, target) -> Outcome` and does not know what answers: the OfflinePlant here (motors,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A curious agent learns where its actions lead, forgets nothing, and goes on where it was.
 
 States are cells around 27 poses of the torso, actions go towards a neighbouring pose. Each outcome is rewarded by how much

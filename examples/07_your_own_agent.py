@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Your own agent: anything that decides, acts through a plant, and observes.
 
 This one is not curious: it goes to the state that it visited least, and counts its arrivals. It uses the lattice, the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A client on the live bus: reads the state of the left arm while the system runs.
 
 Without options it starts a system of its own for a few seconds; with `--endpoint tcp/127.0.0.1:7447` it looks at the one that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hand is drawn to a point: once as a path in advance, once as a force while everything else acts too (thesis Algorithm 5).
 
 `reach_path` is kinematics alone. A `Reacher` has the controller draw the marker with the whole body, tick by tick, and the limits,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What was learned by curiosity is a planner: from anywhere to anywhere, around what does not work (thesis 6.5, 7.4.1).
 
 The cables of the shoulder keep the arm from some poses, which no model told the agent: it has tried. A plan over what actions aim at

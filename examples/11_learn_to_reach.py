@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Learn from which pose to reach for each target: a coarse plan, then a reach that closes the remaining distance (thesis chapter 8).
 
 Each position is a problem. The reward of a reach for one target informs about the others, so that a position never tried before

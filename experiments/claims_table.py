@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of claims with the measured numbers of runs, written to experiments/README.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Take the picture of the running system: start the default scenario, open its page in headless Chromium, take a screenshot.
 
 `python -m experiments.live_picture` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the

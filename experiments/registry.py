@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The names of the experiments of `mobee experiment`, and the modules that hold them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A humanoid that learns by curiosity to plan and to reach, while a reactive layer keeps it safe."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Array types, and the checks of arguments that are arrays or numbers of threads."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Opens the SQLite file of a run and translates its errors into one line."""
 
 from __future__ import annotations

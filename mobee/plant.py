@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Plant: the interface through which agents act, offline and live."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reaching through a plant: targets and outcomes (thesis 8.2)."""
 
 from __future__ import annotations

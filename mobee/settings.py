@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings: named fields with defaults and valid values, and the functions and classes that some of them name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command `mobee`: finds the verb, and imports only the module of that verb."""
 
 from __future__ import annotations

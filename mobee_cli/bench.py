@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee bench`: measure mobee on this machine, beside other programs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee check`: reports what is wrong with a robot or world file, with line numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connects a verb to the running system."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee convert`: converts zero-position XML to URDF and back, and older zero-position files to the present version."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The error that a verb raises when its user, or the machine, has to change something."""
 
 from __future__ import annotations

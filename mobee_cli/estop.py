@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee estop`: stops the robot at once, or releases it again."""
 
 from __future__ import annotations

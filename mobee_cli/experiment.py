@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee experiment`: lists and runs the experiments, draws their figures, and prints the table of claims."""
 
 from __future__ import annotations

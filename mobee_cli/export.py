@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee export`: writes the transitions of a run as one table, for other programs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee launch`: starts a scenario, keeps it running, and prints a summary at the end."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee plan`: plans a path between states or poses with what an agent of a run has learned."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee reach`: reaches for a position or an object, with the running robot or offline."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee reach` with the running robot."""
 
 from __future__ import annotations

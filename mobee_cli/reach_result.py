@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prints the result of a reach."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Formats the results of an experiment for a terminal: lines, and tables of results with the same names."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Options for the robot and the world of verbs that need no running system."""
 
 from __future__ import annotations

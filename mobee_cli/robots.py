@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee robots`: lists the shipped robots and worlds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee router`: runs only the router, for systems whose services are started one by one, as in containers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee status`: shows services, gates of the parts, and agents."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee stop`: ends the running system in order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee topic`: what is published on the bus: list, echo, hz."""
 
 from __future__ import annotations

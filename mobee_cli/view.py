@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee view`: shows a robot file in motion."""
 
 from __future__ import annotations

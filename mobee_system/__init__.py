@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The place of the packages `services`, `bus_schema`, `experiments` and `mobee_cli`, which make the live system and the command `mobee`.
 
 A wheel installs these four packages inside this folder, so that site-packages holds no package of such a general name as `services`.

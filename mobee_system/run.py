@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run a module of the system: `python -m mobee_system.run services.model --help`.
 
 As `python -m services.model --help`, but it also works in a folder that has a package `services` of its own.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # ./launch and ./test source this file: it makes .venv from a lock file when .venv is missing or stale, and builds the native core.
 # shellcheck shell=bash
 

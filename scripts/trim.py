@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Remove from an installed PyBullet what no part of the system uses: 290 of its 300 MB.
 
     python scripts/trim.py

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The repository itself: what is committed, how it starts, what importing it does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two boxes: the separating axis theorem, over the faces of both and the crossings of their edges.
 #include <limits>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A cylinder with a sphere, a capsule or a box: closed forms, and smooth minima along the outlines of their difference.
 #include <limits>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two cylinders.
 //
 // Their difference is two discs and two segments.  Its shortest way out is along an axis, across both axes, a smooth minimum among the

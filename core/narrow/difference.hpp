@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The Minkowski difference b - a of two cores (volumes without their rounding), seen from the first: its support function.
 //
 // Moving a along n by the largest n.d over all d of the difference puts a plane between the two.

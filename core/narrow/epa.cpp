@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The shortest way out of a Minkowski difference that holds the origin: an expanding polytope inside it.
 //
 // Each step takes the face of the polytope that is closest to the origin (below it, where the polytope does not yet hold the

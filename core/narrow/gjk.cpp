@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The algorithm of Gilbert, Johnson and Keerthi: the point of a Minkowski difference that is closest to the origin.
 #include <limits>
 

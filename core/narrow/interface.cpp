@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs of volumes, for tests and benchmarks.
 #include "interface.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The narrow phase: two volumes at a time.  A function for each pair of kinds; `overlap` in overlap.cpp chooses.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The outline of a difference of volumes with a cylinder in it, seen along an edge: where it comes closest to the origin.
 //
 // Along directions square to a unit vector e, a disc across an axis c reaches as far as an ellipse.  Segments add corners and a disc

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Any two volumes: the function for their kinds; with a cylinder or a hull, iterations over the difference of their cores.
 #include <limits>
 

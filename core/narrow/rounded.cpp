@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Spheres and capsules with each other: a point or a segment each, inflated by a radius.
 #include "narrow.hpp"
 

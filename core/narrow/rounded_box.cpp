@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Spheres and capsules with boxes: a point or a segment c + s h, |s| <= 1, inflated by a radius, seen from the box.
 #include "lanes.hpp"
 #include "narrow.hpp"

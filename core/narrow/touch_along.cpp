@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where two volumes touch: the middle of what their features share, seen along the normal, midway between their surfaces.
 //
 // A feature is the vertex, edge or face of a volume that lies farthest along a direction, as a polygon in the plane across it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Polygons of the plane across a contact's normal.
 #pragma once
 

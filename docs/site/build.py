@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build the documentation as a site: `python docs/site/build.py [FOLDER]` writes it into dist/site, or FOLDER.
 
 The pages are the Markdown files of the repository; docs/index.md says in which section each stands.  Reference pages are made from

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of Sphinx for the documentation's site; docs/site/build.py prepares the pages and calls Sphinx."""
 
 from __future__ import annotations

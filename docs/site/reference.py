@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reference pages of the site: public names by their docstrings, the command by its parsers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two checkouts in one run: how much processor time the same work costs in each.
 
 In a round of a case each checkout runs in a fresh process; both prepare the case and do its work once, which does not count, and then by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The cases of `mobee bench against`; each runs in a fresh process, with the library and the workloads of the checkout that is measured.
 
     PYTHONPATH=CHECKOUT python -P against_cases.py CASE

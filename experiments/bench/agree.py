@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The live system in lockstep beside the offline plant: whether two programs compute the same motions.
 
 Claim: on the motor model, encoder noise included, every action of three curious agents ends at the same tick, in the same state and

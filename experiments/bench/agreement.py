@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts of the model beside those of its peers: whether they are the same, and whether depths are right and minimal.
 
 Two programs may differ on whether a pair touches that overlaps by less than MIN_OVERLAP.  A depth is *right* if it is how far the first

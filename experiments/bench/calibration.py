@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The calibration loop: fixed work, none of it MoBeE's, with which times are compared that have no peer.
 
 A third of its time each goes to Python (calls, a dictionary, floating point numbers), to NumPy on arrays of a few numbers and to NumPy on

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """python-fcl and coal on the benchmark's scenes.
 
 python-fcl is asked only whether each pair touches, which is the cheapest of its queries.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of the cost of the model, the plant and plans against their size: `mobee bench model|plant|vi --figure FILE`."""
 
 from __future__ import annotations

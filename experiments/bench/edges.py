@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Edge checks of a roadmap: the time for the thesis' 400 000 poses, for each edge once, and for the edges near a change (thesis 4.3.3).
 
 The roadmap is the thesis' pre-grasp map: a palm over the table every few millimetres, 8 neighbours (figure 4.8).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inverse kinematics: how often and how fast a pose is found for a palm among boxes, beside mink and the thesis' rivals."""
 
 from __future__ import annotations

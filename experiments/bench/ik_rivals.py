@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solvers of inverse kinematics that the library's are compared with, on the same problems: mink and the thesis' rivals.
 
 The rivals (thesis 3.1.1) are CMA-ES, simulated annealing, a particle filter and xNES; each ends at the first good pose.  mink is

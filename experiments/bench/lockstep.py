@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The live system in lockstep: how much faster than real time it runs, on the motor model alone and on PyBullet.
 
 Claim: robot_sim, model, controller and three agents, each a process, make at least 15 s of robot time a second on the motor model

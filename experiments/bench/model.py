@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The egocentric model beside MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
 
 Claim: one compiled kernel makes the model of thesis chapter 2 the fastest of its kind, on the iCub and on robots of other makers

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MuJoCo on the benchmark's scenes, kinematics and collision detection only, and its stepper on the plant's model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evolution strategies: how many evaluations ours needs beside CMA-ES on rotated functions, from the same starts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs of other authors: how they are imported, CMA-ES, coal's searches, and solvers of decision problems."""
 
 from __future__ import annotations

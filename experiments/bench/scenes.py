@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robots, worlds and poses that benchmarks measure: an iCub-like upper body among boxes, and random robots of other makers.
 
 The upper body and its boxes are in data/bench_model.json.  The robots of other makers have the collision volumes that a URDF usually has.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start-up: import, first pose and start of the whole system, in time and memory.
 
 Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the default

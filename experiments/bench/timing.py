@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How benchmarks measure: on chosen cores, by turns, in processor time."""
 
 from __future__ import annotations

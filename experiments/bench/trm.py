@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pre-grasp map of thesis figure 4.8 by least squares and by the evolution strategy: how fast, how complete, how valid."""
 
 from __future__ import annotations

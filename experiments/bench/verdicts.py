@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Requirements of benchmarks, the verdict on a result, and the lines that a report prints of both.
 
 A number that is judged is a ratio, a size or a count, or a time on the standard machine (calibration.py): never a bare time.

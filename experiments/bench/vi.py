@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Planning: how exact and how fast plans are, beside exact policy iteration, SciPy's sparse matrices and quantecon."""
 
 from __future__ import annotations

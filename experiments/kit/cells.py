@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cells: the independent runs of a sweep, and their results on disk, one .npz file each, written whole or not at all."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command line of experiments and benchmarks: types of options, and a progress bar."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Engines that run the cells of a sweep: processes of this machine, or a Ray cluster."""
 
 from __future__ import annotations

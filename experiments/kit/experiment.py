@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An experiment: the claims that it tests, their sources and verdicts, and the method."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plots with Matplotlib, which is optional: experiments run without it, only their figures need it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records of a run in a CSV file, appended one by one, so that an interruption loses no finished record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tasks for roadmaps: the model, the costs and the task space from which a roadmap is built, with helpers for the iCub."""
 
 from __future__ import annotations

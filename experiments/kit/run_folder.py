@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The folder of an experiment's run: its options, the versions of the software, and its results."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Means of few runs with their uncertainty, and rules that decide a claim by them.
 
 Interquartile means and stratified bootstrap intervals as in Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice".

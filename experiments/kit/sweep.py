@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweeps: one trial under each of several conditions with each of several seeds, on all cores or machines."""
 
 from __future__ import annotations

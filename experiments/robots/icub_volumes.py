@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Volumes of the iCub that are chosen by hand: force fields, and solids that follow its meshes closer than one primitive per link.
 
 Zero pose, root frame, [m]; the right arm mirrors the left in y.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write services/robot_sim/solid_pairs.json: which pairs of links count as solid contact in the simulator.
 
 A pair is listed when the convex hulls of its links stay apart by 2 mm in 2000 random legal poses (joint limits and the

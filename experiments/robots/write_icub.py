@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
 Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014;

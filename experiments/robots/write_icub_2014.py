@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
 
 Source: data mobee_original (numbers of kailfrank/MoBeE, no text taken), shoulder_constraints.mobee_2014.

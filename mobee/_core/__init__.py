@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The native core: a shared library, built from the sources in core/, called through ctypes.
 
 Each module here declares the functions of the source files that its first line names. The core is given addresses, and checks no

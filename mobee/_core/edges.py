@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks straight motions between poses; declares core/edges.cpp."""
 
 from __future__ import annotations

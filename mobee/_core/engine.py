@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robots, scenes and evaluations; declares core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
 
 Handles are objects of the core; each frees its own, and keeps alive what its own refers to.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The control law and reaching: declares core/law.cpp and core/reach.cpp; their headers document the numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Learning and planning: declares core/value_iteration.cpp, core/observations.cpp and core/histories.cpp."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Least squares from many starts; declares core/least_squares.cpp."""
 
 from __future__ import annotations

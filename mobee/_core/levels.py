@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The builds of the core, one for each x86-64 level and a generic one elsewhere, and which one runs on this processor.
 
 It imports nothing but Python's own modules: core/build.py loads this file where the library's dependencies are not installed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batches of volume pairs for tests and benchmarks of the narrow phase."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motors of a simulated robot and the offline plant's ticks: declares core/motors.cpp and core/plant.cpp."""
 
 from __future__ import annotations

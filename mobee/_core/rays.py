@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws convex volumes by one ray a pixel; declares core/rays.cpp."""
 
 from __future__ import annotations

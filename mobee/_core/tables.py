@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Passes arrays to the core, as address and length, or as one column for each member of a structure."""
 
 from __future__ import annotations

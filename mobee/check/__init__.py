@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reports what is wrong with a robot or world file, and what to do about it."""
 
 from mobee.check.file import check_file

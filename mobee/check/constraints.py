@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks clauses: contradictions with limits or each other, violations at home, rows without effect."""
 
 from __future__ import annotations

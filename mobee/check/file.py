@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks a file: warnings of its reader, elements of older versions, then the robot or world in it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A finding of a check, and the formatting of numbers and lists in findings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks masses: wrong units, impossible moments of inertia, centres far from their links, weights that motors cannot hold."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks joints, motors, markers and homes: limits, couplings, motors without effect, homes in limit zones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks names: those that differ in case only, and those that other programs cannot use."""
 
 from __future__ import annotations

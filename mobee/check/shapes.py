@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks shapes: fields that do not enclose the solids of their link, reduced hulls that extend beyond their meshes, duplicates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The robot under check, with sampled poses and contacts that several checks use."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks which links touch at home or in every pose, and which pairs are never tested; writes touching pairs into an SRDF."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks for wrong units: millimetres for metres, degrees for radians."""
 
 from __future__ import annotations

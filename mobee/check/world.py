@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks a world: units, thin obstacles, duplicates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reactive control (thesis chapter 5): constraint forces, the dynamical system, reaching, and the test whether a part has settled."""
 
 from mobee.control.controller import Controller as Controller

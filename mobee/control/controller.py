@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The MoBeE controller: a dynamical system that an attractor pulls and forces constrain (thesis 5.2)."""
 
 from __future__ import annotations

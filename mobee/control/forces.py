@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The constraint forces of the law by name, as the model publishes them in every tick, and checks of force values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The gains of the control law, in two named sets, and the test that ends an action (thesis 6.1)."""
 
 from __future__ import annotations

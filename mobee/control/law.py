@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The control law of thesis eq. 5.7 with its numbers for one robot, as tables for the core.
 
 The compiled formulas are in core/law.cpp, the readable ones in `mobee.reference.forces` and `mobee.reference.law`.

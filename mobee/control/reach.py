@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reaching with the Jacobian transpose (thesis 5.1, eqs. 5.4 to 5.6, Algorithm 5): as a path in advance, and tick by tick."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reaches in progress; core/reach.cpp and core/reach_pull.cpp have the formulas."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MoBeE 1.0: the reflex that takes control from the client at a contact and retraces the recent poses (thesis chapter 4)."""
 
 from __future__ import annotations

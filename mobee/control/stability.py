@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The largest time step at which the law is stable."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """User-defined forces of thesis eq. 5.7, as Python functions."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The curious agent: decides, acts through a plant, observes, stores every transition (thesis Algorithm 8)."""
 
 from __future__ import annotations

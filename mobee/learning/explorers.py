@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explorers score the actions of a state: curiosity, the baselines of the thesis, and baselines from the literature."""
 
 from __future__ import annotations

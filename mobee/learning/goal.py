@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """External rewards that an agent plans for instead of, or in addition to, information gain (thesis 6.5)."""
 
 from __future__ import annotations

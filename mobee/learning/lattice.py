@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A lattice: samples at every combination of levels of some joints of one part (thesis 6.2, 7.1-7.4)."""
 
 from __future__ import annotations

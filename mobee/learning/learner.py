@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The curious learner: learns from transitions and chooses actions by planning, without acting (thesis Algorithms 7 and 8)."""
 
 from __future__ import annotations

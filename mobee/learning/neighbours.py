@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Neighbour graphs over samples: the states that the actions of each state aim at, as tables and as edges."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans from any state to targets with a learned model, compared with shortest paths over intended outcomes."""
 
 from __future__ import annotations

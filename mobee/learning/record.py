@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rebuilds spaces and transition models from the record of a run."""
 
 from __future__ import annotations

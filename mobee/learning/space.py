@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The state-action space of one part: states are the Voronoi cells of samples, actions go to samples of other states (thesis 6.2, 6.3)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State spaces adapted to observed transitions: without unreachable states, with shortcuts (thesis 9.4.5)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A tabular plant: every action draws its outcome from given probabilities, for fast tests and known ground truth."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The transition model: outcome counts of every state-action, and the information gain of an observation (thesis 6.4)."""
 
 from __future__ import annotations

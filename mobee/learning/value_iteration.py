@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Value iteration (thesis Algorithm 7) and modified policy iteration."""
 
 from __future__ import annotations

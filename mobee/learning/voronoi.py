@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State spaces of random samples: states are their Voronoi cells (thesis 6.2)."""
 
 from __future__ import annotations

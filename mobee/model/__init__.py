@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The egocentric model: link poses, contacts and projected contact forces of a robot in a world (thesis chapter 2)."""
 
 from mobee.model.contact import Contact

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts, one by one and as a table, and the world objects that a part touches."""
 
 from __future__ import annotations

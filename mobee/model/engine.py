@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The compiled engine of one robot: holds the objects of the core that evaluations use, for any number of threads."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A slow, independent engine on python-fcl, the reference for the core's contacts, and the rules for which pairs are tested.
 
 Depths are exact to 1e-6 m, fcl's tolerance. Only pairs whose bounding spheres overlap are given to fcl.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy; rotations as quaternions.
 
 Quaternions are in the order w, x, y, z; only this module knows it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Masses, centres of mass, gravity torques and potential energy of a robot."""
 
 from __future__ import annotations

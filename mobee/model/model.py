@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Computes link poses, contacts and projected contact forces for joint configurations (thesis chapter 2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The result of an evaluation, for one pose or a batch: positions and rotations, contacts, projected contact forces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables of a robot that the core reads, and the clusters of shapes that share a bounding sphere."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The arguments of an evaluation beside q: the world as an immutable snapshot, and the hands that reach.
 
 The hand of a marker is the marker's link with everything that this link carries: its contacts with targets are ignored while the

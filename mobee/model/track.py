@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evaluates poses that follow each other closely, with a list of the pairs that are near each other (a neighbour list)."""
 
 from __future__ import annotations

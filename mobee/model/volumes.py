@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Volumes as rows of a table that the core reads."""
 
 from __future__ import annotations

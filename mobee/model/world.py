@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The world: named objects around the robot, which any thread may edit while others evaluate."""
 
 from __future__ import annotations

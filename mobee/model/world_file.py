@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loads shipped worlds by name and world files by path; the grammar is in robot/worlds/README.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objects of the world: geometry, position, rotation and role, and the checks of each."""
 
 from __future__ import annotations

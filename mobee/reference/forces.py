@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The forces of the control law (thesis eqs. 5.7 to 5.17), each as a function beside its equation.
 
 Every function takes the `State` of one tick and returns a force (n,), one number for each motor. The mass M of eq. 5.7 is 1, so a

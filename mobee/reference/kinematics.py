@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forward kinematics, Jacobians and gravity (thesis 2.3.1, eq. 5.1).
 
 The robot is given in zero-position form: axes and points of all joints in the root frame, every joint at zero (Gupta 1986).

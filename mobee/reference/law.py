@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dynamical system of thesis eq. 5.7: M q" + C q' + L(K (q - q*)) = f_config + f_work + f_lim + f_cst + f_coll.
 
 This file has the sum of the forces, one step of the system, and the command. The forces themselves are in `forces`.

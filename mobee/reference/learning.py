@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The transition model and planning of a curious agent: Algorithms 6 and 7 and the start of Algorithm 8 (thesis 6.4, 6.5).
 
 T(s, a) (thesis eq. 6.1) is the distribution of the states in which action a of state s ends. It is kept as counts of observed

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motors of a simulated robot: delay, lag, friction, play, hard stops, encoder noise (docs/plant.md).
 
 Each has a motor side and a joint side, with play between them. The encoders measure the joint side.

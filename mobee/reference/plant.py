@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A plant in plain Python, tick by tick: robot, motors, model and law, with the law as a list of terms.
 
 It is where a new force can be tried before it is compiled (see `law`): hundreds of times slower than `mobee.OfflinePlant`, with the

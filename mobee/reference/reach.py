@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The force that draws a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
 Published law: J^T f, with f proportional to the distance of the marker, bounded as a client's force, against the attractor's spring.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cameras: parallel ones, in whose pictures lengths are the same near and far, and perspective ones, as an eye is."""
 
 from __future__ import annotations

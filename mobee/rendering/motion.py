@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motions to draw: poses one after the other, with the world's objects at each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The colours of robots, worlds and plots: 8-bit red, green, blue (, opacity)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A picture of solids in parallel rays: lit from above, with shadows on themselves and on the floor, outlines, and smooth edges."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sheets of pictures as PNG files: filmstrips of motions, and the places of markers in many poses (as thesis figs. 3.1, 3.2).
 
 Of a plant:  `with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.

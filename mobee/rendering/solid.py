@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The volumes of a picture with their colours, and how a robot, a world and a path become such volumes."""
 
 from __future__ import annotations

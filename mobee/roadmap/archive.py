@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roadmap files: one .npz of plain arrays with the world and digests of robot and world, written whole or not at all."""
 
 from __future__ import annotations

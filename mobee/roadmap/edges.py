@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks which edges of a roadmap are free of contact, and keeps the checks up to date while the world changes."""
 
 from __future__ import annotations

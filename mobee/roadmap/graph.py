@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The graph of a roadmap: neighbours, shortest paths (A*), and shortest free paths with lazily checked edges."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """RRT-Connect, PRM and PRM* of OMPL over a model (extra `planning`)."""
 
 from __future__ import annotations

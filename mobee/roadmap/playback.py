@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Turns a path of a roadmap into a motion in time and moves the robot along it under the control law."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds reachable positions and poses of a marker by inverse kinematics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A roadmap: poses that satisfy a task, and the motions between them (thesis chapter 3)."""
 
 from __future__ import annotations

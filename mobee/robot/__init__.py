@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a robot is, and the files that describe robots and worlds."""

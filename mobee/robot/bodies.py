@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Masses and moments of inertia: one body for each link, conversions, plausibility."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reduces the iCub's URDF of the icub-models package to the upper body that the simulator and the viewer load."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joins several robots into one model, for instance a Katana beside the iCub (thesis figure 2.1)."""
 
 from __future__ import annotations

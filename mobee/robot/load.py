@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds shipped robots by name, and reads any robot file by path."""
 
 from __future__ import annotations

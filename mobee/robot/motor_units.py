@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The unit of each motor in the control law, and its limit zones.
 
 The numbers of the law are angles. A motor that slides has no angle, so its range counts as the angle SLIDE_RANGE: 1 rad is then

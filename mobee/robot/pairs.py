@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pairs of shapes of a robot, or of several on one base, that are tested for contacts.
 
 Solids and fields follow one rule; a pair is excluded if

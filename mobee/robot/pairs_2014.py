@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tested pairs as in the program published in 2014, and as in our recorded reading of it.
 
 Both rules work on the elements <link> and <joint> of a file, and find neighbours by descents of the tree: below every element, and

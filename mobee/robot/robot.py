@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The description of a robot: a tree of joints in zero-position form, parts, motors, markers, constraints, shapes, masses."""
 
 from __future__ import annotations

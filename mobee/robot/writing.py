@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shared by the writers of robot files: which motor drives each joint, and numbers as text without loss of precision."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulated robot: the motors, and the offline plant that runs them with model and controller in one process."""
 
 from mobee.simulation.batch import advance_together as advance_together

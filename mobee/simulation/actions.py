@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actions and reaches in progress on an offline plant, and how they ended."""
 
 from __future__ import annotations

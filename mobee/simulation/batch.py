@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many offline plants at once: through one call of the core, or in one process for each processor core."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motors of a simulated robot: lag, delay, backlash, friction, encoder noise, hard stops, and their parameters."""
 
 from __future__ import annotations

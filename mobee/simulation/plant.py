@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The offline plant: model, controller and motors in one process, tick by tick as the live system runs them."""
 
 from __future__ import annotations

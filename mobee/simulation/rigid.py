@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The active motors of a plant, and a robot reduced to the joints, links and shapes that the forces on them depend on."""
 
 from __future__ import annotations

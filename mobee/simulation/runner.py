@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the ticks of one plant in the core and records their trace."""
 
 from __future__ import annotations

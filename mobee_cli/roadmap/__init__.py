@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee roadmap`: roadmaps of whole-body poses: build, tasks, show, query, play."""
 
 from __future__ import annotations

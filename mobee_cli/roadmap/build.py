@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Builds a roadmap: poses that satisfy a task's costs, spread over its task space and joined by edges."""
 
 from __future__ import annotations

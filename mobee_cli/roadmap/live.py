@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves the running robot along a path of a roadmap."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Options for roadmap files and places in them, and descriptions of roadmaps, 80 columns wide."""
 
 from __future__ import annotations

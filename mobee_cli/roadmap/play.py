@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves the robot along a path of a roadmap under the control law, offline or live."""
 
 from __future__ import annotations

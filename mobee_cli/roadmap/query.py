@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds a path through a roadmap to a place."""
 
 from __future__ import annotations

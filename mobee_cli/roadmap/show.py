@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Describes a roadmap, and draws the positions of a marker in all its poses."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lists the shipped tasks; loads the task of a roadmap, shipped or from a Python file."""
 
 from __future__ import annotations

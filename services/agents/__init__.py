@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The agent of one part as a process: explores by curiosity, or learns to reach if it has targets.
 
 Reads: clock, {part}/motion, {part}/reach.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Configuration of an agent: the settings of the library's agents, and the task."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs an agent on the live plant: a curious agent, or one that learns to reach."""
 
 from __future__ import annotations

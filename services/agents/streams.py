@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishes the transitions of an agent, and the rewards and values of its state-actions."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Assembles the state of the whole body from the parts' states, each with its own sampling time (thesis 2.3.2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Typed streams on a session: delivery classes, headers on the way out, checks and counts on the way in."""
 
 from __future__ import annotations

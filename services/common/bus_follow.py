@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves the attractors of several parts together along a path, by the robot's clock."""
 
 from __future__ import annotations

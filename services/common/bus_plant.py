@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The live plant: acts and reaches with a part through controller and model on the bus."""
 
 from __future__ import annotations

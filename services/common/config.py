@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Configuration: a frozen struct is the schema of the settings file, the command-line flags and the help."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Starts a service with its log and its robot, and ends it with one line on bad input."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exit codes of the processes: services, the launcher and the verbs of `mobee`."""
 
 from __future__ import annotations

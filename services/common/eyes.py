@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Camera poses of the robot's eyes, for the renderer and the locator."""
 
 from __future__ import annotations

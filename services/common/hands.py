@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chooses the marker with which a part reaches: its palm, else the end of its chain."""
 
 from __future__ import annotations

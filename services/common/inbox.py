@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inbox of a process: Zenoh's threads put messages in, the main thread handles them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Subscriptions of a service, whose handlers run in its main thread."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep: tick k + 1 begins when all participants have answered tick k (docs/bus.md).
 
 A participant has a `Participant` and calls `done(k)` after it has published all its messages for tick k; the owner of the clock waits at

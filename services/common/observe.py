@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Observes a running system from outside, for tools: services present, messages published."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps a rate by absolute deadlines; percentiles of measured times."""
 
 from __future__ import annotations

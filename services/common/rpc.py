@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calls with a time limit, client and server: a repeated call happens once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The life cycle of a service: it opens the session, answers calls, shows that it is alive, and ends quickly in every state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Opens Zenoh sessions: client of the launcher's router, or that router."""
 
 from __future__ import annotations

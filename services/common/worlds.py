@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The default world of a robot, and a hash of the robot that processes compare."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The MoBeE controller as a process: reads goals and forces, publishes motor commands.
 
 Reads: tick, model/forces, model/targets, estop.

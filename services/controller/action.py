@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The action of one part: owner, target, status."""
 
 from __future__ import annotations

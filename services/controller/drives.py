@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Takes and arms the drives of all parts at robot_sim, and again after each hold."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces that the law receives: those of the model, checked, and user-defined terms."""
 
 from __future__ import annotations

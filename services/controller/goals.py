@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Answers the calls of agents: take and release a part's goal, set it, apply a force, reach."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The control law of the whole robot as the controller runs it: the one owner of the law's state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the controller: once per tick, from the parts' states and the model's forces to the commands."""
 
 from __future__ import annotations

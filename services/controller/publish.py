@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publishes the commands and motions of all parts, and in lockstep the answer to each tick; counts ticks."""
 
 from __future__ import annotations

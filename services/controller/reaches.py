@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reaches in progress: a marker is drawn to a target, then released (thesis 8.2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The launcher: router, start order, supervision, status and stop.
 
 Reads: alive/*/* (readiness), the `stat` of every service it started.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The services: their programs, start order and dependencies."""
 
 from __future__ import annotations

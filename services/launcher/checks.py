@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks before the start: installed packages, free ports, robot and world files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A service as a child process: starts it, watches it, ends it."""
 
 from __future__ import annotations

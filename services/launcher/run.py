@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a scenario: router, services, supervision, stop, summary."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The folder of a run: scenario, settings, versions, logs, results; and settings written as TOML."""
 
 from __future__ import annotations

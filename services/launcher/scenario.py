@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a scenario (services and their settings) from a TOML file, and checks it before any service starts."""
 
 from __future__ import annotations

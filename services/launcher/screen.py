@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shows the state of the system: one screen in a terminal, lines in a pipe."""
 
 from __future__ import annotations

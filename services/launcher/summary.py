@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Summarises a run: the numbers of its services since all were ready, as JSON and as text."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Starts services in order, restarts failed ones, and gives up those that fail repeatedly."""
 
 from __future__ import annotations

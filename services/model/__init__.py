@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The egocentric model as a process: reads the state of the whole body, publishes constraint forces.
 
 Reads: tick, world/*, {part}/reach.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the model: once per tick, from the newest state of every part to the constraint forces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Edits the model's world, by calls of clients and by messages of vision."""
 
 from __future__ import annotations

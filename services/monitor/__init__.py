@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The monitor: a page on loopback and a recording, made from what is published on the bus.
 
 Reads: clock, {part}/state, {part}/motion, model/forces, controller/forces, model/contacts, world/*, vision/image/{left,right},

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layout of the page, and the extent of a robot for its cameras."""
 
 from __future__ import annotations

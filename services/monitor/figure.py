@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draws a robot from its file without meshes: shapes are logged once, then one transform a link."""
 
 from __future__ import annotations

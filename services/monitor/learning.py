@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shows what agents learn: the state space with its uncertain actions; rewards, values and tries."""
 
 from __future__ import annotations

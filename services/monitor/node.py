@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the monitor: the newest message of every stream, twenty times a second, to a page and a file."""
 
 from __future__ import annotations

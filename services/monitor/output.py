@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outputs of the monitor: a page on loopback, a recording, or both."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Serves the page, `python -m services.monitor.page`: becomes Rerun's own program.
 
 Rerun's Python calls listen on every interface; its program has an option to listen on loopback only.

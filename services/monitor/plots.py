@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plots: joint positions and goals, forces by term, rewards."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The 3D scene: meshes or solids, fields, objects, the paths of the hands, and the poses in which actions ended."""
 
 from __future__ import annotations

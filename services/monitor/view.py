@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A view of a robot moved through its range or to given poses, with contacts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MoBeE 1.0: a process between a client and robot_sim that retraces motions which lead into contact (thesis chapter 4).
 
 Two sessions.  As a client of the robot it reads: clock, {part}/state, estop; writes: {part}/cmd, event/port_filter; calls:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`python -m services.port_filter`."""
 
 from __future__ import annotations

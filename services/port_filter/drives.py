@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Answers the calls of the filter's clients: lends them the drives, forwards metadata, emergency stops and liveliness."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the port filter: forwards states, checks the pose, forwards commands or runs the reflex."""
 
 from __future__ import annotations

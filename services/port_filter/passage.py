@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forwards states to the clients, and their commands to the robot unless the reflex is active."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulated robot: motors, safety gate, state streams and, in a second process, eye images.
 
 Writes: `tick`, `clock`, `{part}/state`, `sim/truth`, `estop` (while it is latched), `event/robot_sim`; in lockstep `turn/{service}`.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The physics back-end: PyBullet's joints follow the velocities or torques of the motor model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The iCub, table and ball in PyBullet, and which pairs of links count as solid contact."""
 
 from __future__ import annotations

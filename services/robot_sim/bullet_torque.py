@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Applies torques to PyBullet's joints through gears: reflected inertia and friction."""
 
 from __future__ import annotations

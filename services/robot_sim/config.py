@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of robot_sim and of the renderer."""
 
 from __future__ import annotations

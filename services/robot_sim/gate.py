@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The safety gate of one part, the last check before its motors: which commands are admitted, and how references are limited.
 
 Pure logic: the caller gives the time.

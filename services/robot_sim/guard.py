@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The gates of all parts on the bus: commands, ownership, liveliness, emergency stop."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The back-end interface, and the kinematic back-end: motors without physics."""
 
 from __future__ import annotations

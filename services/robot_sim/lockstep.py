@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep in robot_sim: waits for the participants, and records whether the run is repeatable."""
 
 from __future__ import annotations

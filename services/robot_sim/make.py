@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Makes the back-end named in the configuration."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs robot_sim: in every tick gate, clock, physics, then each part's state at its own time; in lockstep the states come first."""
 
 from __future__ import annotations

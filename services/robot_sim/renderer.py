@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Renders the eye images in a process of its own, `python -m services.robot_sim.renderer`.
 
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene of the eyes: the robot's solids, the world around it, and a camera in each eye."""
 
 from __future__ import annotations

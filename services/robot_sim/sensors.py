@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Encoders: sampling times of the parts, their states, and their metadata."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measures the physics tick by tick: counts contacts and holds, detects rest, publishes `sim/truth`, records files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds a red ball in an image (colour, then the cone of rays tangent to a sphere), and triangulates it from two eyes."""
 
 from __future__ import annotations

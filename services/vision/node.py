@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the locator: reads pairs of images, publishes the ball's position."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Connected regions of an image mask."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every message survives the wire; whatever is not right about one is refused with its reason."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keys hold plain chunks only: a wildcard in a put would reach every matching subscriber."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/bus.md and the code: the tables are current, and the services write, read and answer what the contract names."""
 
 from __future__ import annotations

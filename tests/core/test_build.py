@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """core/build.py: what it builds with, when it does nothing, and what it says when it cannot."""
 
 from __future__ import annotations

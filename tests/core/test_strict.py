@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """No build joins a multiplication to an addition: that rounds once instead of twice, and older processors cannot."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Check an installed MoBeE, outside of a clone: `python wheel.py`, with the Python of that installation.
 
 It needs only the library and its dependencies.  Each build of the core that this machine can run computes contacts and a step of the

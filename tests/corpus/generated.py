@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that are made when a test needs them: too large to be committed, or readable although they look odd."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the message about each file of the corpus must say, beside the file, its line and a remedy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The commands of docker/compose.yaml, as they stand there and as plain processes of this machine."""
 
 from __future__ import annotations

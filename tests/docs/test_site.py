@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The documentation builds as a site without a warning and without the network, and its links lead somewhere."""
 
 from __future__ import annotations

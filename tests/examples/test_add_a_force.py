@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """docs/law.md, "Add a force", followed from outside the project."""
 
 from __future__ import annotations

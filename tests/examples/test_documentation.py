@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The code in README.md and in docs/ runs as it stands: a fence with a second word is a file of that name."""
 
 from __future__ import annotations

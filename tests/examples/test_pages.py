@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every block of code in README.md, CONTRIBUTING.md and docs/: Python runs, commands parse, files are well-formed.
 
 A block that is a file (a fence with a second word) or that has a test of its own is in test_documentation.py or test_add_a_force.py.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finished cells without a disk."""
 
 from __future__ import annotations

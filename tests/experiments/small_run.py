@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An experiment with the options of the command line, in this process."""
 
 from __future__ import annotations

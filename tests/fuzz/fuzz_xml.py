@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fuzzes the reader of XML files: python tests/fuzz/fuzz_xml.py -max_total_time=300."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs a coverage-guided fuzzer (atheris) on one reader; see README.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Seeded changes to the structure of an XML file: what bit flips would need years to find."""
 
 from __future__ import annotations

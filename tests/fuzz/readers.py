@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a fuzzer feeds: both readers, and what must hold of everything that they accept."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A few hundred seeded mutations of shipped files through the readers: the fuzzers' idea in the seconds that every test run has."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small robots made by hand: a planar arm whose geometry one can do in the head, and a tree that uses everything."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee bench` on given numbers: nothing is measured here."""
 
 from __future__ import annotations

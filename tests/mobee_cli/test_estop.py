@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee estop` against a robot that the test plays."""
 
 from __future__ import annotations

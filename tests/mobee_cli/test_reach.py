@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`mobee reach --offline`, and what the verb refuses."""
 
 from __future__ import annotations

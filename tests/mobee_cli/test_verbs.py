@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs of an operator against a system of toys that runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every tracked file has a licence, named in its first lines or in REUSE.toml, and the text of each licence is in LICENSES/."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The wheel, installed into an environment of its own: what it brings, and that the library and the live system work from it."""
 
 from __future__ import annotations

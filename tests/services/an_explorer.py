@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An explorer from outside the library, for the agent that is started with it."""
 
 from __future__ import annotations

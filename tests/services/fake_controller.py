@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The controller as a test plays it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """robot_sim as a test plays it."""
 
 from __future__ import annotations

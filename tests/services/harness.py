@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bus on which the test plays everybody but the one process under test."""
 
 from __future__ import annotations

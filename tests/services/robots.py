@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small robots of a user's own, as text of their files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bus with the test as its router: it plays the services that are not under test."""
 
 from __future__ import annotations

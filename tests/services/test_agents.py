@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A curious agent as a process: the test plays the controller and reads the disk."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An agent with targets as a process: the test plays the controller and the model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A process that learns until it is killed, and says after each transition what its model is."""
 
 from __future__ import annotations

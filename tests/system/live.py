@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A whole system, launched as a user launches it, and a client that watches it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the summary of a run at the table must say, and a line of it for people."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thesis 4.1.1 in short: a minute of random position moves without MoBeE, with the first and with the second one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The target locator in the running system: the ball is moved to ten places."""
 
 from __future__ import annotations

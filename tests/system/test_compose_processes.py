@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The commands of docker/compose.yaml as plain processes: the same system without its launcher."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a running system goes through, one after the other: forces that come late, random bytes, the death of its launcher."""
 
 from __future__ import annotations

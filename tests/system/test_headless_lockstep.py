@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first run of all, in robot time: the iCub at the table, three curious agents, everything but the monitor, in lockstep."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The iCub at the table, three curious agents, all services but the monitor, in real time and at twice the default rate.
 
 At the default rate the other system tests run.

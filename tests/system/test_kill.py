@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """kill -9 of each service while its parts move: who holds, how fast, and what is left (DESIGN section 5)."""
 
 from __future__ import annotations

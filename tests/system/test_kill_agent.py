@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """kill -9 of a learning agent at random moments, many times in a row: nothing observed is lost or doubled, and it learns on as ever.
 
 MOBEE_KILLS=50 kills fifty times instead of ten.

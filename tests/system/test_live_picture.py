@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page in a browser: two pictures, and the robot has moved between them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lockstep with all services: the same run whatever the scheduling, and the one that the offline plant makes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reaching with all services: as offline, to the bit; what is left when who reaches is killed; and a map that is played."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The real processes: a ball turns solid before the hand, and the way around it is under way at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One idea holds the project together: the same agent on the offline plant and on the bus (DESIGN section 2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Model throughput: evaluations per second while a thread edits the world without a pause (thesis Algorithm 1, FLOOD_MODEL).
 
 Claim: while every joint moves and one thread removes and creates boxes as fast as it can, in growing numbers, the model gives

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Endurance test of the model: several threads edit one world while the model evaluates, and every evaluation is checked."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The threads of thesis figure 2.3 beside the sensory one, of which one moves every joint and one evaluates the model; and random boxes."""
 
 from __future__ import annotations

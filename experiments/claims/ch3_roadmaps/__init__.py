@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thesis chapters 3 and 4.3: poses and roadmaps from cost functions, and what they learn from contacts."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """NES: number of evaluations that natural evolution strategies need, compared with CMA-ES.
 
 Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.

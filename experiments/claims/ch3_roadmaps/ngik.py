@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """NGIK: number of evaluations of natural gradient inverse kinematics, compared with other optimisers.
 
 Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Replanning: the time to a new path when a ball becomes solid in front of the moving hand.
 
 Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The crossings of `replanning` on the live robot: the scene, a map of three poses around a ball, and a performer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roadmap from scratch: random poses, joined without verification, and explored by the robot itself.
 
 Claim: a map of 20 random samples, each joined to its 10 nearest neighbours without verifying an edge, is explored by commands

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """TRM: coverage and validity of the task-relevant roadmaps of thesis figures 3.1 to 3.11 and 4.8, by evolution and by least squares.
 
 Claim: the framework produces maps for all these tasks: poses that meet the task's constraints, spread over its task space, in one graph.

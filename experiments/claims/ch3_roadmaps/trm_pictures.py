@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of maps: the positions of their markers, and a motion through each (as thesis figs. 3.1-3.11).
 
     python -m experiments.claims.ch3_roadmaps.trm_pictures TASK [TASK ...] [--method least_squares] [--out FOLDER]

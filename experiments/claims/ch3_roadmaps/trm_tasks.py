@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tasks of thesis figures 3.1 to 3.11 and 4.8, a function each; docs/roadmaps.md has a task file to copy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Babbling: collisions and completed commands under random position moves of 23 motors at 20 % speed, at a table (thesis 4.1.1).
 
 Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second

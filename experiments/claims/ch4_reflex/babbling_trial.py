@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One trial of `babbling`: commands, a new system of real processes in lockstep that executes them, and its measures."""
 
 from __future__ import annotations

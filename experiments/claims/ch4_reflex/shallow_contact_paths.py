@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Straight paths of the hand into the table's field at any angle, and a client that sends position references along one."""
 
 from __future__ import annotations

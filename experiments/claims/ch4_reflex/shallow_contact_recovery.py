@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shallow contact recovery: the reflex when the hand enters the table's field at a low angle.
 
 Claim: the reflex of MoBeE 1.0 recovers from steep contacts. The flatter the approach, the more often its recovery fails and control

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Constraint violations: a search for the command that violates the cable rows or the forearm clauses most.
 
 Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than

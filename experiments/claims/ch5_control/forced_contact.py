@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forced contact: growing forces push a hand into table, body and joint limits, and draw it to and through singular poses.
 
 Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a

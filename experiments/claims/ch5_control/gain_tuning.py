@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gain tuning: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
 
 Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motor identification: lag, delay, backlash and friction of the PyBullet robot's motors, fitted to responses to velocities.
 
 Claim: the motor model of `mobee.simulation` with numbers fitted to the encoder readings of the PyBullet robot describes that robot,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fits the motor model (mobee.simulation.motors) to responses, and checks the method with simulated motors.
 
 Fitted are lag, delay, backlash, friction and encoder noise of every motor.  The model is simulated for all motors at once, since they do

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records the responses of the PyBullet robot's motors: velocities [rad/s] in, encoder positions out, every tick."""
 
 from __future__ import annotations

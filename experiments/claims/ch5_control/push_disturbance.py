@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Push disturbance: an external force at the robot's hand, against which MoBeE gives no guarantee.
 
 Claim: MoBeE protects the robot from itself, not from external energy (thesis 5.2, footnote 4: Justin "can sense when there is too much

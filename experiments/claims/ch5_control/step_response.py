@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Step responses: settling time and overshoot, and whether they depend on the control period.
 
 Claim: at all control periods of 1 to 20 ms, single motors and whole postures reach their targets and stay there, with the default gains

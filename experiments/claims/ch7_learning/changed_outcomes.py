@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Change the outcomes of some actions suddenly, and observe how agents with and without forgetting learn the new ones.
 
 Claim: when actions that had always ended in one state suddenly end in another, their value shoots up; the agent tries them a few times and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run all experiments of chapter 7 one after the other, with their figures.
 
 Claim: the thesis' experiments in model learning can be repeated, with all figures, by one command.  Source: thesis chapter 7, paper

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Let the curious agent discover the shoulder's cable constraints on a lattice of 81 states, with different discounts and priors.
 
 Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (prior 50-50) or 2651 (60-40).  The states 24,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure after how many transitions an explorer has tried every state-action.
 
 Claim: the curious agent (AC in the paper) has tried all state-actions in about half the time of the agent that takes the action least

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure how uniformly three explorers visit states and try actions, and how often they try failing actions.
 
 Claim: after 4000 transitions the curious agent's visits of states and tries of state-actions are more uniform than those of random and

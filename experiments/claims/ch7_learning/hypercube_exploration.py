@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explore a hypercube of 16 states, in which every action succeeds, with the curious agent.
 
 Claim: on the hypercube of 16 states and 64 actions all actions succeed, every action is tried at least 5 times after about the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare two information gains as rewards: the thesis' 'Kail' divergence, and the KL divergence from a uniform prior over all states.
 
 'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.

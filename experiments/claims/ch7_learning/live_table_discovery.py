@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare what three live agents learn at the table with what offline agents learn.
 
 Claim: the three agents of the table experiment, each a process of its own in the live system in lockstep, learn transition models

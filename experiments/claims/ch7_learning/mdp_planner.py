@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plan with the learned MDP, without obstacles, around a table that enters, and around one that moves up and down.
 
 Claim: most learned state-actions reliably take the arm to their goal, a few end elsewhere, always or sometimes (fig. 7).  The MDP needs no

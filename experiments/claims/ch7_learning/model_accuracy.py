@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the error of learned transition models, for several explorers, with and without imagined outcomes.
 
 Claim: curiosity learns the stochastic actions better than least-tried exploration, and the error of counts without imagined outcomes

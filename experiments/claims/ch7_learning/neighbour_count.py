@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare graphs with different numbers of neighbours per state, by learning time and by the plans of the learned models.
 
 Claim: the published 16 neighbours per state are more than necessary; fewer connections would shorten the learning time.

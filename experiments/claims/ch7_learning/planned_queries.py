@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Queries of an arm around a table that moves up and down, and the execution of plans for them."""
 
 from __future__ import annotations

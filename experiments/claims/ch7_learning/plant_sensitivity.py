@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Change one parameter of the plant at a time, and measure whether the findings about the shoulder's cables remain.
 
 Claim: on the lattice of rank 4 four states are never reached, four others hardly ever, and the actions into these end one pitch level

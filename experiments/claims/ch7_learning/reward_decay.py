@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure how the expected rewards of all state-actions decay while an agent explores.
 
 Claim: the curious agent's reward decays uniformly over the state-actions, because the agent goes wherever the reward is high.

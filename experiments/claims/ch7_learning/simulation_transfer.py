@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare the transition model learned on the offline plant with that learned on PyBullet's robot.
 
 Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Let three independent agents, of torso and arms, explore near a table that an arm reaches only when the torso bends forward.
 
 Claim: over time the agents bend forward, put the arms low and touch the table more and more often, in cycles.  They try most often the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measures of runs at the table: contact of the arms with it, interest in it, cycles of contact, and actions that depend on other parts.
 
 Contact is computed from poses alone, in the same way for tables that exert forces and for ghosts.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Find the states of a large lattice that the arm never reaches, and the states in which actions towards them end.
 
 Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches 60, 124, 188 and 252, and hardly ever 61, 125, 189

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Queries of the published arm among balls, the wrong models of its planners, and the execution of the queries."""
 
 from __future__ import annotations

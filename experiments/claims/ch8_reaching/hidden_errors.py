@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An arm and its workspace, with calibration errors and a ball that the planners' model, or every model, does not contain."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare the coarse planner alone, the reactive reach alone, and both together.
 
 Claim: a coarse discrete planner together with a reactive reach achieves more than either alone.  The planner needs few states, because

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare roadmap planners (PRM) with the learned MDP planner on the same noisy robot, of which the roadmaps have a wrong model.
 
 Claim: "a plan first, act later approach, such as PRM planning, will never work well on robots such as the iCub", and the roadmap's

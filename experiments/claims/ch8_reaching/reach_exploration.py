@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare three exploration strategies of an agent that learns to reach for the 27 targets of the thesis.
 
 Claim: after about 800 problem-tries, intrinsically motivated exploration yields higher scores than random or greedy optimistic

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw selected reaches as filmstrips (thesis figs. A.1-A.3).
 
     python -m experiments.claims.ch8_reaching.reach_film [RUN.sqlite] [--out reach_film.png]

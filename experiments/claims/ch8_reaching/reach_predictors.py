@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare predictors of the reward of a reach with an oracle, by the score of the agents that use them.
 
 Claim: a predictor that generalises over poses and targets reaches at least .80 of an oracle's score after 200 problem-tries, .90 after

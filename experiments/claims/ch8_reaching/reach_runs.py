@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measures of the runs of one exploration strategy: scores, choices of states, agreement, coverage and costs."""
 
 from __future__ import annotations

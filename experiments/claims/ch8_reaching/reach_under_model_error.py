@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare a reach learner with a planner whose model is wrong, and which replans after every change, with and without memory.
 
 Claim: where the model is wrong, learning from tries overtakes planning (thesis 9.3: one could plan the motions offline, but moving the

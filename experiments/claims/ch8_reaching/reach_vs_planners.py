@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare the learned reacher with a planner (inverse kinematics and RRT-Connect) that knows the robot and the world.
 
 Claim: the learned reacher is no worse than planning with a perfect model, also under encoder noise and for a moving target; and single

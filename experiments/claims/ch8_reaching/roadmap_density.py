@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Replan around a cup that was put on the table after the roadmap was built, in roadmaps of growing density.
 
 Claim: infeasible edges are found "when the back of the hand bumps into the object"; the map is adapted and the path replanned, which

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare learning transitions and reaches at the same time with learning the transitions first.
 
 Claim: there is no reason that the transition model and the reaches cannot be learned simultaneously; where an action fails, contact with

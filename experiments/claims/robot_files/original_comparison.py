@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comparison of this library's reading of an original robot file with the rules of the program of 2014, pose by pose."""
 
 from __future__ import annotations

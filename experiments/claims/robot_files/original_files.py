@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Search for robot and world files of 2010 to 2014 in the histories of Git repositories, and in plain folders."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Originals: whether this library reads the robot and world files of 2010 to 2014 as the programs of that time did.
 
 Claim: at least 95 % of the distinct files in the public histories of kailfrank/MoBeE and Juxi/icVision load as they are, and places,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Own robots: whether URDFs of others work as they are, without expert knowledge.
 
 Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home; none has contacts with itself there after

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rules of the program of 2014, from a second reading of its source: a reference that shares nothing with mobee.robot.
 
 It reads files of 2011 to 2014 with the standard library's parser and keeps every <link> and <joint> as a node of a tree, as the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The robots that are measured: of example-robot-data, of pybullet_data, and some of extreme size."""
 
 from __future__ import annotations

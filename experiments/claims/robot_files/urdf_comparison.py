@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comparison of one URDF file with another reading: Pinocchio's own frames and shapes, and coal's contacts of exact convex hulls."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """URDF files of others: whether they load, and whether frames and contacts agree with Pinocchio and coal.
 
 Claim: a URDF of others loads as it is, or is refused with the line and a remedy; the frames of all links agree with Pinocchio's within

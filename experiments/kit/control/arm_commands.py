@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands for one arm, drawn at random or varied, and runs of the plant in which both arms execute one each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recorded runs of the offline plant under the control law, and forces of a client during them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Safety measures of recorded postures: violated constraints and limits, depths of contacts, oscillation of a marker.
 
 They share no code with the control law, which they judge.

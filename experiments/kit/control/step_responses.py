@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Step responses of one motor or of many: settling time, overshoot and remaining error."""
 
 from __future__ import annotations

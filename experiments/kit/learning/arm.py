@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
 
 The robot is `icub_2014` under the gains of 2014, at a control period of 20 ms, its motors those of the plant's defaults

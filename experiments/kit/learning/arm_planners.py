@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Planners that are compared with each other: straight motions, a roadmap planned once or replanned, and a learned MDP."""
 
 from __future__ import annotations

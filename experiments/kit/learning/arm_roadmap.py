@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roadmaps of the published left arm, four joints, built from the model that a planner believes in.
 
 Vertices and edges are free poses and motions in that model; the graph is OMPL's PRM or the lattice of the learners.  The planners of

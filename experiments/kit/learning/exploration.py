@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exploration by one agent, or by several at the same time, and the record of their transitions."""
 
 from __future__ import annotations

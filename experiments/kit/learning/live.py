@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same agents on the offline plant, and on the live processes in lockstep; finished transitions are kept on disk."""
 
 from __future__ import annotations

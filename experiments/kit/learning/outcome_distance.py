@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Distances between the outcomes of the same agents offline and live: total variation of each state-action."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counts of the transitions of a run: tries, failures, visits and ends.
 
 Transitions are (T, 3) integers, rows of state, action, state reached.  Counts of state-actions are (S, A), or (E,) of those that exist.

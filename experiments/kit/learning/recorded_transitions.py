@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads all transitions of a run: from the stores of its agents, and from the cells of a sweep."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """True outcomes of the actions of a plant, measured by many tries, and errors of transition models with respect to them.
 
 The outcome of an action depends on the pose within the cell, and the momentum, with which the part arrived.  The tries are therefore

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Launches a live system of real processes, with or without a performer, and exchanges files with it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the recordings of robot_sim: joint positions of all ticks, and solid contacts as events with their depths."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reaching right arm: robot, control laws, states, plants, learned transitions, and the model of a planner.
 
 The four joints of the published lattice move; the wrist and the fingers are rigid at home.  `reach_space`, `reach_plant` and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The model of robot and world that the planner peer uses: sound poses and motions, inverse kinematics, and RRT-Connect.
 
 Inverse kinematics by damped least squares with restarts, all of them at once (Wampler 1986); `kit.reaching.targets.nearest_pose` finds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), attempted by the planner alone, the reach alone, and both."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Learning to reach in experiments: learners by name, learning with evaluations, and single tries by plans."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The planner that reach learners are compared with: inverse kinematics and RRT-Connect, executed through MoBeE.
 
 It plans with a belief about robot and world (belief.py), which may differ from the plant, and plans again on every change.  If a motion

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The targets of the thesis: 27 spheres of 10 cm on a grid that roughly covers the workspace of the right arm (thesis 8.3, fig. 8.1).
 
     python -m experiments.kit.reaching.targets

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A toy arm of four joints with known true rewards, to compare learners of reaches quickly.
 
     python -m experiments.kit.reaching.toy_arm --seeds 3 --only gp

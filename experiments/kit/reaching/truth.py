@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """True rewards of reaches and transitions blocked by targets, measured on the plant, and the oracle that plans with them.
 
 Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  A state that

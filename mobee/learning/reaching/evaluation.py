@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evaluates a reach learner without changing it (thesis 8.3.3)."""
 
 from __future__ import annotations

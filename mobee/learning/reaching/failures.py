@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Failed transitions as negative rewards: for all targets, nearby ones, or similar transitions (thesis 8.1)."""
 
 from __future__ import annotations

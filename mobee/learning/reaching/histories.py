@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Histories of values by state and target, and their averages weighted by distance (thesis eqs. 8.1, 8.5, 8.7)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reach learner: predictor, failures, plans and choices, without a plant (thesis 8.1 to 8.3)."""
 
 from __future__ import annotations

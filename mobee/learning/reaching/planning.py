@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plans that end in a reach: one more action of every state, after which the problem-try ends (thesis 8.2, 8.3.1)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The agent that learns from which pose each target is best reached, and a path there (thesis chapter 8)."""
 
 from __future__ import annotations

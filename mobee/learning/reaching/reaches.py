@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reach actions of a space: the marker's position and Jacobian in each state."""
 
 from __future__ import annotations

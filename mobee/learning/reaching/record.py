@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rebuilds a reach learner from its record."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stores the steps of a reach learner in the file of a run; each is on disk before the next action."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Strategies compute the reward of a reach from each state: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A tabular plant with reaches, for tests and for worlds with known ground truth."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Problems (targets), problem-tries and their steps (thesis 8.3.1)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Adaptive roadmaps: every edge counts as free until a motion along it has failed (thesis 4.2)."""
 
 from __future__ import annotations

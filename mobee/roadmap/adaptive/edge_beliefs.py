@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Beliefs about the edges of an adaptive roadmap, and the roadmap as the state space of an agent (thesis 4.2, 9.4.5)."""
 
 from __future__ import annotations

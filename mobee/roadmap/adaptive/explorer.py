@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explores which edges of an optimistic roadmap are free (thesis 4.3.1)."""
 
 from __future__ import annotations

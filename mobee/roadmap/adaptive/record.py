@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keeps the observations and changes of an adaptive roadmap on disk."""
 
 from __future__ import annotations

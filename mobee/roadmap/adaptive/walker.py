@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moves a robot along an adaptive roadmap, observes which edges are free and replans (thesis 4.2, 4.3.2)."""
 
 from __future__ import annotations

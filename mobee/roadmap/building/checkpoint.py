@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Saves an unfinished roadmap with its settings, and resumes building from the file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The explored part of a task space: vertices, expansion weights, covered region (thesis Algorithm 4).
 
 All points are task coordinates divided by the spacing of the roadmap, so that neighbours are about 1 apart.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Builds a roadmap by evolution-strategy searches that start at vertices and end beside them (thesis Algorithms 3 and 4)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Builds a roadmap by least squares: solves for the points of a lattice in the task space, outward from the first pose."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Schedules the evolution-strategy searches of a growing roadmap: start vertex, aim, time-out (thesis Algorithm 4)."""
 
 from __future__ import annotations

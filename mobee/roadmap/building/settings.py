@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings of a roadmap: how its poses are found, and which of them edges join."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses with given task coordinates, by least squares, and postures that are similar between neighbours."""
 
 from __future__ import annotations

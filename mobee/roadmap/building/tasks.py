@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Task spaces: the coordinates over which a roadmap is spread (thesis eqs. 3.4, 3.5, table 3.2).
 
 Positions are in m in the root frame, angles in rad.  `+` joins task spaces: `place(...) + motors(...)` is the last row of the table.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Natural evolution strategies: sampling, rank weights, natural-gradient updates (Glasmachers et al. 2010, thesis 3.2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Searches by evolution strategy within a box, with restarts; several at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost terms of poses: those of thesis table 3.1, others, and user functions."""
 
 from __future__ import annotations

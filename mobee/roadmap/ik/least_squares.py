@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damped least squares with restarts, for the terms that have a derivative; the other terms are checked afterwards."""
 
 from __future__ import annotations

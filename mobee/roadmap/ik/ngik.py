@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Natural gradient inverse kinematics: finds a pose that minimises a sum of costs (thesis 3.2)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pose search problem: which motors move, which are sampled, and the costs of batches of poses."""
 
 from __future__ import annotations

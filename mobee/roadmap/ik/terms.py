@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Terms of the cost of a pose (thesis eqs. 3.1-3.3), and the residuals by which least squares meets them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames of URDF: `<origin xyz=... rpy=...>`, rotations about the fixed axes x, y, z in that order."""
 
 from __future__ import annotations

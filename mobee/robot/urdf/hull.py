@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Convex hulls and bounding primitives of meshes, never smaller than the mesh."""
 
 from __future__ import annotations

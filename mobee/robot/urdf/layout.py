@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A URDF's tree laid out at zero pose: links, joints, markers and masses in the root frame."""
 
 from __future__ import annotations

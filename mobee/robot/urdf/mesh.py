@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finds and reads the points of mesh files: STL and OBJ; COLLADA is in mesh_dae.py."""
 
 from __future__ import annotations

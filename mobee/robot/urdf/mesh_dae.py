@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the points of COLLADA files, placed as in their scene.
 
 Lengths are turned into metres by the file's <unit>. Its <up_axis> is left alone, as ROS tools do: the URDF says which way is up.

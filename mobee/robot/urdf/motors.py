@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads motors, limits and couplings (<mimic>) of a URDF."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which shapes of a robot from a URDF are tested against each other, solids and generated fields.
 
 Every two shapes on different links are, save

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a robot from a URDF and its SRDF; docs/robots.md lists what is read as what."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads solids from collision geometry, and generates the fields around them."""
 
 from __future__ import annotations

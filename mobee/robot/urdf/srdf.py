@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads an SRDF: disabled pairs, groups of joints, named poses, and which of these is home."""
 
 from __future__ import annotations

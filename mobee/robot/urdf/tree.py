@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the links and joints of a URDF as a checked tree."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes a robot as URDF for other programs, with an SRDF beside it."""
 
 from __future__ import annotations

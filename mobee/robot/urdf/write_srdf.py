@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes an SRDF: groups, home and disabled pairs; adds disabled pairs to an existing one."""
 
 from __future__ import annotations

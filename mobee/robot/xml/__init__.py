@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes robots as zero-position XML, of every version of the grammar."""

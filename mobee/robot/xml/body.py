@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the elements on a link or joint: volumes, hulls, masses, markers."""
 
 from __future__ import annotations

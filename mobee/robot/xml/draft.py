@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The robot read so far from a file, and the reader's position in its tree."""
 
 from __future__ import annotations

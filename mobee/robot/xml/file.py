@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Opens XML files: refuses missing, too large and hostile ones, and repairs faults that the readers of 2010 to 2014 accepted."""
 
 from __future__ import annotations

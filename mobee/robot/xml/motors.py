@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads motors, the joints they drive, and linear constraints."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """XML as plain nodes with line numbers and typed attributes; reads and writes files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rewrites files of the programs of 2010 to 2014 (VirtualSkin, MoBeE) into today's grammar.
 
 The rules are those of the published program (kailfrank/MoBeE, 2014):

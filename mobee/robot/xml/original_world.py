@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rewrites worlds of the programs of 2011 to 2014 (<WorldList>) into today's grammar."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads and writes <ignore> tags: pairs of links or shapes that are not tested."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads a robot from zero-position XML (thesis 2.3.1); the grammar is in robots/README.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Versions of the grammar: rewrites older files into today's form before they are read.
 
 | version attribute of the root | form |

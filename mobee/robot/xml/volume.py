@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reads the tags sphere, capsule, cylinder and box, of robots and worlds (thesis 2.3.1)."""
 
 from __future__ import annotations

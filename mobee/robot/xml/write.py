@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes a robot as zero-position XML that reads back as the same robot."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motor models fitted to the responses of a robot, one TOML file a robot; `mobee experiment run motor-identification` makes them."""
 
 from __future__ import annotations

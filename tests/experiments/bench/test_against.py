@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two checkouts: the arithmetic on their times, and the control of their processes, with toy checkouts."""
 
 from __future__ import annotations

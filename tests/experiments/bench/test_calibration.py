@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The calibration's arithmetic, on a clock that the tests set; no speed is measured."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Verdicts and reports of the benchmarks of the live system on given summaries; the systems themselves run in tests/system."""
 
 from __future__ import annotations

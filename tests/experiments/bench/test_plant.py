@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plant's benchmark on given numbers, and the determinism of its workloads."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every benchmark that runs in this process, at its smallest: it gives numbers as JSON, a verdict, and a report of 80 columns."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sweep to be started, interrupted and killed: python -m tests.experiments.kit.toy_sweep FOLDER [--seeds N ...]."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every compiled part of the library answers to the same questions, as hashes: `python -m tests.mobee._core.everything`.
 
 Run with $MOBEE_CORE it prints the answers of one build of the core; all builds are to give the same bits.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which build of the core is loaded, and what is said when that cannot be done."""
 
 from __future__ import annotations

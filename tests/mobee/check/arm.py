@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An arm of which nothing is wrong, and ways to spoil it."""
 
 from __future__ import annotations

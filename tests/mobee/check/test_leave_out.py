@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What `mobee check --write-srdf` writes, and what it never does."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A URDF and its SRDF, checked: the lines are theirs, and so are the remedies."""
 
 from __future__ import annotations

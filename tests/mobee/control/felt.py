@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The constraint forces at a pose whose contacts are whatever a test wants."""
 
 from __future__ import annotations

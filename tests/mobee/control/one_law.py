@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A law of some motors with numbers of its own, in no robot."""
 
 from __future__ import annotations

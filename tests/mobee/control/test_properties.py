@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is promised of the forces and of the system, for any pose and motion."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The compiled reach law against the Jacobian of the model and against what it is to do."""
 
 from __future__ import annotations

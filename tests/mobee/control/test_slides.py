@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A motor that slides is under the law of one that turns through SLIDE_RANGE, in a unit of its own."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces from outside, beside those of the law."""
 
 from __future__ import annotations

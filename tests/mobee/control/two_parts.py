@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The planar arm of the other tests with its first joint as a part of its own, and an object to touch."""
 
 from __future__ import annotations

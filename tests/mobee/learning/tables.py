@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small decision problems given by their tables."""
 
 from __future__ import annotations

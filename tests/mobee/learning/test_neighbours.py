@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which points are nearest does not depend on how they are searched for."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One struct of settings an agent: its constructor, the scenario file, the record and the page come from it."""
 
 from __future__ import annotations

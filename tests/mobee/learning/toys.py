@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A robot of motors only, and plants that answer at once: what learning needs of the world, without a world."""
 
 from __future__ import annotations

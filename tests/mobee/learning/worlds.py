@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Worlds from the literature on exploration, as tables: hard for whoever does not plan to explore."""
 
 from __future__ import annotations

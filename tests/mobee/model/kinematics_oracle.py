@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same robots in pinocchio, an independent implementation of rigid-body kinematics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random robots and worlds with everything that the engine knows, and its contacts found the plain way: pair by pair, no broad phase."""
 
 from __future__ import annotations

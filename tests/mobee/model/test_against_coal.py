@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every contact against Pinocchio and coal: 500 random poses of the benchmark's robot, among 0 and 100 boxes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a link carries is felt like a shape of that link."""
 
 from __future__ import annotations

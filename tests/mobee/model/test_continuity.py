@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contacts and forces along 1000 random paths of the benchmark's robot, in steps of 1 mrad, among 0 and 100 boxes.
 
 What must hold, with "moved" for how far a pair's volumes have moved relative to each other in a step:

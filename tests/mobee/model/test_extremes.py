@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The least and the greatest that the engine takes: sizes, chains, motors, objects, and arrays of every kind."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The libraries for all levels of processors give the same bits."""
 
 from __future__ import annotations

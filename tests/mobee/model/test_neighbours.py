@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """That the list is used and thrown away when it should be; that its results are right, test_track.py says."""
 
 from __future__ import annotations

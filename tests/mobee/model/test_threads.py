@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One model, many threads: each evaluation is that of one consistent world, and the same as alone."""
 
 from __future__ import annotations

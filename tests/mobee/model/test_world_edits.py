@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Any sequence of edits: the arrays that the engine reads agree with the objects, and no earlier snapshot changes."""
 
 from __future__ import annotations

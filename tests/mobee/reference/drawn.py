@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robots and gains drawn at random, with everything that the law looks at."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The forces of the definition: what is promised of each, and that the controller's are the same."""
 
 from __future__ import annotations

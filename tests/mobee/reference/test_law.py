@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sum of the forces and its steps: the controller moves as the definition says, and a force of one's own goes in beside the others."""
 
 from __future__ import annotations

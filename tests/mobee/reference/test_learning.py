@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Algorithms 6 and 7 to the letter: the printed tables, and that the transition model and the planner do the same."""
 
 from __future__ import annotations

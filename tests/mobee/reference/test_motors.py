@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motors of the definition: what each of their parts does, and that the simulated ones are the same."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reach force of the definition: what it is to do, and that the controller's is the same."""
 
 from __future__ import annotations

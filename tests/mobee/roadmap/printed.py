@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thesis Algorithms 3 and 4 to the letter over a plane, q = y, for what becomes of them; each reading of notes and docs is a switch."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why Algorithm 4 is not built as it is printed: what becomes of it, and of each reading left out (docs/roadmaps.md)."""
 
 from __future__ import annotations

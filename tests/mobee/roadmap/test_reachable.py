@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How near a marker can come to a place, against what is known of the place."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A task that costs nothing to judge: the tip of a planar arm of three links of 1/3, its last link kept level within a tolerance."""
 
 from __future__ import annotations

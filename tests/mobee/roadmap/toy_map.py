@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A plant on which some motions fail, and small maps for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reference poses of the shipped robots."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robot files for tests, written line by line so that a message's line number can be checked."""
 
 from __future__ import annotations

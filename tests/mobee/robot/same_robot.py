@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether two robots are the same, whatever order their links and shapes stand in."""
 
 from __future__ import annotations

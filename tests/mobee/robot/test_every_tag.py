@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One file holds every tag and every attribute of the grammar; each does what thesis 2.3.1 and robots/README.md say."""
 
 from __future__ import annotations

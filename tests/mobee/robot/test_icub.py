@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shipped iCub against its sources."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The published iCub model against its own numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of 2010 to 2014, rule by rule; tests/experiments/claims/robot_files compares whole files with a second reading of the program."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Versions of the grammar: what MoBeE 0.1 wrote keeps its meaning, and what could mean two things says so."""
 
 from __future__ import annotations

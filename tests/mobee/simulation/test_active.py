@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Motors that are not active: rigid at home, without noise, and for the others as if they were simulated."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """References that can be braked; numpy says the same of whole arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The compiled loop against the same parts put together in Python, and against itself cut into other pieces."""
 
 from __future__ import annotations

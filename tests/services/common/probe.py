@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A service that counts what reaches it, and gets into every state from which one must end."""
 
 from __future__ import annotations

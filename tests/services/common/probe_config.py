@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Beside the probe, because a struct of the main module cannot be named by another."""
 
 from __future__ import annotations

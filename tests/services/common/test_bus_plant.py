@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a plant on the bus presents to the model, and what it says when that cannot be."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A mistake in a configuration is one line that says where it is and what would be right; exit code 2."""
 
 from __future__ import annotations

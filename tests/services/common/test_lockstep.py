@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The barrier's bookkeeping, on a bus that the test plays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The life of a service, as a real process on a real bus: what it answers, what it refuses, and how it ends."""
 
 from __future__ import annotations

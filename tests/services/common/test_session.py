@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a process finds its router."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One controller for all tests of the package, each in a run of its own."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The controller as a process: the test plays robot_sim, the model and the agents."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An action moves a part until it settles or its time is over."""
 
 from __future__ import annotations

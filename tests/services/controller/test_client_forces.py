@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces that the owner of a goal adds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When parts are held, and how they come under control again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces from outside in a live controller: at the contacts that the model tells, and told to the monitor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Who owns the goal of a part, and what it may be."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is warmed leaves no trace in the law."""
 
 from __future__ import annotations

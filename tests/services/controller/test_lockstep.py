@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The controller in lockstep: the test plays robot_sim and the model, tick by tick."""
 
 from __future__ import annotations

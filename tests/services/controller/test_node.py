@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The controller answers every tick with commands to all parts, or holds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers that begin anew, or with other settings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A reach draws a marker to its target and lets it go."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A launcher with toy services as real processes, and what is left of them."""
 
 from __future__ import annotations

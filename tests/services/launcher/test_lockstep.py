@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the launcher makes of a scenario in lockstep, before anything is started."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whom the supervisor counts as frozen."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The model as a process: the test plays robot_sim, vision and whoever edits the world."""
 
 from __future__ import annotations

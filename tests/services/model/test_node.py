@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The model answers every tick with forces, poses and contacts, and calls with Jacobians."""
 
 from __future__ import annotations

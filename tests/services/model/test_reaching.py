@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """While a part reaches, its link does not feel the targets, and the controller is told where they are."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The world as it is perceived, and edited by calls."""
 
 from __future__ import annotations

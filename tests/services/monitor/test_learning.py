@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the monitor shows of what an agent knows."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The monitor: what it shows, and that nobody else notices it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The port filter as a process, between a client's own program and robot_sim as a process."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """robot_sim as a process; the test plays router, controller, model and everybody else."""
 
 from __future__ import annotations

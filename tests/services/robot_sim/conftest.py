@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One robot_sim for the tests of its process."""
 
 from __future__ import annotations

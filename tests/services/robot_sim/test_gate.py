@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The safety gate without a bus: what it admits, and what the motors get."""
 
 from __future__ import annotations

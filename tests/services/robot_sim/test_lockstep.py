@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """robot_sim in lockstep as a process: the test is the only one who takes part."""
 
 from __future__ import annotations

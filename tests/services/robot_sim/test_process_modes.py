@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Position and torque; stop, pause and reset."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processes with other rates, back-ends and settings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the process says with every tick, and of itself."""
 
 from __future__ import annotations

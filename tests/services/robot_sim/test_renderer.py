@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The renderer: its drawing without a bus, and the process on one."""
 
 from __future__ import annotations

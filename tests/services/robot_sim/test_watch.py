@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is measured of the physics: counters, stops, recorded files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The target locator: what is a ball, where it is, and what the process reads."""
 
 from __future__ import annotations

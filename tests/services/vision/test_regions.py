@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Regions of masks are those that SciPy finds."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """A service that acts and reaches by a fixed script, the same on every plant."""

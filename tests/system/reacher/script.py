@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The script: postures to go to and targets to reach for."""
 
 from __future__ import annotations

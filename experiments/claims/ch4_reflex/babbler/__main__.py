@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`python -m experiments.claims.ch4_reflex.babbler`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sends commands to all parts at once: positions to the drives, or goals to MoBeE's controller."""
 
 from __future__ import annotations

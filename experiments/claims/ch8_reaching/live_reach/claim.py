@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare the learned reacher with a planner on the live PyBullet robot, in lockstep.
 
 Claim: trained offline and refined live, the learned reacher brings the palm to within 2 cm of the surface of at least 95 % of those of the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Times the reaches of the live arm, and moves a target or an obstacle during a reach."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The live arm and its problems: robot, law and states, targets, first poses, and the learner that is trained offline.
 
 The problems are the thesis' 27 targets and new ones between them, each with a random first pose, at rest or with a target or an obstacle

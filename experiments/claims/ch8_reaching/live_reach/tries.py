@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tries on the live robot: the job of a launch, its record, its judgement by the simulator's joints, and the reasons of misses.
 
     python -m experiments.claims.ch8_reaching.live_reach.tries

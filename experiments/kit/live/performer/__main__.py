@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`python -m experiments.kit.live.performer`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Predictors of the rewards of reaching, by name."""
 
 from collections.abc import Callable

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The covariance of the Gaussian process over reaches, and the parameters of highest evidence.
 
 Rewards are correlated for reaches from similar poses for near targets ("place"), from similar poses with similar vectors from hand to

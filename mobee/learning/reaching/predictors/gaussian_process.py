@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gaussian process regression of the rewards over poses and targets: the best predictor here.
 
 A lower triangular factor grows by a row for each reach.  For every queried target, the rows of its states are cached and continued at

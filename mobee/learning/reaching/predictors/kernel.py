@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nadaraya-Watson kernel regression of the rewards over poses and targets; scales by leave-one-out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Predicts the remaining error of a reach from a linear arm: springs at the joints, a force at the hand.
 
 In a state with the Jacobian J, a force proportional to the remaining error e turns the joints by g J^T e, against their springs.  So for

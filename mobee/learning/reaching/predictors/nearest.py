@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nearest-neighbour regression: rewards of reaches from similar poses over similar vectors from hand to target."""
 
 from __future__ import annotations

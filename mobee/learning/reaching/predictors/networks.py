@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A small ensemble of neural networks; their disagreement is the uncertainty."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reaches so far, repeats merged, and the base of predictors that treat states independently."""
 
 from __future__ import annotations

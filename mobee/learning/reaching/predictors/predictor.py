@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The interface of reward predictors, and the prior from the distance between hand and target."""
 
 from __future__ import annotations

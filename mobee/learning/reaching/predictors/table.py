@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A table of mean rewards for each state and target, without generalisation."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The published predictor: averages over a state's history weighted by the distance of targets (thesis eq. 8.5)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A crossing is timed on robot_sim's ticks, and the turn by the simulator's joints."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
 from experiments.claims.ch7_learning.neighbour_count import attempt, drawn_tasks, fewest_actions, findings, trial

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random robot files as they were written from 2011 to 2014."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of 2011 to 2014 as this library reads them, beside a second reading of the program's source."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The generated robots and one of PyBullet; the tests do not install example-robot-data."""
 
 from __future__ import annotations

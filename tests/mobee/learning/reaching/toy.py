@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A toy world to reach in: hands at places that follow from the state, and targets that block some transitions."""
 
 from __future__ import annotations

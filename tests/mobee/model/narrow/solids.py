@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An oracle that knows no formula of the engine: support points of solids, and the overlap of two along one direction."""
 
 from __future__ import annotations

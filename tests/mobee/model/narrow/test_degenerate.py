@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tiny, huge, flat, touching and concentric volumes: always a number, and always a shortest way out."""
 
 from __future__ import annotations

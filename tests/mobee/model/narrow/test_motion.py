@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answer follows the motion of the volumes, as far as the shortest way out does by its nature.
 
 Let h be how far any point of the pair moves.  The depth never changes by more than h.  While the core of a rounded volume is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A planar arm of three segments of 0.3 m reaches a disk of radius 0.9, except where it touches something."""
 
 from __future__ import annotations

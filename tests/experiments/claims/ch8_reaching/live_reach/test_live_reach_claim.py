@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The claims follow from blocks of tries."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Targets and first poses of the live tries."""
 
 from __future__ import annotations

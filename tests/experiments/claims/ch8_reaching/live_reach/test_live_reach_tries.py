@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A live try is judged by the simulator's joints, at the tick at which its last reach ended."""
 
 from __future__ import annotations

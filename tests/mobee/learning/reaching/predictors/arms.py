@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reach actions and reaches drawn at random, and a reward that depends on both pose and target."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every predictor of rewards does, whatever its mathematics."""
 
 from __future__ import annotations
