@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// Numbered as in mobee/roadmap/ik/aims.py.
+// Numbered as in mobee/roadmap/ik/terms.py.
 enum class AimKind : std::int64_t {
     place,       // the two points are one
     turned,      // the two frames are parallel

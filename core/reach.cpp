@@ -88,7 +88,7 @@ void force_motors(Reach& reach) {
     }
 }
 
-// Add L(f) as of a client (see `add_client_force`), of the motors that are pulled.
+// Add L(f) as of a client (see `mobee_law_client`), of the motors that are pulled.
 void add_bounded(const Law& law, const Reach& reach, double* total) {
     if (!law.direction) {
         for (const PulledMotor& motor : reach.motors) {
