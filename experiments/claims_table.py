@@ -40,9 +40,14 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 **confirmed**: our number agrees with the publication. **refuted**: it does not. **open**: it was not measured, does not decide, or has
 fewer than {MIN_SEEDS} seeds.
 
-Where states have 16 neighbours, many samples are equally far, and which become neighbours is drawn. In exploration-coverage and
-neighbour-count each seed draws its own graph. Everywhere else all seeds share one (tie seed 0): there the intervals cover noise,
-starts and ties of choice, not the draw of the graph, and what the numbers say may be a property of that graph.
+Terms in the rows. **state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
+once and to succeed once; **60-40**: to succeed twice. **constrained**, **free**: the left arm with its cable constraints and
+self-contacts, and without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first
+is better than a run of the other, with ties counted half.
+
+Where states have 16 neighbours, many samples have the same distance, and it is drawn at random which become neighbours. In
+exploration-coverage and neighbour-count each seed draws its own graph. Elsewhere all seeds share one (tie seed 0): there the
+intervals include noise, starts and random choices, but not the draw of the graph, and a result may be a property of that graph.
 """
 
 
