@@ -9,7 +9,7 @@ import os
 import secrets
 import signal
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
@@ -23,8 +23,8 @@ from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.config import ServiceConfig
-from services.common.entry import set_up_log, wait_until_released
+from services.common.config import ServiceConfig, load_config
+from services.common.entry import explained, robot_of, set_up_log, wait_until_released
 from services.common.exit_codes import ENVIRONMENT, OK
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
@@ -34,6 +34,7 @@ from services.common.session import LEASE, LOCAL_ENDPOINT, open_client, spare_th
 
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
+_C = TypeVar("_C", bound=ServiceConfig)
 
 ORPHANED = 10.0  # s without a router after which a service ends
 
@@ -254,3 +255,28 @@ def _end(signum: int, frame: FrameType | None) -> None:
 def _ignore_signals() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def run_node(
+    module: str,
+    config_class: type[_C],
+    node: Callable[[Service, _C, Robot], object],
+    argv: Sequence[str] | None = None,
+    prompt: bool = False,
+) -> None:
+    """Read the settings, load the robot, create a node on a new service, and serve until a signal or a shutdown call.
+
+    Args:
+        module: dotted name of the program, such as "services.model"; its last word is the name of the service.
+        config_class: type of the settings.
+        node: creates the object whose handlers the service runs.
+        argv: command line without the program's name; None: that of this process.
+        prompt: see Service.
+    """
+    config = load_config(config_class, argv, module)
+    with explained(module):
+        robot = robot_of(config)
+        with Service(module.rpartition(".")[2], config, robot, prompt=prompt) as service:
+            node(service, config, robot)
+            service.ready()
+            service.run()

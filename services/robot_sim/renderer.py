@@ -16,10 +16,8 @@ from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
 from mobee.robot.robot import Robot
 from services.common.body import Body
-from services.common.config import load_config
-from services.common.entry import explained, robot_of
 from services.common.rate import Percentiles
-from services.common.service import Service
+from services.common.service import Service, run_node
 from services.robot_sim.config import RendererConfig
 from services.robot_sim.renderer_scene import Scene
 
@@ -102,13 +100,7 @@ class RendererNode:
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Run the renderer until a signal or a shutdown call."""
-    config = load_config(RendererConfig, argv, "services.robot_sim.renderer")
-    with explained("services.robot_sim.renderer"):
-        robot = robot_of(config)
-        with Service("renderer", config, robot) as service:
-            RendererNode(service, config, robot)
-            service.ready()
-            service.run()
+    run_node("services.robot_sim.renderer", RendererConfig, RendererNode, argv)
 
 
 if __name__ == "__main__":
