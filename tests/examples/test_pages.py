@@ -59,6 +59,41 @@ ELSEWHERE = {
     "docs/bus.md": "not run: two lines of a service, whose own names stand for any",
 }
 
+RUN_HERE = (
+    "mobee roadmap tasks",
+    "mobee roadmap build palm-down -o palm.npz",
+    "mobee roadmap show palm.npz",
+    "mobee roadmap query palm.npz --to -0.3 0.2",
+    "mobee roadmap play palm.npz --to -0.3 0.2 --from -0.4 0",
+    "mobee reach --target -0.3 0.2 0.1 --offline --json",
+    "mobee experiment run hypercube-exploration",
+)
+"""Commands on the pages that run here in this order, in one folder."""
+
+RUN_ELSEWHERE = {
+    r"./launch": "tests/services/launcher/test_run.py",
+    r"./test.*": "is what runs this test",
+    r"pip install .": "tests/packaging/test_wheel.py",
+    r"pip install (\"mobee\[planning\]\"|--target erd .*)": "needs a package index",
+    r"mobee launch reach": "tests/services/launcher/test_scenario.py",
+    r"mobee launch filtered": "tests/services/port_filter/test_process.py",
+    r"mobee reach --target [-. 0-9]+": "tests/system/test_reach.py",
+    r"mobee reach --object ball --stay": "never ends; test_reach.py of mobee_cli and test_reaches.py of the controller test --stay",
+    r"mobee reach --target [-. 0-9]+ --run .*": "tests/mobee_cli/test_reach.py",
+    r"mobee reach --offline --robot pointer.xml .*": "tests/mobee_cli/test_reach.py",
+    r"mobee roadmap build palm-down": "runs here with a file's name",
+    r"mobee roadmap show palm.npz --view": "tests/mobee_cli/test_roadmap.py",
+    r"mobee roadmap play palm.npz --to [-. 0-9]+ --live": "tests/system/test_reach.py",
+    r"mobee roadmap (build own_task.py|show own_task.npz|build sweep.py|show sweep.npz).*": "tests/examples/test_documentation.py",
+    r"mobee plan .*": "tests/mobee_cli/test_plan.py",
+    r"mobee check .*": "tests/mobee_cli/test_check.py",
+    r"mobee convert .*": "tests/mobee_cli/test_convert.py",
+    r"mobee bench against .*": "tests/experiments/bench/test_against.py",
+    r"mobee experiment (run|figure) .*": "tests/experiments/test_registry.py",
+    r"python -m experiments.claims.ch8_reaching.reach_film .*": "tests/experiments/claims/ch8_reaching/test_reach_film.py",
+}
+"""All other commands on the pages, as patterns: the test that runs the command in short, or why none does."""
+
 SHORTER = {"tries=400": "tries=4", "repetitions=5": "repetitions=1"}
 """Numbers with which a block would take a minute."""
 
@@ -135,6 +170,28 @@ def test_a_command_on_a_page_is_one_that_its_program_accepts(place: str, line: s
             assert set(extras) <= declared.keys(), place
         case _:
             assert (ROOT / program).is_file(), place
+
+
+def without_comment(line: str) -> str:
+    return line.partition(" #")[0].strip()
+
+
+def test_the_quick_commands_on_the_pages_run(tmp_path: Path) -> None:
+    on_pages = {without_comment(line) for _, line in commands()}
+    assert set(RUN_HERE) <= on_pages
+    for line in RUN_HERE:
+        words = [sys.executable, "-m", "mobee_cli", *shlex.split(line)[1:]]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=250)
+        assert done.returncode == 0, f"{line}: {done.stderr}"
+        assert done.stdout.strip(), line
+
+
+def test_every_other_command_has_a_test_or_a_reason() -> None:
+    others = {without_comment(line) for _, line in commands()} - set(RUN_HERE)
+    covered = {line: [pattern for pattern in RUN_ELSEWHERE if re.fullmatch(pattern, line)] for line in others}
+    assert [line for line, patterns in covered.items() if not patterns] == []
+    assert RUN_ELSEWHERE.keys() == {pattern for patterns in covered.values() for pattern in patterns}
+    assert [place for place in RUN_ELSEWHERE.values() if place.startswith("tests/") and not (ROOT / place).is_file()] == []
 
 
 @pytest.mark.parametrize("block", [block for block in BLOCKS if block.language in {"toml", "json"}], ids=str)
