@@ -184,6 +184,16 @@ class Watcher:
     def wait_moving(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 40.0) -> None:
         until(lambda: all(self.speed(part) > faster for part in parts), timeout, f"{', '.join(parts)} move")
 
+    def wait_until_moved(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 60.0) -> None:
+        """Wait until each part has moved since the call, not necessarily at the same time."""
+        until(lambda: self.clock, timeout, "the watcher hears the clock")
+        run, k = self.run, self.k
+
+        def moved(part: str) -> bool:
+            return any(s.run == run and s.k > k and max(map(abs, s.dq)) > faster for s in self.states[part][-1000:])
+
+        until(lambda: all(moved(part) for part in parts), timeout, f"{', '.join(parts)} have moved")
+
 
 def transitions(run_dir: Path) -> dict[str, list[tuple[Any, ...]]]:
     """All transitions on disk, by agent."""

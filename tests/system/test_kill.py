@@ -45,11 +45,10 @@ def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
     until(is_back, 20.0, f"{who} is back")
 
 
-def all_go_on(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]], more: int = 1) -> None:
-    """Every agent makes more transitions, and what was on disk is still there, in order."""
-    system, _ = live
-    counts = {agent: len(transitions(system.run_dir)[agent]) for agent in AGENTS}
-    until(lambda: all(len(transitions(system.run_dir)[agent]) >= counts[agent] + more for agent in AGENTS), 90.0, f"{more} more each")
+def all_go_on(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]]) -> None:
+    """Every agent's part moves again, and the transitions that were on disk before are still there, in order."""
+    system, watcher = live
+    watcher.wait_until_moved(AGENTS)
     after = transitions(system.run_dir)
     for agent in AGENTS:
         assert after[agent][: len(before[agent])] == before[agent]
@@ -113,7 +112,7 @@ def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher
     assert first.gate in ("idle", "hold")
     assert max(map(abs, first.dq)) < 0.05
     wait_back(watcher, "robot_sim", pid)
-    all_go_on(live, before, 2)
+    all_go_on(live, before)
 
 
 @pytest.mark.parametrize("who", ["vision", "renderer", "monitor"])
@@ -131,3 +130,14 @@ def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: st
         if not held[-1]:
             return
     raise AssertionError(f"states in hold after each kill of {who}: {held}")
+
+
+def test_after_all_kills_every_agent_learns_on(live: tuple[Launch, Watcher]) -> None:
+    system, _ = live
+    before = transitions(system.run_dir)
+    until(
+        lambda: all(len(after) > len(before[agent]) for agent, after in transitions(system.run_dir).items()),
+        90.0,
+        "one more transition of each agent",
+    )
+    all_go_on(live, before)

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from mobee.reach import TARGET
 from mobee.roadmap.roadmap import Roadmap
 from services.common import rpc
 from tests.services.harness import ROOT
-from tests.system.live import Watcher, running, until
+from tests.system.live import Launch, Watcher, running, until
 from tests.system.reacher.script import PART, perform
 
 pytestmark = pytest.mark.system
@@ -50,49 +51,71 @@ def test_live_reaches_in_lockstep_are_those_of_the_offline_plant_to_the_bit(tmp_
     print("mm missing:", [round(1e3 * outcome["missing"]) for outcome in offline if "missing" in outcome])
 
 
-def test_a_map_is_played_and_when_who_reaches_is_killed_the_arm_brakes_and_the_target_is_gone(tmp_path: Path) -> None:
-    with running(tmp_path, str(SCENARIO)) as (system, watcher):
-        played = play_a_map(tmp_path / "map.npz", system.endpoint)
-        assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
-        until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be given back")
-        told: list[Reach] = []
-        kept = watcher.session.declare_subscriber(
-            Reach.stream.key(PART), lambda sample: told.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
-        )
-        argv = [sys.executable, "-m", "tests.system.reacher", "--endpoint", system.endpoint, "--in-vain"]
-        reacher = subprocess.Popen(argv, cwd=ROOT, env=dict(os.environ))
-        try:
-            until(lambda: told and watcher.speed(PART) > 0.1, 30.0, "the reach")
-            assert TARGET in objects(watcher)
-            reacher.kill()
-            until(lambda: told[-1].phase == "interrupted", 2.0, "the end of the reach")
-        finally:
-            reacher.kill()
-            reacher.wait()
-        k = told[-1].k
-        until(lambda: watcher.motions[PART][-1].status == "idle", 2.0, "the part without an action")
-        assert watcher.motions[PART][-1].epoch == 0
-        until(lambda: watcher.k > k + 100, 5.0, "a second to pass")
-        there = np.array(watcher.states[PART][-1].q)
-        until(lambda: watcher.k > k + 200, 5.0, "another one")
-        assert np.abs(watcher.states[PART][-1].q - there).max() < STILL
-        assert TARGET not in objects(watcher)
-        assert told[-1].phase == "interrupted"
-        kept.undeclare()
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Watcher]]:
+    with running(tmp_path_factory.mktemp("reach"), str(SCENARIO)) as pair:
+        yield pair
 
 
-def play_a_map(path: Path, endpoint: str) -> dict[str, Any]:
-    """Two poses of the right arm in the open, and the way to the second, as `mobee roadmap play --live --json` tells of it."""
+def test_the_command_reaches_a_place_in_the_running_system(live: tuple[Launch, Watcher]) -> None:
+    system, watcher = live
+    reached = command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", system.endpoint)
+    assert reached["reached"] and reached["settled"]
+    until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be released")
+
+
+def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], tmp_path: Path) -> None:
+    system, watcher = live
+    played = command("roadmap", "play", str(two_poses(tmp_path / "map.npz")), "--to", "1", "--live", "--endpoint", system.endpoint)
+    assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
+    until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be released")
+
+
+def test_when_the_program_that_reaches_is_killed_the_arm_brakes_and_the_target_is_removed(live: tuple[Launch, Watcher]) -> None:
+    system, watcher = live
+    reaches: list[Reach] = []
+    subscriber = watcher.session.declare_subscriber(
+        Reach.stream.key(PART), lambda sample: reaches.append(decode(Reach, sample.payload.to_bytes(), str(sample.encoding)))
+    )
+    argv = [sys.executable, "-m", "tests.system.reacher", "--endpoint", system.endpoint, "--in-vain"]
+    reacher = subprocess.Popen(argv, cwd=ROOT, env=dict(os.environ))
+    try:
+        until(lambda: reaches and watcher.speed(PART) > 0.1, 30.0, "the reach")
+        assert TARGET in objects(watcher)
+        reacher.kill()
+        until(lambda: reaches[-1].phase == "interrupted", 2.0, "the end of the reach")
+    finally:
+        reacher.kill()
+        reacher.wait()
+    k = reaches[-1].k
+    until(lambda: watcher.motions[PART][-1].status == "idle", 2.0, "the part without an action")
+    assert watcher.motions[PART][-1].epoch == 0
+    until(lambda: watcher.k > k + 100, 5.0, "a second to pass")
+    there = np.array(watcher.states[PART][-1].q)
+    until(lambda: watcher.k > k + 200, 5.0, "another one")
+    assert np.abs(watcher.states[PART][-1].q - there).max() < STILL
+    assert TARGET not in objects(watcher)
+    assert reaches[-1].phase == "interrupted"
+    subscriber.undeclare()
+
+
+def two_poses(path: Path) -> Path:
+    """Write a roadmap of two poses of the right arm in free space, and one edge."""
     robot, world = load_robot("icub"), load_world("table")
     world.remove("ball")
     q = np.repeat(robot.home[None], 2, axis=0)
     moves = ["r_shoulder_pitch", "r_shoulder_roll", "r_elbow"]
     q[:, [robot.motor_index(name) for name in moves]] = [(-0.5, 0.8, 0.9), (-0.6, 0.9, 1.1)]
     Roadmap(Model(robot, world), q, np.array([[0.0], [1.0]]), np.array([[0, 1]]), np.ones(1), {"motors": moves}).save(path)
-    argv = [sys.executable, "-m", "mobee_cli", "roadmap", "play", str(path), "--to", "1", "--live", "--endpoint", endpoint, "--json"]
+    return path
+
+
+def command(*words: str) -> dict[str, Any]:
+    """Run a command of `mobee` that moves the running robot; returns what it prints as JSON."""
+    argv = [sys.executable, "-m", "mobee_cli", *words, "--json"]
     for _ in range(ATTEMPTS):
         done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
-        if "the motion was interrupted" not in done.stderr:
+        if "interrupted" not in done.stderr:
             break
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))
