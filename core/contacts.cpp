@@ -7,7 +7,7 @@ namespace mobee {
 
 namespace contacts {
 
-// The robot's shapes, then the objects of the snapshot.
+// Return the name of a contact's shape: indices below `slots` are the robot's shapes, the others are objects of the snapshot.
 std::int64_t name_of(const Scene& scene, const Shape& shape) {
     const std::int64_t own = scene.robot->own_shapes;
     return shape.name < own ? shape.name : own + scene.carried[shape.name - own];
@@ -25,7 +25,7 @@ void push(Wrench& wrench, Vec3 force, Vec3 point) {
 
 bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
-// In the order of the contacts: the sum does not depend on how they were found.
+// Sum in the order of the contacts, so that the result does not depend on the search that found them.
 bool push_links(const Array<Contact>& contacts, Array<Wrench>& wrench) {
     bool any = false;
     for (const Contact& contact : contacts) {
@@ -55,7 +55,7 @@ bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double dept
     if (pair.second >= robot.slots()) {
         const std::int64_t object = pair.second - robot.slots();
         contact.second = robot.own_shapes + scene.name[object];
-        return !(scene.target[object] && spares(robot, one, hands));
+        return !(scene.target[object] && ignores_targets(robot, one, hands));
     }
     const Shape& two = robot.shape[pair.second];
     if (two.field) contact.kind = field_contact;  // a carried object meets fields too
@@ -86,7 +86,7 @@ void sort_contacts(const Scene& scene, Contacts& contacts) {
         std::sort(found.begin(), found.end(), contacts::before);
         return;
     }
-    // Each contact goes to the place of its kind and first shape, and there behind those with a smaller second.
+    // Insertion into the place of its kind and first shape, after the contacts with a smaller second shape.
     const std::int64_t shapes = scene.robot->own_shapes;
     const auto place_of = [shapes](const Contact& one) { return static_cast<std::size_t>(one.kind * shapes + one.first); };
     std::swap(contacts.found, contacts.unsorted);
@@ -109,13 +109,13 @@ void sort_contacts(const Scene& scene, Contacts& contacts) {
 
 void project(const Robot& robot, const Frame* frames, const Array<Contact>& found, bool cut, Array<Wrench>& wrench, double* torque) {
     if (!contacts::push_links(found, wrench)) return;
-    // Gathered link by link from the tips to the base.
+    // Accumulate over the links from the tips to the base.
     for (std::int64_t link = robot.joints; link > 0; --link) {
         const Vec3 force = wrench[link].force, moment = wrench[link].moment;
         if (contacts::is_zero(force) && contacts::is_zero(moment)) continue;
         wrench[link] = Wrench{};
         const Joint& joint = robot.joint[link - 1];
-        // A joint leaves its own axis where it is, so the link it moves carries the axis too.
+        // A joint does not move its own axis, so the axis is fixed in the moved link as well.
         const Frame& frame = frames[link];
         const Vec3 axis = turn(frame, joint.axis);
         const double along = joint.slides ? dot(axis, force) : dot(axis, moment - cross(move(frame, joint.point), force));

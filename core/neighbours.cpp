@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A list is of use until two volumes together may have moved by the skin since it was made; until then a pair is looked at only when
-// what its two volumes have moved adds up to what was between them, and of two shapes of one hand also only when the joints between
-// them have turned enough.  What has not moved at all is neither placed nor tested again.  Where poses are far apart a list does not
-// pay: every pose is then evaluated as any other, until the steps become short.
+// A neighbour list (Verlet list) of pairs of volumes.  It is valid until two volumes may have moved by the skin, in sum, since the list was
+// made.  Until then a listed pair is tested only if the motions of its two volumes add up to the gap between them.  Two shapes of one hand
+// are tested only if the joints between them have also turned enough.  Volumes that have not moved are neither placed nor tested.  Where
+// consecutive poses are far apart, a list costs more than it saves: then every pose is evaluated without a list.
 #include "neighbours.hpp"
 
 #include <cmath>
@@ -14,14 +14,14 @@
 
 namespace mobee {
 
-enum class Remembered : std::int64_t { nothing, pose, list, pose_to_renew };  // the last: in a world that has changed under a useful list
+enum class Remembered : std::int64_t { nothing, pose, list, pose_to_renew };  // pose_to_renew: the world has changed while a list was in use
 
-// A pair nearer than the skin when the list was made.
+// A pair whose gap was less than the skin when the list was made.
 struct Neighbour {
     Pair pair;
-    Pair groups;              // of the two
-    double gap = 0.0;         // m between the two then
-    std::int64_t kept = -1;   // which contact of then is theirs, -1: none
+    Pair groups;              // of the two volumes
+    double gap = 0.0;         // m, at that time
+    std::int64_t kept = -1;   // index of the pair's contact at that time; -1: none
 };
 
 struct Neighbours {
@@ -38,24 +38,26 @@ struct Neighbours {
     Motion motion;
     Pairs pairs;
     Array<Neighbour> list;
-    Array<Contact> kept;  // when the list was made
+    Array<Contact> kept;  // contacts when the list was made
     Contacts contacts;
-    Array<Pair> close;     // pairs of the list that are looked at
-    Array<Contact> still;  // contacts of those of which neither has moved
+    Array<Pair> close;     // listed pairs to be tested
+    Array<Contact> still;  // contacts of pairs of which neither volume has moved
     Array<Wrench> wrench;
     Rows rows;
 };
 
 namespace following {
 
-constexpr double margin = 1e-9;  // m: above the rounding of distances and of what was moved
-constexpr double short_step = 4.0;   // steps of the present length that a new list must last to be worth making
-constexpr std::int64_t worth = 4;    // poses that a list must have served before an edit of the world to be made again at once, else so many go without
+constexpr double margin = 1e-9;  // m; larger than the rounding errors of distances and motions
+constexpr double short_step = 4.0;   // a list is made only if it would stay valid for this number of steps of the present length
+// After an edit of the world, a list that has served at least this number of poses is made again at once.  Otherwise this number of
+// poses is evaluated without a list.
+constexpr std::int64_t min_served = 4;
 
-// Whether the list holds in a pose in which a shape may be `farthest` away [m] from the pose remembered.
+// Return whether the list is valid in a pose in which a shape may have moved by `farthest` [m] since the list was made.
 bool holds(const Neighbours& near, double farthest) { return near.state == Remembered::list && 2.0 * farthest < near.skin - margin; }
 
-// Whether to make a list where none holds.
+// Return whether to make a list if none is valid.
 bool pays(Neighbours& near, double farthest) {
     if (near.state == Remembered::list) return near.served > 1;
     if (near.pause > 0) {
@@ -65,17 +67,17 @@ bool pays(Neighbours& near, double farthest) {
     return near.state == Remembered::pose_to_renew || (near.state == Remembered::pose && short_step * 2.0 * farthest < near.skin);
 }
 
-// How far the two of a listed pair may have moved together.
+// Return an upper bound of the sum of the motions of a listed pair's two volumes [m].
 double way_of_pair(Neighbours& near, Pair pair) {
     const Robot& robot = *near.scene->robot;
     const double way = way_of(robot, pair.first, near.placed, near.motion);
     return pair.second < robot.slots() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
 }
 
-// The same from their groups alone: no less, and it places nothing.
+// Return a looser upper bound from their groups alone, without placing the volumes.
 double way_of_groups(const Motion& motion, Pair groups) { return motion.far[groups.first] + motion.far[groups.second]; }
 
-// The groups of two shapes, or of a shape and an object.
+// Return the groups of two shapes, or of a shape and an object.
 Pair groups_of(const Neighbours& near, Pair pair) {
     const Motion& motion = near.motion;
     const bool own = pair.second < near.scene->robot->slots();
@@ -83,7 +85,7 @@ Pair groups_of(const Neighbours& near, Pair pair) {
     return {group_of(pair.first), own ? group_of(pair.second) : static_cast<std::int32_t>(motion.group.size())};
 }
 
-// How far two shapes of the robot may have come nearer, as seen from the link that carries both.
+// Return an upper bound of the approach of two shapes of the robot, seen from the link that carries both [m].
 double approach(const Neighbours& near, Pair pair) {
     const Robot& robot = *near.scene->robot;
     const Shape &a = robot.shape[pair.first], &b = robot.shape[pair.second];
@@ -91,7 +93,7 @@ double approach(const Neighbours& near, Pair pair) {
     return swung(near.motion, a.link, base, a.lever) + swung(near.motion, b.link, base, b.lever);
 }
 
-// Collect the listed pairs that may have met, and the contacts of those of which neither has moved.
+// Collect the listed pairs that may touch, and the contacts of the pairs of which neither volume has moved.
 void gather(Neighbours& near) {
     near.close.clear();
     near.still.clear();
@@ -138,7 +140,7 @@ void make_list(Neighbours& near) {
     for (const Contact& one : near.contacts.found) near.kept.push(one);
 }
 
-// Look at all pairs.
+// Test all pairs.
 void start_anew(Neighbours& near, bool build) {
     const Scene& scene = *near.scene;
     bound_clusters(*scene.robot, near.placed);
@@ -174,7 +176,7 @@ std::int64_t find(Neighbours& near, const double* q) {
     return static_cast<std::int64_t>(near.contacts.found.size());
 }
 
-void feel(Neighbours& near, double* torque) {
+void project_contacts(Neighbours& near, double* torque) {
     sort_contacts(*near.scene, near.contacts);
     project(*near.scene->robot, near.placed.links.frame.data(), near.contacts.found, near.cut, near.wrench, torque);
 }
@@ -190,44 +192,44 @@ MOBEE_CALL Neighbours* mobee_neighbours_new(double skin, std::int64_t cut) {
 
 MOBEE_CALL void mobee_neighbours_free(Neighbours* near) { discard(near); }
 
-// From now on among another world, or with others who reach.
+// Change the world, or the set of reaching hands.
 MOBEE_CALL void mobee_neighbours_enter(Neighbours* near, const Scene* scene, const Hands* hands) {
-    const bool was_of_use = near->state == Remembered::list && near->served >= following::worth;
+    const bool was_of_use = near->state == Remembered::list && near->served >= following::min_served;
     const bool first = near->scene == nullptr;
     near->scene = scene;
     near->hands = *hands;
     near->state = was_of_use ? Remembered::pose_to_renew : Remembered::nothing;
-    near->pause = was_of_use || first ? 0 : following::worth;  // a world in motion outdates its lists
+    near->pause = was_of_use || first ? 0 : following::min_served;  // a world in motion outdates its lists
     near->placed.fit(*scene->robot);
     near->motion.fit(*scene->robot);
     near->wrench.resize(scene->robot->links);
 }
 
-// Find the contacts in the poses q (poses, motors), one after the other, and what they do, (poses, motors); returns how many there are.
+// Find the contacts in each pose of q (poses, motors) and their torques (poses, motors).  Return the number of contacts.
 MOBEE_CALL std::int64_t mobee_follow(Neighbours* near, const double* q, std::int64_t poses, double* torque) {
     const std::int64_t motors = near->scene->robot->motors;
     near->rows.size = 0;
     std::memset(torque, 0, poses * motors * sizeof(double));
     for (std::int64_t b = 0; b < poses; ++b) {
         if (find(*near, q + b * motors) == 0) continue;
-        feel(*near, torque + b * motors);
+        project_contacts(*near, torque + b * motors);
         near->rows.append(b, near->contacts.found);
     }
     return static_cast<std::int64_t>(near->rows.size);
 }
 
-// Give the rows of the last `mobee_follow` away, see `mobee_room_rows`.
+// Copy out the rows of the last `mobee_follow`, see `mobee_room_rows`.
 MOBEE_CALL void mobee_neighbours_rows(Neighbours* near, void** arrays) { near->rows.give(arrays); }
 
-// For tests: the state, how many pairs are listed, how many poses the list has served.
+// For tests: the state, the number of listed pairs, and the number of poses that the list has served.
 MOBEE_CALL void mobee_neighbours_state(const Neighbours* near, std::int64_t* state) {
     state[0] = static_cast<std::int64_t>(near->state);
     state[1] = static_cast<std::int64_t>(near->list.size());
     state[2] = near->served;
 }
 
-// For tests: how far each shape (shapes,) may have moved from the angles `then` to `now`, as seen from each link that carries both it and
-// another: (shapes, links), by the number of the other link.
+// For tests: upper bounds of the motion of each shape between the angles `then` and `now`, (shapes, links).  Column k is the motion as
+// seen from the link that carries both the shape and link k.
 MOBEE_CALL void mobee_swung(const Robot* robot, const double* then, const double* now, double* out) {
     Motion motion;
     motion.fit(*robot);

@@ -15,9 +15,9 @@ std::int64_t find(Neighbours& near, const double* q);
 
 // Put the contacts of the last `find` in order and add what those of fields do to the motors, the sum of J^T (depth * normal), to
 // `torque` (motors,).
-void feel(Neighbours& near, double* torque);
+void project_contacts(Neighbours& near, double* torque);
 
-// The contacts of the last `find`; after `feel` in order: by kind, first and second.
+// The contacts of the last `find`; after `project_contacts` in order: by kind, first and second.
 const Contact& contact(const Neighbours& near, std::int64_t index);
 
 }  // namespace mobee

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reaching: the motors of a part draw a marker to a target, against their attractor (thesis 5.1 and 8.2).
+// Reaching: the motors of a part pull a marker towards a target (thesis 5.1 and 8.2).
 //
-// It rounds as it is written, as the law does.  In the frame of the target a Jacobian has three rows, or six where the marker's
-// normal is turned too.
+// The order of the floating-point operations is fixed, as in the law.  The Jacobian of the marker has three rows (position), or six
+// where the marker's normal is turned too.
 #pragma once
 
 #include <cstdint>
@@ -15,79 +15,85 @@ namespace mobee {
 // A motor that drives a joint between base and marker.
 struct ReachDrive {
     std::int64_t motor = 0;
-    std::int64_t pulled = -1;  // which of the pulled motors it is, -1 if it is none
-    double scale = 0.0;        // by how much it moves the joint,
-    double lever = 0.0;        // and that in the unit of the motor
+    std::int64_t pulled = -1;  // index among the pulled motors; -1 for a motor that is not pulled
+    double scale = 0.0;        // motion of the joint for a unit of the motor's position
+    double lever = 0.0;        // motion of the joint for 1 rad of the gains: scale * MotorGains::unit; 0 for a motor that is not pulled
 };
 
 // A joint between base and marker.
 struct ReachJoint {
-    std::int64_t slides = 0;
-    std::int64_t pulled = 0;  // a pulled motor drives it
+    std::int64_t slides = 0;  // 1 for a prismatic joint
+    std::int64_t pulled = 0;  // whether a pulled motor drives it
     Interval drives;
-    Vec3 axis, pivot;  // at zero pose, root frame
-    double offset = 0.0;
-    // Of the last pose.  `seen`: the marker in the frame of what carries the joint, and that frame.
+    Vec3 axis, pivot;         // at zero pose, root frame
+    double offset = 0.0;      // position of the joint when its motors are at 0
+    // At the last pose:
     double angle = 0.0, sine = 0.0, cosine = 0.0;
-    Vec3 seen;
-    Rotation frame;
-    Vec3 motion, turning;  // of the marker along the joint, root frame
+    Vec3 marker;           // position of the marker in the frame of the link that carries the joint [m]
+    Rotation frame;        // rotation of the link that carries the joint
+    Vec3 linear, angular;  // velocity of the marker for unit velocity of the joint, root frame
 };
 
-// A motor that is pulled; its numbers in the unit of the motor.
+// A motor that pulls the marker.  Its position counts in MotorGains::unit.
 struct PulledMotor {
     std::int64_t motor = 0;
-    double column[6] = {};  // of the marker's Jacobian
-    double slope = 0.0;     // J^T error: how fast half the square of the error falls, m^2/rad
-    double ease = 0.0;      // how fast the motor goes for a torque of 1, 0 where a limit keeps it
-    double force = 0.0;
-    double way = 0.0, before = 0.0;     // out of a singular pose, now and the last time
-    double bent = 0.0;                  // along which the marker's path bends most
-    double limited = 0.0, held = 0.0;   // how strongly its limit holds it back, and what else does
+    double column[6] = {};  // column of the marker's Jacobian
+    double descent = 0.0;   // element of J^T error: the negative gradient of half the squared error, m^2/rad
+    double mobility = 0.0;  // velocity for a force of 1; 0 where a limit blocks the motor
+    double force = 0.0;     // rad/s^2
+    double escape = 0.0, last_escape = 0.0;  // elements of the unit direction out of a singular pose: present, and previous
+    double bend_direction = 0.0;             // element of the unit direction along which the marker's path curves most
+    double limit_resistance = 0.0;           // size of the limit force if it opposes the pull, else 0
+    double obstruction = 0.0;                // the other forces on the motor without the limit force
 };
 
 struct Reach {
-    std::int64_t part = 0;  // the first motor of the part
-    std::int64_t surface = 0, turned = 0;  // what is asked for: the target's surface; the marker's normal
-    std::int64_t used = 0;  // joints up to the last that a pulled motor drives
-    View<ReachJoint> joints;
+    std::int64_t part = 0;          // first motor of the part; -1 for a reach of the whole body
+    std::int64_t to_surface = 0;    // whether the target is the surface of a ball, else its centre
+    std::int64_t turns_normal = 0;  // whether the marker's normal is turned to `target_normal`
+    std::int64_t joint_count = 0;   // number of joints up to the last one that a pulled motor drives
+    View<ReachJoint> joints;        // from the base to the marker
     View<const ReachDrive> drives;
     View<PulledMotor> motors;
-    double* curve = nullptr;  // (motors, motors): how J^T of the error, or of the force, changes with each motor
-    Vec3 target, wanted;      // where the marker is to be, where its normal is to point; root frame
-    double radius = 0.0;      // m, of the target
-    Vec3 point, normal;       // of the marker at zero pose, root frame
-    // Of the last pose: marker, its normal, what is missing (to the target in m, and to the normal), and its length [m].
-    Vec3 at, facing;
-    double error[6] = {};
-    double missing = 0.0;
-    // What the default law remembers: what is missing without the encoders' noise, its length [m], the least so far [m] and for how
-    // long [s].
-    double seen[6] = {};
-    double left = 0.0, best = 0.0, since = 0.0;
-    std::int64_t begun = 0;
+    double* curvature = nullptr;    // (motors, motors), second derivatives, filled when they are needed
+    Vec3 target, target_normal;     // of the target: position and wanted direction of the normal, root frame
+    double radius = 0.0;            // m, of the target
+    Vec3 point, normal;             // of the marker at zero pose, root frame
+    // At the last pose:
+    Vec3 marker_position, marker_normal;
+    double error[6] = {};   // from marker to target [m], then from the marker's normal to the target's (cross product)
+    double distance = 0.0;  // length of the position error [m]
+    // State of the default law:
+    double smoothed_error[6] = {};       // the error averaged over the noise of the encoders; normals weighted by an arm [m]
+    double smoothed_distance = 0.0;      // its length [m]
+    double least_distance = 0.0;         // the smallest of these lengths so far [m]
+    double time_without_progress = 0.0;  // s, since `least_distance` has decreased
+    std::int64_t started = 0;            // whether the state has been initialised
 
-    int rows() const { return turned ? 6 : 3; }
+    int rows() const { return turns_normal ? 6 : 3; }
 };
 
-// Add the forces of reaches at the measured q (n,) to `total` (n,), which has all others.  `q` is the same afterwards.
+// Add the forces of reaches at the measured q (n,) to `total` (n,), which holds the sum of all other forces.  `q` is changed during the
+// call and restored.
 void add_reaches(const Law& law, View<Reach* const> reaches, double* q, const double* attractor, double dt, double* total);
 
-// Whether the part that begins with that motor reaches, and goes on although it has settled; never under the published law.
-bool goes_on(const Law& law, View<Reach* const> reaches, std::int64_t part);
+// Return whether the part whose first motor is `part` reaches and its marker still comes nearer.  False under the published law.
+bool is_approaching(const Law& law, View<Reach* const> reaches, std::int64_t part);
 
-// Bring the marker, and the columns of the motors that are pulled, to q; then what is missing.
+// Compute the marker's position and normal and the Jacobian columns of the pulled motors at q.
 void place_marker(Reach& reach, const double* q);
-void note_error(Reach& reach);
 
-// Fill the motors' forces, before they are bounded, of a marker that is in place; whether `way` leads out of this pose.  `against`
-// (n,): what else acts on the motors than their springs.
-bool pull_marker(const Law& law, Reach& reach, double* q, double dt, const double* against);
+// Compute error and distance for the present marker.
+void update_error(Reach& reach);
 
-// Take the springs of the motors that are pulled away from `total`, and where they are `nudged` draw them a little along `way`.
-void add_release(const Law& law, const Reach& reach, bool nudged, const double* q, const double* attractor, double* total);
+// Fill the motors' forces of the default law, before they are bounded, for a placed marker.  `other_forces` (n,) act on the motors
+// besides their springs.  Return whether the pose is singular and `escape` was filled.
+bool compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces);
 
-// Whether the marker is not there yet and still comes nearer.
-bool nears(const Reach& reach);
+// Cancel the springs of the pulled motors in `total`.  If `escapes`, add springs towards a point along `escape` in their place.
+void replace_springs(const Law& law, const Reach& reach, bool escapes, const double* q, const double* attractor, double* total);
+
+// Return whether the marker has not arrived yet and has come nearer recently.
+bool has_progress(const Reach& reach);
 
 }  // namespace mobee

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The default reach law: the marker comes nearer at one rate in every direction, wherever the arm is.
+// The default reach law: the error of the marker decays at one rate in every direction, in all poses that are not singular.
 //
-// The force on the marker is (J E J^T + damping)^-1 times what is missing, E how much each motor gives way, and so weak that the bend
-// of the marker's path does not make it swing.  In a singular pose, where J^T f is zero, motors are nudged along a way on which the
-// error falls on both sides.  What holds the motors back, limits, clauses or contacts, is a wall along which the marker goes on.
+// The force on the marker is (J E J^T + damping)^-1 times the error.  E is the diagonal matrix of the motors' mobilities.  The damping is
+// raised where the curvature of the marker's path would make the marker oscillate.  In a singular pose, where J^T f is zero, springs move
+// the motors along a direction in which the error decreases both forward and backward.  Limits, clauses and contacts that oppose the
+// force are treated as a wall, and the marker slides along it.
 #include <algorithm>
 #include <cmath>
 
@@ -13,93 +14,93 @@ namespace mobee {
 
 namespace pull {
 
-constexpr double rate = 5.0;        // 1/s: far below what swings with commands three ticks old at 100 Hz (docs/law.md)
-constexpr double arm = 0.1;         // m: a normal that is wrong by an angle counts as a position wrong by this times the angle
-constexpr double softness = 0.03;   // of the size of J E J^T: damping
-constexpr int softer = 60;          // times at most that it is doubled: more than any finite force needs
-constexpr double nothing = 1e-12;   // m^2/s, what a marker gives that nothing moves
-constexpr double longest = 0.2;     // m: beyond it the pull grows no more
-constexpr double tolerance = 2e-3;  // m
-constexpr double weakness = 0.05;   // of the error's force that arrives at the motors: below it the pose is singular
-constexpr double nudge = 0.1;       // rad, out of a singular pose
-constexpr double smooth = 0.25;     // s, over which the error is averaged before it is judged
-constexpr double patience = 3.0;    // s without coming nearer: no way out is tried any more
-constexpr double wait = 0.6;        // s: what has come nearer since has not arrived
-constexpr double better = 5e-4;     // m, that count as nearer
-constexpr double wall = 0.5;        // rad/s^2: what holds the motors back half counts as a wall where it is that strong
-constexpr double curved = 1e-3;     // of the size of J E J^T: curvature that counts
-constexpr double probe_size = 1e-4; // rad
-constexpr int few_turns = 12, turns = 60;  // of the power iteration
+constexpr double rate = 5.0;        // 1/s; far below the rate that oscillates with commands three ticks old at 100 Hz (docs/law.md)
+constexpr double arm = 0.1;         // m; an angular error of the normal counts as a position error of this length times the angle
+constexpr double relative_damping = 0.03;   // least damping, relative to the Frobenius norm of J E J^T
+constexpr int max_doublings = 60;          // of the damping; more than any finite force needs
+constexpr double min_mobility = 1e-12;   // m^2/s; lower bound of the norm of J E J^T, for a marker that no motor moves
+constexpr double saturation_length = 0.2;     // m; the force is half of its bound at this error
+constexpr double tolerance = 2e-3;  // m, error of a reached target
+constexpr double singular_share = 0.05;   // a pose is singular if less than this share of the force on the marker moves the motors
+constexpr double escape_step = 0.1;       // rad, distance of the springs' goal in a singular pose
+constexpr double smoothing_time = 0.25;     // s, time constant of the average of the error
+constexpr double escape_timeout = 3.0;    // s without progress, after which no escape from a singular pose is tried
+constexpr double stall_time = 0.6;        // s without progress, after which a reach has ended
+constexpr double min_progress = 5e-4;     // m, decrease of the error that counts as progress
+constexpr double wall_force = 0.5;        // rad/s^2; an opposing force of this size halves the mobility along it
+constexpr double min_curvature = 1e-3;     // least curvature of an escape direction, relative to the norm of J E J^T
+constexpr double probe_size = 1e-4;  // rad, of finite differences
+constexpr int bend_iterations = 12, escape_iterations = 60;  // iterations of the power method
 
-// What a row of the Jacobian counts [m]: 1 for positions, `arm` for normals.
+// Return the weight of a row of the Jacobian: 1 for positions, `arm` [m] for normals.
 constexpr double weight(int row) { return row < 3 ? 1.0 : arm; }
 
-// The equations of the force on the marker: J E J^T, its triangular root, and the force.
+// The linear system for the force on the marker: J E J^T, its Cholesky factor, and the force.
 struct Push {
-    double give[6][6];
+    double mobility[6][6];
     double root[6][6];
     double force[6];
 };
 
-// Average the error, keep for how long it has not become less; what is missing [m].
-double note_missing(Reach& reach, double dt) {
-    const double share = reach.begun ? std::min(1.0, dt / smooth) : 1.0;
+// Update the smoothed error and the time without progress.  Return the length of the smoothed error [m].
+double smooth_error(Reach& reach, double dt) {
+    const double share = reach.started ? std::min(1.0, dt / smoothing_time) : 1.0;
     double squares = 0.0;
     for (int row = 0; row < reach.rows(); ++row) {
-        reach.seen[row] += (weight(row) * reach.error[row] - reach.seen[row]) * share;
-        squares += reach.seen[row] * reach.seen[row];
+        reach.smoothed_error[row] += (weight(row) * reach.error[row] - reach.smoothed_error[row]) * share;
+        squares += reach.smoothed_error[row] * reach.smoothed_error[row];
     }
-    const double missing = std::sqrt(squares);
-    if (!reach.begun || missing < reach.best - better) {
-        reach.best = missing;
-        reach.since = 0.0;
+    const double remaining = std::sqrt(squares);
+    if (!reach.started || remaining < reach.least_distance - min_progress) {
+        reach.least_distance = remaining;
+        reach.time_without_progress = 0.0;
     }
-    reach.begun = 1;
-    reach.since += dt;
-    reach.left = missing;
-    return missing;
+    reach.started = 1;
+    reach.time_without_progress += dt;
+    reach.smoothed_distance = remaining;
+    return remaining;
 }
 
-void find_slopes(Reach& reach) {
+void compute_descent(Reach& reach) {
     for (PulledMotor& motor : reach.motors) {
-        motor.slope = 0.0;
-        for (int row = 0; row < reach.rows(); ++row) motor.slope += weight(row) * weight(row) * motor.column[row] * reach.error[row];
+        motor.descent = 0.0;
+        for (int row = 0; row < reach.rows(); ++row) motor.descent += weight(row) * weight(row) * motor.column[row] * reach.error[row];
     }
 }
 
-// Slope of the squash over damping; 0 for a motor that a limit keeps.
-void ease_motors(const Law& law, Reach& reach, const double* q) {
+// Compute the mobility of each motor: slope of the squash divided by damping; 0 for a motor that a limit blocks.
+void compute_mobility(const Law& law, Reach& reach, const double* q) {
     for (PulledMotor& motor : reach.motors) {
         const MotorGains& gains = law.motors[motor.motor];
         const double here = q[motor.motor];
-        const double low = gains.low + 0.5 * gains.below, high = gains.high - 0.5 * gains.above;
-        const bool kept = (here < low && motor.slope < 0.0) || (here > high && motor.slope > 0.0);
-        motor.ease = kept ? 0.0 : gains.client_slope / gains.damping;
+        const double low = gains.low + 0.5 * gains.low_zone, high = gains.high - 0.5 * gains.high_zone;
+        const bool is_blocked = (here < low && motor.descent < 0.0) || (here > high && motor.descent > 0.0);
+        motor.mobility = is_blocked ? 0.0 : gains.client_slope / gains.damping;
     }
 }
 
-// Fill J E J^T; its size.
-double fill_give(const Reach& reach, Push& push) {
+// Fill J E J^T.  Return its Frobenius norm.
+double compute_marker_mobility(const Reach& reach, Push& push) {
     double squares = 0.0;
     for (int a = 0; a < reach.rows(); ++a) {
         for (int b = 0; b < reach.rows(); ++b) {
             double total = 0.0;
-            for (const PulledMotor& motor : reach.motors) total += motor.column[a] * motor.ease * motor.column[b];
+            for (const PulledMotor& motor : reach.motors) total += motor.column[a] * motor.mobility * motor.column[b];
             total *= weight(a) * weight(b);
-            push.give[a][b] = total;
+            push.mobility[a][b] = total;
             squares += total * total;
         }
     }
-    return std::max(std::sqrt(squares), nothing);
+    return std::max(std::sqrt(squares), min_mobility);
 }
 
-// Replace the force by the solution of (J E J^T / size + soft) x = force (Cholesky).
-void solve(Push& push, int rows, double size, double soft) {
+// Replace the force by the solution of (J E J^T / size + damping) x = force (Cholesky).
+void solve(Push& push, int rows, double size, double damping) {
     auto& root = push.root;
     double* x = push.force;
     for (int a = 0; a < rows; ++a) {
         for (int b = 0; b <= a; ++b) {
-            double total = push.give[a][b] / size + (a == b ? soft : 0.0);
+            double total = push.mobility[a][b] / size + (a == b ? damping : 0.0);
             for (int c = 0; c < b; ++c) total -= root[a][c] * root[b][c];
             root[a][b] = a == b ? std::sqrt(total) : total / root[b][b];
         }
@@ -114,34 +115,36 @@ void solve(Push& push, int rows, double size, double soft) {
     }
 }
 
-// No less than `bend`, at little cost: for joints i before j the path's second derivative is the axis of i times the motion of j.
-double bend_at_most(const Reach& reach, const Push& push) {
-    double levers = 0.0, axes = 0.0, force = 0.0, twist = 0.0;
+// Return an upper bound of `max_bend` at low cost.  For joints i before j, the second derivative of the marker's path is the cross product
+// of the axis of i and the motion of j.
+double bend_bound(const Reach& reach, const Push& push) {
+    double levers = 0.0, axes = 0.0, force = 0.0, normal_force = 0.0;
     for (const PulledMotor& motor : reach.motors) {
         for (int row = 0; row < 3; ++row) {
-            levers += motor.column[row] * motor.column[row] * motor.ease;
-            axes += motor.column[3 + row] * motor.column[3 + row] * motor.ease;
+            levers += motor.column[row] * motor.column[row] * motor.mobility;
+            axes += motor.column[3 + row] * motor.column[3 + row] * motor.mobility;
         }
     }
     for (int row = 0; row < 3; ++row) {
         force += push.force[row] * push.force[row];
-        if (reach.turned) twist += push.force[3 + row] * push.force[3 + row];
+        if (reach.turns_normal) normal_force += push.force[3 + row] * push.force[3 + row];
     }
-    return std::sqrt(force * levers * axes) + arm * std::sqrt(twist) * axes;
+    return std::sqrt(force * levers * axes) + arm * std::sqrt(normal_force) * axes;
 }
 
-// The force times the second derivative of the marker's pose along joint a, the nearer to the base, and b.
-double bend_of(const Reach& reach, const Push& push, std::int64_t a, std::int64_t b) {
+// Return the dot product of the force and the second derivative of the marker's pose along joints a and b; a is nearer to the base.
+double joint_bend(const Reach& reach, const Push& push, std::int64_t a, std::int64_t b) {
     const ReachJoint &first = reach.joints[a], &second = reach.joints[b];
     const Vec3 force = {push.force[0], push.force[1], push.force[2]};
-    const double found = dot(force, cross(first.turning, second.motion));
-    if (!reach.turned || a == b) return found;
-    const Vec3 twist = {push.force[3], push.force[4], push.force[5]};
-    return found + 0.5 * arm * dot(twist, cross(first.turning, second.turning));
+    const double bend = dot(force, cross(first.angular, second.linear));
+    if (!reach.turns_normal || a == b) return bend;
+    const Vec3 normal_force = {push.force[3], push.force[4], push.force[5]};
+    return bend + 0.5 * arm * dot(normal_force, cross(first.angular, second.angular));
 }
 
-// The largest eigenvalue of the matrix times `sign`, all of them within +-`shift`; its vector in `vector`, where it starts.
-double largest(Reach& reach, double shift, double sign, double PulledMotor::* vector, int count) {
+// Return the largest eigenvalue of `sign` times the curvature matrix by the power method.  All eigenvalues are within +-`shift`.  `vector`
+// holds the start vector, and afterwards the eigenvector.
+double largest_eigenvalue(Reach& reach, double shift, double sign, double PulledMotor::* vector, int count) {
     const std::int64_t moved = reach.motors.size;
     double length = 0.0;
     for (int turn = 0; turn < count; ++turn) {
@@ -149,58 +152,60 @@ double largest(Reach& reach, double shift, double sign, double PulledMotor::* ve
         for (std::int64_t k = 0; k < moved; ++k) {
             PulledMotor& motor = reach.motors[k];
             motor.force = shift * motor.*vector;
-            for (std::int64_t m = 0; m < moved; ++m) motor.force += sign * reach.curve[k * moved + m] * reach.motors[m].*vector;
+            for (std::int64_t m = 0; m < moved; ++m) motor.force += sign * reach.curvature[k * moved + m] * reach.motors[m].*vector;
             squares += motor.force * motor.force;
         }
         length = std::sqrt(squares);
-        for (PulledMotor& motor : reach.motors) motor.*vector = length > 0.0 && motor.ease > 0.0 ? motor.force / length : 0.0;
+        for (PulledMotor& motor : reach.motors) motor.*vector = length > 0.0 && motor.mobility > 0.0 ? motor.force / length : 0.0;
     }
     return length - shift;
 }
 
-// Add what the bend along joints a and b is for each pair of motors that drive them to the matrix.
+// Add the bend along joints a and b to the curvature matrix, for each pair of motors that drive them.
 void add_bend(Reach& reach, std::int64_t a, std::int64_t b, double along) {
     const std::int64_t moved = reach.motors.size;
     const Interval first = reach.joints[a].drives, second = reach.joints[b].drives;
     for (std::int64_t c = first.first; c < first.end; ++c) {
         for (std::int64_t d = second.first; d < second.end; ++d) {
-            const ReachDrive &one = reach.drives[c], &two = reach.drives[d];
-            const double both = one.lever * two.lever;
-            if (both == 0.0) continue;
-            const double value = -along * both * std::sqrt(reach.motors[one.pulled].ease * reach.motors[two.pulled].ease);
-            reach.curve[one.pulled * moved + two.pulled] += value;
-            if (a != b) reach.curve[two.pulled * moved + one.pulled] += value;
+            const ReachDrive &first_drive = reach.drives[c], &second_drive = reach.drives[d];
+            const double levers = first_drive.lever * second_drive.lever;
+            if (levers == 0.0) continue;
+            const double mobilities = reach.motors[first_drive.pulled].mobility * reach.motors[second_drive.pulled].mobility;
+            const double value = -along * levers * std::sqrt(mobilities);
+            reach.curvature[first_drive.pulled * moved + second_drive.pulled] += value;
+            if (a != b) reach.curvature[second_drive.pulled * moved + first_drive.pulled] += value;
         }
     }
 }
 
-// What the bend of the marker's path adds to the stiffness of the force at most, along any motion, as the motors give way.
-double bend(Reach& reach, const Push& push) {
+// Return the largest stiffness [1/s] that the curvature of the marker's path adds to the force, over all directions of motion.
+double max_bend(Reach& reach, const Push& push) {
     const std::int64_t moved = reach.motors.size;
-    std::fill_n(reach.curve, moved * moved, 0.0);
-    for (std::int64_t a = 0; a < reach.used; ++a)
-        for (std::int64_t b = a; b < reach.used; ++b)
-            if (reach.joints[a].pulled && reach.joints[b].pulled) add_bend(reach, a, b, bend_of(reach, push, a, b));
+    std::fill_n(reach.curvature, moved * moved, 0.0);
+    for (std::int64_t a = 0; a < reach.joint_count; ++a)
+        for (std::int64_t b = a; b < reach.joint_count; ++b)
+            if (reach.joints[a].pulled && reach.joints[b].pulled) add_bend(reach, a, b, joint_bend(reach, push, a, b));
     double squares = 0.0;
     for (std::int64_t k = 0; k < moved; ++k) {
-        for (std::int64_t m = 0; m < moved; ++m) squares += reach.curve[k * moved + m] * reach.curve[k * moved + m];
-        reach.motors[k].bent = 1.0 + 0.1 * static_cast<double>(k);
+        for (std::int64_t m = 0; m < moved; ++m) squares += reach.curvature[k * moved + m] * reach.curvature[k * moved + m];
+        reach.motors[k].bend_direction = 1.0 + 0.1 * static_cast<double>(k);
     }
-    return largest(reach, std::sqrt(squares), 1.0, &PulledMotor::bent, few_turns);
+    return largest_eigenvalue(reach, std::sqrt(squares), 1.0, &PulledMotor::bend_direction, bend_iterations);
 }
 
-// The force on the marker: as much in every direction as gives the rate, less where the bend of its path would make it swing.
+// Compute the force on the marker that makes its error decay at `rate`.  Double the damping until the curvature of the marker's path
+// cannot make it oscillate.
 void push_marker(Reach& reach, Push& push, double size, double scale) {
-    double soft = softness;
-    for (int time = 0; time < softer; ++time) {
+    double damping = relative_damping;
+    for (int time = 0; time < max_doublings; ++time) {
         for (int row = 0; row < reach.rows(); ++row) push.force[row] = rate * scale * weight(row) * reach.error[row] / size;
-        solve(push, reach.rows(), size, soft);
-        if (bend_at_most(reach, push) < rate || bend(reach, push) < rate) return;
-        soft *= 2.0;
+        solve(push, reach.rows(), size, damping);
+        if (bend_bound(reach, push) < rate || max_bend(reach, push) < rate) return;
+        damping *= 2.0;
     }
 }
 
-// J^T of the force on the marker.
+// Compute the motors' forces: J^T times the force on the marker.
 void force_motors(Reach& reach, const Push& push) {
     for (PulledMotor& motor : reach.motors) {
         motor.force = 0.0;
@@ -208,145 +213,146 @@ void force_motors(Reach& reach, const Push& push) {
     }
 }
 
-// How fast the force moves the motors along what holds them back; below 0: into it.
-double speed_of_held(const Reach& reach) {
+// Return the velocity of the motors along the obstructing force; below 0: they move into the obstacle.
+double speed_along_obstruction(const Reach& reach) {
     double speed = 0.0;
-    for (const PulledMotor& motor : reach.motors) speed += motor.held * motor.ease * motor.force;
+    for (const PulledMotor& motor : reach.motors) speed += motor.obstruction * motor.mobility * motor.force;
     return speed;
 }
 
-// Split what acts against the force: the limit of each motor, and the rest; whether any of it does.
-bool is_held_back(const Law& law, Reach& reach, const double* q, const double* against) {
+// Split the other forces into the limit force of each motor and the rest.  Return whether any of them opposes the motors' forces.
+bool is_obstructed(const Law& law, Reach& reach, const double* q, const double* other_forces) {
     bool limited = false;
     for (PulledMotor& motor : reach.motors) {
         const MotorGains& gains = law.motors[motor.motor];
         const double limit = limit_force(gains, q[motor.motor]);
-        motor.limited = limit * motor.force < 0.0 ? std::fabs(limit) / gains.unit : 0.0;
-        motor.held = (against[motor.motor] - limit) / gains.unit;
-        limited = limited || motor.limited > 0.0;
+        motor.limit_resistance = limit * motor.force < 0.0 ? std::fabs(limit) / gains.unit : 0.0;
+        motor.obstruction = (other_forces[motor.motor] - limit) / gains.unit;
+        limited = limited || motor.limit_resistance > 0.0;
     }
-    return limited || speed_of_held(reach) < 0.0;
+    return limited || speed_along_obstruction(reach) < 0.0;
 }
 
-// Take `held` as a direction in which the motors give no way, the less the weaker it is; how much of it is taken.
-double face_wall(const Reach& reach, Push& push) {
+// Remove the mobility along `obstruction`, by a share that grows with the size of the obstruction.  Return the share, divided by the
+// mobility along it.
+double remove_obstructed_mobility(const Reach& reach, Push& push) {
     double squares = 0.0, across = 0.0;
     for (const PulledMotor& motor : reach.motors) {
-        squares += motor.held * motor.held;
-        across += motor.held * motor.ease * motor.held;
+        squares += motor.obstruction * motor.obstruction;
+        across += motor.obstruction * motor.mobility * motor.obstruction;
     }
     if (across == 0.0) return 0.0;
     const double length = std::sqrt(squares);
-    const double share = length / (length + wall) / across;
+    const double share = length / (length + wall_force) / across;
     double away[6] = {};
     for (int row = 0; row < reach.rows(); ++row)
-        for (const PulledMotor& motor : reach.motors) away[row] += weight(row) * motor.column[row] * motor.ease * motor.held;
+        for (const PulledMotor& motor : reach.motors) away[row] += weight(row) * motor.column[row] * motor.mobility * motor.obstruction;
     for (int a = 0; a < reach.rows(); ++a)
-        for (int b = 0; b < reach.rows(); ++b) push.give[a][b] -= share * away[a] * away[b];
+        for (int b = 0; b < reach.rows(); ++b) push.mobility[a][b] -= share * away[a] * away[b];
     return share;
 }
 
-// Fill the forces again for motors that are held back: along the wall, not into it.
+// Compute the forces again for obstructed motors: along the obstacle, not into it.
 void slide(Reach& reach, Push& push, double size, double scale) {
-    const double before = speed_of_held(reach);
-    for (PulledMotor& motor : reach.motors) motor.ease *= wall / (wall + motor.limited);
-    fill_give(reach, push);
-    const double share = before < 0.0 ? face_wall(reach, push) : 0.0;
+    const double before = speed_along_obstruction(reach);
+    for (PulledMotor& motor : reach.motors) motor.mobility *= wall_force / (wall_force + motor.limit_resistance);
+    compute_marker_mobility(reach, push);
+    const double share = before < 0.0 ? remove_obstructed_mobility(reach, push) : 0.0;
     push_marker(reach, push, size, scale);
     force_motors(reach, push);
-    const double speed = speed_of_held(reach);
+    const double speed = speed_along_obstruction(reach);
     for (PulledMotor& motor : reach.motors)
-        motor.force = (motor.force - share * speed * motor.held) * wall / (wall + motor.limited);
+        motor.force = (motor.force - share * speed * motor.obstruction) * wall_force / (wall_force + motor.limit_resistance);
 }
 
-void see_from(Reach& reach, const double* q) {
+void update_reach(Reach& reach, const double* q) {
     place_marker(reach, q);
-    note_error(reach);
-    find_slopes(reach);
+    update_error(reach);
+    compute_descent(reach);
 }
 
-// Fill how half the square of the error curves along pairs of motors, as they give way; its size.
-double curve(const Law& law, Reach& reach, double* q) {
+// Fill the curvature matrix with the Hessian of half the squared error, scaled by the motors' mobilities.  Return its Frobenius norm.
+double compute_curvature(const Law& law, Reach& reach, double* q) {
     const std::int64_t moved = reach.motors.size;
     for (std::int64_t k = 0; k < moved; ++k) {
         const std::int64_t i = reach.motors[k].motor;
         const double here = q[i], probe = probe_size * law.motors[i].unit;
-        double* row = reach.curve + k * moved;
+        double* row = reach.curvature + k * moved;
         q[i] = here + probe;
-        see_from(reach, q);
-        for (std::int64_t m = 0; m < moved; ++m) row[m] = reach.motors[m].slope;
+        update_reach(reach, q);
+        for (std::int64_t m = 0; m < moved; ++m) row[m] = reach.motors[m].descent;
         q[i] = here + -probe;
-        see_from(reach, q);
-        for (std::int64_t m = 0; m < moved; ++m) row[m] = (reach.motors[m].slope - row[m]) / (2.0 * probe_size);
+        update_reach(reach, q);
+        for (std::int64_t m = 0; m < moved; ++m) row[m] = (reach.motors[m].descent - row[m]) / (2.0 * probe_size);
         q[i] = here;
     }
     double squares = 0.0;
     for (std::int64_t k = 0; k < moved; ++k) {
         for (std::int64_t m = 0; m <= k; ++m) {
-            double &one = reach.curve[k * moved + m], &two = reach.curve[m * moved + k];
-            const double both = 0.5 * (one + two) * std::sqrt(reach.motors[k].ease * reach.motors[m].ease);
-            one = two = both;
-            squares += k == m ? both * both : 2.0 * both * both;
+            double &lower = reach.curvature[k * moved + m], &upper = reach.curvature[m * moved + k];
+            const double mean = 0.5 * (lower + upper) * std::sqrt(reach.motors[k].mobility * reach.motors[m].mobility);
+            lower = upper = mean;
+            squares += k == m ? mean * mean : 2.0 * mean * mean;
         }
     }
-    see_from(reach, q);
+    update_reach(reach, q);
     return std::sqrt(squares);
 }
 
-// From a pose that the pull does not move: the way along which the error falls on both sides; false if there is none.
-bool find_way(const Law& law, Reach& reach, double* q, double size) {
-    const double shift = curve(law, reach, q);
+// Find a direction out of a singular pose along which the error decreases both forward and backward.  Return false if none exists.
+bool find_escape(const Law& law, Reach& reach, double* q, double size) {
+    const double shift = compute_curvature(law, reach, q);
     for (std::int64_t k = 0; k < reach.motors.size; ++k) {
-        reach.motors[k].before = reach.motors[k].way;
-        reach.motors[k].way = 1.0 + 0.1 * static_cast<double>(k);
+        reach.motors[k].last_escape = reach.motors[k].escape;
+        reach.motors[k].escape = 1.0 + 0.1 * static_cast<double>(k);
     }
-    if (largest(reach, shift, -1.0, &PulledMotor::way, turns) < curved * size) {
-        for (PulledMotor& motor : reach.motors) motor.way = 0.0;
+    if (largest_eigenvalue(reach, shift, -1.0, &PulledMotor::escape, escape_iterations) < min_curvature * size) {
+        for (PulledMotor& motor : reach.motors) motor.escape = 0.0;
         return false;
     }
     double before = 0.0, middle = 0.0;
     for (const PulledMotor& motor : reach.motors) {
         const MotorGains& gains = law.motors[motor.motor];
-        before += motor.way * motor.before;
-        middle += motor.way * (0.5 * (gains.low + gains.high) - q[motor.motor]);
+        before += motor.escape * motor.last_escape;
+        middle += motor.escape * (0.5 * (gains.low + gains.high) - q[motor.motor]);
     }
     if (before < 0.0 || (before == 0.0 && middle < 0.0))
-        for (PulledMotor& motor : reach.motors) motor.way = -motor.way;
+        for (PulledMotor& motor : reach.motors) motor.escape = -motor.escape;
     return true;
 }
 
 }  // namespace pull
 
-bool pull_marker(const Law& law, Reach& reach, double* q, double dt, const double* against) {
-    const double missing = pull::note_missing(reach, dt);
-    pull::find_slopes(reach);
-    pull::ease_motors(law, reach, q);
+bool compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces) {
+    const double remaining = pull::smooth_error(reach, dt);
+    pull::compute_descent(reach);
+    pull::compute_mobility(law, reach, q);
     pull::Push push;
-    const double size = pull::fill_give(reach, push);
-    double squares = 0.0, arriving = 0.0;
+    const double size = pull::compute_marker_mobility(reach, push);
+    double squares = 0.0, effective = 0.0;
     for (int row = 0; row < reach.rows(); ++row)
         squares += pull::weight(row) * reach.error[row] * pull::weight(row) * reach.error[row];
-    for (const PulledMotor& motor : reach.motors) arriving += motor.slope * motor.ease * motor.slope;
-    const bool weak = arriving < pull::weakness * pull::weakness * size * squares;
-    const bool lost = weak && missing > pull::tolerance && reach.since <= pull::patience;
-    const bool nudged = lost && pull::find_way(law, reach, q, size);
-    const double fading = missing / (missing + 0.5 * pull::tolerance);  // so that at the target the encoders' noise is not followed
-    const double scale = fading / (1.0 + std::sqrt(squares) / pull::longest);
+    for (const PulledMotor& motor : reach.motors) effective += motor.descent * motor.mobility * motor.descent;
+    const bool is_singular = effective < pull::singular_share * pull::singular_share * size * squares;
+    const bool needs_escape = is_singular && remaining > pull::tolerance && reach.time_without_progress <= pull::escape_timeout;
+    const bool escapes = needs_escape && pull::find_escape(law, reach, q, size);
+    const double fade = remaining / (remaining + 0.5 * pull::tolerance);  // at the target the motors do not follow the encoders' noise
+    const double scale = fade / (1.0 + std::sqrt(squares) / pull::saturation_length);
     pull::push_marker(reach, push, size, scale);
     pull::force_motors(reach, push);
-    if (pull::is_held_back(law, reach, q, against)) pull::slide(reach, push, size, scale);
-    return nudged;
+    if (pull::is_obstructed(law, reach, q, other_forces)) pull::slide(reach, push, size, scale);
+    return escapes;
 }
 
-void add_release(const Law& law, const Reach& reach, bool nudged, const double* q, const double* attractor, double* total) {
+void replace_springs(const Law& law, const Reach& reach, bool escapes, const double* q, const double* attractor, double* total) {
     for (const PulledMotor& motor : reach.motors) {
         const std::int64_t i = motor.motor;
         const MotorGains& gains = law.motors[i];
         total[i] -= squash(attractor[i] - q[i], gains.max_spring, gains.spring_knee);
-        if (nudged) total[i] += squash(pull::nudge * motor.way * gains.unit, gains.max_spring, gains.spring_knee);
+        if (escapes) total[i] += squash(pull::escape_step * motor.escape * gains.unit, gains.max_spring, gains.spring_knee);
     }
 }
 
-bool nears(const Reach& reach) { return reach.left > 0.75 * pull::tolerance && reach.since < pull::wait; }
+bool has_progress(const Reach& reach) { return reach.smoothed_distance > 0.75 * pull::tolerance && reach.time_without_progress < pull::stall_time; }
 
 }  // namespace mobee

@@ -9,9 +9,9 @@
 
 namespace mobee {
 
-// One state of the world as Python makes it, see mobee/model/snapshot.py; all is copied but the robot.
+// A snapshot of the world as Python lays it out, see mobee/model/snapshot.py.  Everything except the robot is copied.
 struct WorldTables {
-    std::int64_t objects, carried, side;  // side: cells of the grid along its longest side
+    std::int64_t objects, carried, side;  // side: number of grid cells along the longest side
     const VolumeRow* volume;              // (objects,)
     const std::int64_t* role;             // (objects,)
     const std::int64_t* which;            // (carried,)
@@ -24,9 +24,9 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 bool is_free(std::int64_t role) { return role == obstacle || role == target; }
 
-// The objects that the grid holds, without large ones: their box, and the widest.
+// The bounding box of the objects in the grid, without the large ones, and the largest radius among them.
 struct Small {
-    double usual = 0.0;  // m: what has a larger radius is large
+    double usual = 0.0;  // m; an object with a larger radius is large
     Vec3 low{infinity, infinity, infinity}, high{-infinity, -infinity, -infinity};
     double widest = 0.0;
     std::int64_t count = 0;
@@ -81,7 +81,7 @@ std::int64_t cell_of(const Grid& grid, Vec3 center) {
     return number;
 }
 
-// In single precision, and no farther than what its squares can say; nothing near is as far.
+// Convert to single precision, clipped so that squares do not overflow; no nearby object is that far away.
 float single(double place) { return static_cast<float>(clamp(place, -1e15, 1e15)); }
 
 void put(Scene& scene, const WorldTables& from, std::int64_t which, std::int64_t place) {
@@ -99,7 +99,7 @@ void put(Scene& scene, const WorldTables& from, std::int64_t which, std::int64_t
     scene.target[place] = from.role[which] == target;
 }
 
-// Counting sort by cell, the large ones before all cells.
+// Sort the objects by cell (counting sort); large objects come before all cells.
 void sort_objects(Scene& scene, const WorldTables& from, double usual) {
     constexpr std::int64_t large = -1, absent = -2;
     Grid& grid = scene.grid;
@@ -135,7 +135,7 @@ bool carried_by(const Robot& robot, std::int64_t link, std::int64_t carrier) {
     return link == carrier;
 }
 
-bool spares(const Robot& robot, const Shape& shape, const Hands& hands) {
+bool ignores_targets(const Robot& robot, const Shape& shape, const Hands& hands) {
     for (const Hand& hand : hands.hand) {
         if (hand.link < 0) continue;
         if (carried_by(robot, shape.link, hand.link) || (shape.field && carried_by(robot, shape.link, hand.fields))) return true;
@@ -145,7 +145,7 @@ bool spares(const Robot& robot, const Shape& shape, const Hands& hands) {
 
 Span span(double offset, double along, double per_metre, std::int64_t cells) {
     const double last = static_cast<double>(cells) - 1.0;
-    // In this order NaN, of coordinates that have overflown, becomes a cell as well.
+    // With the arguments in this order, NaN from overflown coordinates also gives a valid cell.
     const double low = most((offset - along) * per_metre, 0.0), high = most((offset + along) * per_metre, 0.0);
     return {static_cast<std::int64_t>(least(low, last)), static_cast<std::int64_t>(least(high, last)) + 1};
 }
@@ -162,7 +162,7 @@ MOBEE_CALL Scene* mobee_scene_new(const Robot* robot, const WorldTables* from) {
 
 MOBEE_CALL void mobee_scene_free(Scene* scene) { discard(scene); }
 
-// For tests: how many objects there are, how many of them are large, and the cells along x, y and z.
+// For tests: the number of objects, the number of large ones, and the number of cells along x, y and z.
 MOBEE_CALL void mobee_scene_counts(const Scene* scene, std::int64_t* counts) {
     const Grid& grid = scene->grid;
     counts[0] = scene->objects();
@@ -170,7 +170,7 @@ MOBEE_CALL void mobee_scene_counts(const Scene* scene, std::int64_t* counts) {
     for (int axis = 0; axis < 3; ++axis) counts[2 + axis] = grid.cells[axis];
 }
 
-// For tests: where each cell begins (cells + 1,); of each object which it is, and whether it is a target, (objects, 2), and its centre.
+// For tests: the first object of each cell (cells + 1,); the index of each object and whether it is a target, (objects, 2); its centre.
 MOBEE_CALL void mobee_scene_objects(const Scene* scene, std::int64_t* starts, std::int64_t* objects, Vec3* centers) {
     for (const std::int64_t start : scene->grid.starts) *starts++ = start;
     for (std::int64_t k = 0; k < scene->objects(); ++k) {

@@ -49,7 +49,7 @@ struct Scene {
 bool carried_by(const Robot& robot, std::int64_t link, std::int64_t carrier);
 
 // Whether a shape is one of those that reach, which do not feel the targets.
-bool spares(const Robot& robot, const Shape& shape, const Hands& hands);
+bool ignores_targets(const Robot& robot, const Shape& shape, const Hands& hands);
 
 // The first cell, and the one past the last, that [offset - along, offset + along] reaches; what lies outside counts to the edge cells.
 struct Span {

@@ -13,14 +13,14 @@ from mobee._core import ADDRESS, INTEGER, REAL, function
 from mobee._core.tables import INTERVAL, WHOLE, View, columns
 
 MOTOR_GAINS = columns(
-    "low", "high", "max_spring", "spring_knee", "damping", "limit_slope", "below", "above", "client_slope", "max_client", "client_knee",
-    "max_speed", "max_acceleration", "max_torque", "leash", "unit", "fine",
+    "low", "high", "max_spring", "spring_knee", "damping", "limit_slope", "low_zone", "high_zone", "client_slope", "max_client",
+    "client_knee", "max_speed", "max_acceleration", "max_torque", "max_lead", "unit", "settle_unit",
 )  # fmt: skip
 CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])
 CLAUSE_ENTRY = np.dtype([("motor", WHOLE), ("factor", "f8"), ("normal", "f8")])
-STATE = columns("velocity", "acceleration", "sent", "reference", "feedforward")
-"""The state of a motor under the law: rad/s, rad/s^2, the velocity commanded last, the position reference, N m added to a torque."""
-SETTLE = ("speed", "acceleration", "first_look", "interval", "timeout")
+STATE = columns("velocity", "acceleration", "commanded", "reference", "feedforward")
+"""The state of a motor under the law: velocity, acceleration, last velocity command, position reference, feedforward torque [N m]."""
+SETTLE = ("speed", "acceleration", "first_check", "interval", "timeout")
 
 TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
 """The numbers of the terms that are common to all motors, by their names in `Gains`."""
@@ -34,17 +34,17 @@ class Settle(ctypes.Structure):
 
 
 class SettleTest(ctypes.Structure):
-    """The state of a settle test, s."""
+    """The state of a settle test: the start of the action and the time of the next check [s]."""
 
-    _fields_ = (("begun", REAL), ("next_look", REAL))
+    _fields_ = (("start", REAL), ("next_check", REAL))
 
 
 class Law(ctypes.Structure):
-    """A law with its numbers; the caller keeps the tables alive."""
+    """A law with its gains; the caller keeps the tables alive."""
 
     _fields_ = (
-        *((name, View) for name in ("motors", "active", "felt", "parts", "clauses", "rows", "entries")),
-        *((name, INTEGER) for name in ("published", "touching", "direction", "modality")),
+        *((name, View) for name in ("motors", "active", "constrained", "parts", "clauses", "rows", "entries")),
+        *((name, INTEGER) for name in ("published", "contact_forces", "keeps_direction", "modality")),
         *((name, REAL) for name in TERM_GAINS),
         ("settle", Settle),
     )
@@ -54,14 +54,15 @@ DRIVE = np.dtype([("motor", WHOLE), ("pulled", WHOLE), ("scale", "f8"), ("lever"
 JOINT = np.dtype(
     [
         ("slides", WHOLE), ("pulled", WHOLE), ("drives", INTERVAL), ("axis", "f8", 3), ("pivot", "f8", 3), ("offset", "f8"),
-        ("angle", "f8"), ("sine", "f8"), ("cosine", "f8"), ("seen", "f8", 3), ("frame", "f8", (3, 3)), ("motion", "f8", 3),
-        ("turning", "f8", 3),
+        ("angle", "f8"), ("sine", "f8"), ("cosine", "f8"), ("marker", "f8", 3), ("frame", "f8", (3, 3)), ("linear", "f8", 3),
+        ("angular", "f8", 3),
     ]
 )  # fmt: skip
 PULLED = np.dtype(
     [
         ("motor", WHOLE), ("column", "f8", 6),
-        *((name, "f8") for name in ("slope", "ease", "force", "way", "before", "bent", "limited", "held")),
+        *((name, "f8") for name in ("descent", "mobility", "force", "escape", "last_escape")),
+        *((name, "f8") for name in ("bend_direction", "limit_resistance", "obstruction")),
     ]
 )  # fmt: skip
 
@@ -72,12 +73,13 @@ class Reach(ctypes.Structure):
     """A reach in progress; the caller keeps the tables alive."""
 
     _fields_ = (
-        *((name, INTEGER) for name in ("part", "surface", "turned", "used")),
+        *((name, INTEGER) for name in ("part", "to_surface", "turns_normal", "joint_count")),
         *((name, View) for name in ("joints", "drives", "motors")),
-        ("curve", ADDRESS),
-        ("target", _VECTOR), ("wanted", _VECTOR), ("radius", REAL), ("point", _VECTOR), ("normal", _VECTOR),
-        ("at", _VECTOR), ("facing", _VECTOR), ("error", _TWIST), ("missing", REAL),
-        ("seen", _TWIST), ("left", REAL), ("best", REAL), ("since", REAL), ("begun", INTEGER),
+        ("curvature", ADDRESS),
+        ("target", _VECTOR), ("target_normal", _VECTOR), ("radius", REAL), ("point", _VECTOR), ("normal", _VECTOR),
+        ("marker_position", _VECTOR), ("marker_normal", _VECTOR), ("error", _TWIST), ("distance", REAL),
+        ("smoothed_error", _TWIST), ("smoothed_distance", REAL), ("least_distance", REAL), ("time_without_progress", REAL),
+        ("started", INTEGER),
     )  # fmt: skip
 
 
@@ -89,8 +91,8 @@ class Calls:
         self.client = function("law_client", ADDRESS, ADDRESS, ADDRESS)
         self.step = function("law_step", ADDRESS, ADDRESS, REAL, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
         self.add_reaches = function("reach_add", ADDRESS, ADDRESS, INTEGER, ADDRESS, ADDRESS, REAL, ADDRESS)
-        self.reach_goes_on = function("reach_goes_on", ADDRESS, ADDRESS, INTEGER, INTEGER, result=INTEGER)
-        self.look = function("law_look", ADDRESS, ADDRESS, REAL, ADDRESS, INTEGER, result=INTEGER)
+        self.reach_is_approaching = function("reach_is_approaching", ADDRESS, ADDRESS, INTEGER, INTEGER, result=INTEGER)
+        self.settle_check = function("settle_check", ADDRESS, ADDRESS, REAL, ADDRESS, INTEGER, result=INTEGER)
 
 
 calls = cache(Calls)
@@ -101,11 +103,11 @@ calls = cache(Calls)
 def term_names() -> tuple[str, ...]:
     """Return the names of the forces, in the order in which the core fills and adds them."""
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
-    return tuple(found.decode() for found in takewhile(bool, map(name, count())))
+    return tuple(term.decode() for term in takewhile(bool, map(name, count())))
 
 
 @cache
 def state_term_names() -> tuple[str, ...]:
     """Return the names of the forces that depend on the law's state."""
-    moving = function("law_moving", INTEGER, result=INTEGER)
-    return tuple(name for index, name in enumerate(term_names()) if moving(index))
+    needs_state = function("law_needs_state", INTEGER, result=INTEGER)
+    return tuple(name for index, name in enumerate(term_names()) if needs_state(index))

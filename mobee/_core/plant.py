@@ -11,14 +11,24 @@ import numpy as np
 from mobee._core import ADDRESS, BYTES, INTEGER, REAL, function, law
 from mobee._core.tables import INTERVAL, WHOLE, View, columns
 
-NUMBERS = columns(
-    "low", "high", "max_velocity", "max_acceleration", "max_torque", "share", "play", "friction", whole=("delay",)
+CONSTANTS = columns(
+    "low", "high", "max_velocity", "max_acceleration", "max_torque", "response", "half_backlash", "friction", whole=("delay",)
 )  # fmt: skip
 STATE = columns(
-    "q", "velocity", "effort", "motor_q", "motor_velocity", "dragged", "rest", "reference", "load", "left", whole=("mode", "resting")
+    "q",
+    "velocity",
+    "effort",
+    "motor_q",
+    "motor_velocity",
+    "pulled_q",
+    "hold_q",
+    "reference",
+    "load",
+    "applied_torque",
+    whole=("mode", "holding"),
 )
 MODES = ("position", "velocity", "torque", "hold")
-PART = np.dtype([("motors", INTERVAL), ("under_way", WHOLE), ("verdict", WHOLE), ("begun", "f8"), ("next_look", "f8")])
+PART = np.dtype([("motors", INTERVAL), ("under_way", WHOLE), ("verdict", WHOLE), ("start", "f8"), ("next_check", "f8")])
 """A part and its action, see `PartAction`."""
 RECORD_DEPTHS = 2
 ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
@@ -28,8 +38,8 @@ class Motors(ctypes.Structure):
     """The motors; the caller keeps the tables alive."""
 
     _fields_ = (
-        ("living", View), ("numbers", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
-        ("seed", ctypes.c_uint64), ("drawn", ADDRESS), ("drawn_from", INTEGER),
+        ("living", View), ("constants", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
+        ("seed", ctypes.c_uint64), ("noise_samples", ADDRESS), ("noise_tick", INTEGER),
     )  # fmt: skip
 
 
@@ -46,18 +56,18 @@ class Plant(ctypes.Structure):
     """A plant; the caller keeps alive everything that it points to."""
 
     _fields_ = (
-        *((name, ADDRESS) for name in ("near", "law", "law_state", "attractor", "client", "forces")),
+        *((name, ADDRESS) for name in ("neighbours", "law", "law_state", "attractor", "client", "forces")),
         ("rows", INTEGER), ("reaches", View),
         ("motors", ADDRESS), ("commands", ADDRESS), ("command_age", INTEGER), ("substeps", INTEGER), ("dt", REAL),
         ("noise", ADDRESS), ("parts", View),
         *((name, ADDRESS) for name in ("q", "torque", "total", "record")),
-        *((name, INTEGER) for name in ("ticks", "most", "done", "end")),
+        *((name, INTEGER) for name in ("ticks", "max_ticks", "ticks_run", "end")),
     )  # fmt: skip
 
 
 STRUCTURES = (
     law.MOTOR_GAINS, law.CLAUSE_ROW, law.CLAUSE_ENTRY, law.STATE, law.Law, law.DRIVE, law.JOINT, law.PULLED, law.Reach,
-    NUMBERS, STATE, Motors, PART, Plant,
+    CONSTANTS, STATE, Motors, PART, Plant,
 )  # fmt: skip
 """All structures that are declared both here and in the core."""
 

@@ -41,7 +41,7 @@ class Settle:
 
     speed: float  # rad/s
     acceleration: float  # rad/s^2
-    first_look: float = 1.0  # s from the start of the action to the first check
+    first_check: float = 1.0  # s from the start of the action to the first check
     interval: float = 0.2  # s between checks
     timeout: float = 20.0  # s
 
@@ -49,8 +49,8 @@ class Settle:
         for name in ("speed", "acceleration", "interval", "timeout"):
             if not 0 < getattr(self, name) < np.inf:
                 raise InvalidValue(f"settle {name} {getattr(self, name)}: must be finite and above 0")
-        if not 0 <= self.first_look < np.inf:
-            raise InvalidValue(f"settle first_look {self.first_look} s: must be a finite time, not negative")
+        if not 0 <= self.first_check < np.inf:
+            raise InvalidValue(f"settle first_check {self.first_check} s: must be a finite time, not negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,8 +234,8 @@ class SettleTest:
         """`start`: when the action begins [s]."""
         self.settle = settle
         self._thresholds = core.Settle(*(getattr(settle, name) for name in core.SETTLE))
-        self._memory = core.SettleTest(start, start + settle.first_look)
-        self._check = core.calls().look
+        self._memory = core.SettleTest(start, start + settle.first_check)
+        self._check = core.calls().settle_check
 
     def update(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
         """Return the verdict on the part's motion at time t [s]; always "moving" between two checks.
@@ -244,5 +244,5 @@ class SettleTest:
         divided by their `fine_units`.
         """
         motion = np.array([speeds, accelerations], dtype=np.float64)
-        found: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])
-        return VERDICTS[found]
+        verdict: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])
+        return VERDICTS[verdict]

@@ -104,12 +104,12 @@ def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
     table["spring_knee"] = table["max_spring"] / gains.of_robot("stiffness", robot)
     table["client_knee"] = table["max_client"] / table["client_slope"]
     table["limit_slope"] = gains.of_robot("max_limit", robot) / width
-    table["below"], table["above"] = limit_zones(robot, width).T
+    table["low_zone"], table["high_zone"] = limit_zones(robot, width).T
     table["max_speed"] = INSIDE * speed_scale * np.array([m.max_velocity for m in robot.motor_table])
     table["max_acceleration"] = INSIDE * np.array([m.max_acceleration for m in robot.motor_table])
     table["max_torque"] = [m.max_torque for m in robot.motor_table]
-    table["leash"] = LEASH * table["max_speed"]
-    table["unit"], table["fine"] = motor_units(robot), fine_units(robot)
+    table["max_lead"] = LEASH * table["max_speed"]
+    table["unit"], table["settle_unit"] = motor_units(robot), fine_units(robot)
     return table
 
 

@@ -33,19 +33,19 @@ class Reaching:
         """`part`: the index of its first motor, see `_first`. The tables: see `mobee._core.law`; those that change are copied."""
         self.marker = marker.name
         self.joints, self.motors = joints.copy(), motors.copy()
-        self._drives, self._curve = drives, np.zeros((len(motors), len(motors)))
+        self._drives, self._curvature = drives, np.zeros((len(motors), len(motors)))
         self.struct = core.Reach(
-            part=part, used=1 + int(np.flatnonzero(joints["pulled"])[-1]),  # joints up to the last that a pulled motor drives
+            part=part, joint_count=1 + int(np.flatnonzero(joints["pulled"])[-1]),  # joints up to the last that a pulled motor drives
             joints=view(self.joints), drives=view(self._drives), motors=view(self.motors),
-            curve=address(self._curve), point=tuple(marker.position), normal=tuple(marker.normal),
+            curvature=address(self._curvature), point=tuple(marker.position), normal=tuple(marker.normal),
         )  # fmt: skip
         self.address = ctypes.addressof(self.struct)
 
     def aim(self, target: ReachTarget) -> None:
         """Set the target."""
-        self.struct.surface, self.struct.turned = target.aim == "surface", target.normal is not None
+        self.struct.to_surface, self.struct.turns_normal = target.aim == "surface", target.normal is not None
         self.struct.target[:], self.struct.radius = target.position.tolist(), target.radius
-        self.struct.wanted[:] = [0.0] * 3 if target.normal is None else target.normal.tolist()
+        self.struct.target_normal[:] = [0.0] * 3 if target.normal is None else target.normal.tolist()
 
 
 class Reaches:
@@ -94,7 +94,7 @@ class Reaches:
 
     def is_approaching(self, part: str | None) -> bool:
         """Return whether a part's reach still brings its marker nearer, although the part has settled; False under the published law."""
-        return bool(self._core.reach_goes_on(self._law.address, self.address, len(self), _first(self._robot, part)))
+        return bool(self._core.reach_is_approaching(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:
         """Update the list of addresses for the core."""

@@ -99,7 +99,7 @@ def torque(robot: Robot, motion: Motion, q: Array) -> Array:
 def is_settled(robot: Robot, gains: Gains, motion: Motion, part: str) -> bool:
     """Return whether a part has come to rest (thesis 6.1): no motor is commanded beyond the settle speed and acceleration.
 
-    This is checked `first_look` s after the action began, then every `interval` s, until `timeout`.
+    This is checked `first_check` s after the action began, then every `interval` s, until `timeout`.
     """
     where, unit = robot.part(part).slice, fine_units(robot)
     slow = np.abs(motion.velocity) <= gains.settle.speed * unit

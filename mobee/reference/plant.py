@@ -67,7 +67,7 @@ class Plant:
         """Go towards a target (n_part,) rad until the part has settled (thesis 6.1); return False if its time is up before."""
         self.attractor[self.robot.part(part).slice] = target
         settle, since = self.gains.settle, 0.0
-        look = settle.first_look
+        look = settle.first_check
         while since < settle.timeout - ROUNDING:
             self.tick()
             since += self.dt

@@ -29,7 +29,7 @@ _SETTLED = VERDICTS.index("settled")
 class Actions:
     """The state of each part's action; `parts`: a row for each part, see `mobee._core.plant.PART`, which the plant's ticks change."""
 
-    __slots__ = ("_alive", "_begun", "_limits", "_next_look", "_parts", "_row", "_under_way", "_verdict", "parts")
+    __slots__ = ("_alive", "_limits", "_next_check", "_parts", "_row", "_start", "_under_way", "_verdict", "parts")
 
     def __init__(self, robot: Robot, alive: NDArray[np.bool_]) -> None:
         self._parts, self._row = robot.parts, {name: row for row, name in enumerate(robot.parts)}
@@ -37,7 +37,7 @@ class Actions:
         self._limits = {name: robot.limits[part.slice].tolist() for name, part in robot.parts.items()}
         self.parts: Table = np.zeros(len(self._row), dtype=PART)
         self.parts["motors"] = [(part.start, part.start + len(part)) for part in robot.parts.values()]
-        self._begun, self._next_look = self.parts["begun"], self.parts["next_look"]
+        self._start, self._next_check = self.parts["start"], self.parts["next_check"]
         self._under_way, self._verdict = self.parts["under_way"], self.parts["verdict"]
 
     @property
@@ -57,10 +57,10 @@ class Actions:
             if not low <= at <= high:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
-    def begin(self, part: str, start: float, first_look: float) -> None:
-        """Start a part's settle test at a time [s]; the first check is `first_look` s later."""
+    def begin(self, part: str, start: float, first_check: float) -> None:
+        """Start a part's settle test at a time [s]; the first check is `first_check` s later."""
         row = self._row[part]
-        self._begun[row], self._next_look[row], self._under_way[row] = start, start + first_look, 1
+        self._start[row], self._next_check[row], self._under_way[row] = start, start + first_check, 1
 
     def end_all(self) -> None:
         """End all actions without an outcome."""
@@ -70,7 +70,7 @@ class Actions:
         """Return the outcome of a part's last action: encoders q (n,) rad, read at time `sampled` [s], and the objects in contact."""
         row = self._row[part]
         settled = bool(self._verdict[row] == _SETTLED)
-        return Outcome(q[self._parts[part].slice].copy(), settled, sampled - float(self._begun[row]), touched)
+        return Outcome(q[self._parts[part].slice].copy(), settled, sampled - float(self._start[row]), touched)
 
 
 if TYPE_CHECKING:

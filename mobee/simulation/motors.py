@@ -133,16 +133,24 @@ class Motors:
         """Indices of the active motors, ascending."""
         self.state: Table = np.zeros(n, dtype=core.STATE)
         """A row for each motor, see `mobee._core.plant.STATE`: always the same array, changed by the ticks of a plant."""
-        for name in ("q", "motor_q", "dragged", "rest"):
+        for name in ("q", "motor_q", "pulled_q", "hold_q"):
             self.state[name] = q
-        self.state["mode"], self.state["resting"] = _HOLD, 1
-        self.numbers = _numbers(robot, parameters)
-        """Constants of each motor for the current substep, see `mobee._core.plant.NUMBERS`."""
+        self.state["mode"], self.state["holding"] = _HOLD, 1
+        self.constants = _constants(robot, parameters)
+        """Constants of each motor for the current substep, see `mobee._core.plant.CONSTANTS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
-        self._drawn = np.empty((len(self.living), 4))
+        self._noise_samples = np.empty((len(self.living), 4))
         self.struct = core.Motors(
-            view(self.living), view(self.numbers), address(self.state), address(self._line), 1, 0, self.seed, address(self._drawn), -1
+            view(self.living),
+            view(self.constants),
+            address(self.state),
+            address(self._line),
+            1,
+            0,
+            self.seed,
+            address(self._noise_samples),
+            -1,
         )
         """The motors as the core reads them."""
         self.address = ctypes.addressof(self.struct)
@@ -178,7 +186,7 @@ class Motors:
     @property
     def torques(self) -> Array:
         """What left the delay line in the last substep [N m], 0 where a motor is not in torque mode."""
-        return self.state["left"].copy()
+        return self.state["applied_torque"].copy()
 
     @property
     def in_torque(self) -> NDArray[np.bool_]:
@@ -217,7 +225,7 @@ class Motors:
         """
         self.begin_substeps(dt)
         self._core.drive(self.address, dt)
-        velocity: Array = (self.state["dragged"] - self.state["q"]) / dt
+        velocity: Array = (self.state["pulled_q"] - self.state["q"]) / dt
         return velocity
 
     def move(self, substeps: int, dt: float) -> None:
@@ -253,8 +261,8 @@ class Motors:
             return
         self._dt = dt
         with np.errstate(divide="ignore"):
-            self.numbers["share"] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
-        before, delay = self.numbers["delay"].copy(), np.round(self._delay / dt).astype(np.int64)
+            self.constants["response"] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
+        before, delay = self.constants["delay"].copy(), np.round(self._delay / dt).astype(np.int64)
         rows, old = int(delay.max()) + 1, len(self._line)
         oldest_first = np.roll(self._line, old - 1 - self.struct.newest, axis=0)
         still = np.where(self.in_torque, self.state["load"], self.state["motor_velocity"])
@@ -262,17 +270,17 @@ class Motors:
         for motor, steps in enumerate(np.minimum(before, delay)):
             if steps:
                 line[rows - steps :, motor] = oldest_first[old - steps :, motor]
-        self.numbers["delay"] = delay
+        self.constants["delay"] = delay
         self._line = line
         self.struct.line, self.struct.rows, self.struct.newest = address(line), rows, rows - 1
 
 
-def _numbers(robot: Robot, parameters: MotorParameters) -> Table:
+def _constants(robot: Robot, parameters: MotorParameters) -> Table:
     """Return the constants of each motor, one row a motor."""
-    table: Table = np.zeros(len(robot.motor_table), dtype=core.NUMBERS)
+    table: Table = np.zeros(len(robot.motor_table), dtype=core.CONSTANTS)
     table["low"], table["high"] = robot.limits.T
     for name in ("max_velocity", "max_acceleration", "max_torque"):
         table[name] = [getattr(motor, name) for motor in robot.motor_table]
-    table["play"] = parameters.of_robot("backlash", robot) / 2.0
+    table["half_backlash"] = parameters.of_robot("backlash", robot) / 2.0
     table["friction"] = parameters.of_robot("friction", robot)
     return table

@@ -318,7 +318,7 @@ class OfflinePlant:
 
     def _test(self, part: str) -> None:
         """Start the part's settle test at the tick that has ended, as live, so that the next tick is the first one tested."""
-        self._actions.begin(part, self.time - self.dt, self.controller.gains.settle.first_look)
+        self._actions.begin(part, self.time - self.dt, self.controller.gains.settle.first_check)
 
     def _require_alone(self, part: str, doing: str) -> None:
         if others := [other for other in self._actions.under_way if other != part]:

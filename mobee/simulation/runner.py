@@ -117,13 +117,13 @@ class Runner:
         listed = controller.reaches.address, len(controller.reaches)
         if listed != self._listed:
             struct.reaches, self._listed = View(*listed), listed
-        struct.near = self._near(solids, reaching) if controller.contact_forces or solids else None
-        struct.ticks, struct.most, struct.done = ticks, most, 0
+        struct.neighbours = self._near(solids, reaching) if controller.contact_forces or solids else None
+        struct.ticks, struct.max_ticks, struct.ticks_run = ticks, most, 0
         return self._address
 
     def results(self) -> tuple[Array, int, bool]:
         """Return the record (ticks, 3 n + 2), the number of ticks run, and whether the motors' state is no longer finite."""
-        done, end = self._struct.done, self._struct.end
+        done, end = self._struct.ticks_run, self._struct.end
         if done:
             self._controller.note_forces(self._forces)
         return self._record[:done], done, end == core.STATE_LOST

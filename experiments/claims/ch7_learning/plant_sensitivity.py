@@ -121,7 +121,7 @@ _CHANGED: dict[str, Changes] = {
     "spring maximum, deg/s^2 (1000)": _degrees("gains", "max_spring", 800.0, 1500.0),
     "settle speed, deg/s (1)": _degrees("settle", "speed", 0.2, 0.6, 1.2, 2.0),
     "settle acceleration, deg/s^2 (50)": _degrees("settle", "acceleration", 25.0, 100.0),
-    "first settle test, s (1)": _plain("settle", "first_look", 0.2, 3.0),
+    "first settle test, s (1)": _plain("settle", "first_check", 0.2, 3.0),
     "limit ramp, deg (10)": _degrees("gains", "limit_width", 5.0),
     "control period, s (0.02)": {"0.01": {"dt": 0.01}, "0.005": {"dt": 0.005}},
     "cable zone, degrees along the normals": {

@@ -131,7 +131,7 @@ class SelfContactPlant:
         """See Plant; runs the plant from one settle test to the next."""
         plant, settle = self._plant, self._plant.controller.gains.settle
         where, start = self.robot.part(part).slice, plant.time - plant.dt
-        test, ticks = SettleTest(settle, start), _ticks(settle.first_look, plant.dt)
+        test, ticks = SettleTest(settle, start), _ticks(settle.first_check, plant.dt)
         deepest, pose = 0.0, None
         plant.begin(part, target)
         while True:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A law of some motors with numbers of its own, in no robot."""
+"""The law of some motors with given gains, without a robot."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from mobee.arrays import Array
 
 
 class OneLaw:
-    """Motors in one part with these numbers; what is not given is far away."""
+    """Motors of one part with the given gains; limits that are not given are too large to have an effect."""
 
     def __init__(self, count: int = 1, *, law: dict[str, float] | None = None, **motor: float) -> None:
         self._motors = np.zeros(count, dtype=core.MOTOR_GAINS)
-        far = {"low": -1e9, "high": 1e9, "spring_knee": 1.0, "client_knee": 1.0, "max_speed": 1e9, "max_acceleration": 1e9, "leash": 1e9}
-        for name, value in {**far, "unit": 1.0, "fine": 1.0, **motor}.items():
+        far = {"low": -1e9, "high": 1e9, "spring_knee": 1.0, "client_knee": 1.0, "max_speed": 1e9, "max_acceleration": 1e9, "max_lead": 1e9}
+        for name, value in {**far, "unit": 1.0, "settle_unit": 1.0, **motor}.items():
             self._motors[name] = value
         self._all, self._part = np.arange(count), np.array([(0, count)], dtype=INTERVAL)
-        every: dict[str, Any] = {name: view(self._all) for name in ("active", "felt")}
-        self._law = core.Law(motors=view(self._motors), parts=view(self._part), touching=1, **every, **(law or {}))
+        every: dict[str, Any] = {name: view(self._all) for name in ("active", "constrained")}
+        self._law = core.Law(motors=view(self._motors), parts=view(self._part), contact_forces=1, **every, **(law or {}))
         self._at, self._calls = ctypes.addressof(self._law), core.calls()
 
     def force(self, name: str, q: Array, torque: Array) -> Array:

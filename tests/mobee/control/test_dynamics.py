@@ -12,7 +12,7 @@ from tests.mobee.control.one_law import OneLaw
 
 def accelerated(error: float, velocity: float, force: float, gains: Gains) -> float:
     law = OneLaw(max_spring=gains.max_spring, spring_knee=gains.max_spring / gains.stiffness, damping=gains.damping)
-    return float(law.step(0.01, error, force, velocity=velocity, sent=velocity)["acceleration"])
+    return float(law.step(0.01, error, force, velocity=velocity, commanded=velocity)["acceleration"])
 
 
 def test_the_published_spring_by_hand() -> None:
@@ -27,12 +27,12 @@ def test_forces_add_to_the_acceleration() -> None:
 
 
 @given(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0))
-def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> None:
-    told = float(OneLaw(max_speed=1.0, max_acceleration=10.0).step(0.01, velocity=wanted, sent=sent)["sent"])
-    assert abs(told - sent) <= 0.1 + 1e-12
-    assert abs(told) <= max(1.0, abs(sent) - 0.1 + 1e-12)
+def test_the_velocity_command_is_within_its_limits(wanted: float, sent: float) -> None:
+    command = float(OneLaw(max_speed=1.0, max_acceleration=10.0).step(0.01, velocity=wanted, commanded=sent)["commanded"])
+    assert abs(command - sent) <= 0.1 + 1e-12
+    assert abs(command) <= max(1.0, abs(sent) - 0.1 + 1e-12)
     if abs(wanted) <= 1.0 and abs(wanted - sent) <= 0.1:
-        assert told == pytest.approx(wanted, abs=1e-12)
+        assert command == pytest.approx(wanted, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -41,5 +41,5 @@ def test_the_velocity_told_is_within_its_limits(wanted: float, sent: float) -> N
     ids=["goes on", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
 )
 def test_the_position_reference(reference: float, q: float, velocity: float, then: float) -> None:
-    law = OneLaw(leash=0.3, low=-1.0, high=1.0)
-    assert law.step(0.01, q, q=q, reference=reference, velocity=velocity, sent=velocity)["reference"] == pytest.approx(then)
+    law = OneLaw(max_lead=0.3, low=-1.0, high=1.0)
+    assert law.step(0.01, q, q=q, reference=reference, velocity=velocity, commanded=velocity)["reference"] == pytest.approx(then)

@@ -18,7 +18,7 @@ def test_the_published_numbers() -> None:
     assert degrees == pytest.approx([1000.0, 1000.0, 10.0, 1500.0, 40.0, 1200.0, 1000.0])
     assert (g.damping, g.stiffness, g.contact_gain, g.contact_slope, g.client_slope) == (50.0, 50.0, 1000.0, 50.0, 50.0)
     assert np.rad2deg([g.settle.speed, g.settle.acceleration]) == pytest.approx([1.0, 50.0])
-    assert (g.settle.first_look, g.settle.interval, g.settle.timeout) == (1.0, 0.2, 20.0)
+    assert (g.settle.first_check, g.settle.interval, g.settle.timeout) == (1.0, 0.2, 20.0)
 
 
 def test_published_fingers_and_eyes_do_not_move_and_the_rest_does() -> None:
@@ -95,7 +95,7 @@ SETTLE = Settle(speed=0.02, acceleration=0.9)
 REST = np.zeros(3)
 
 
-def test_a_resting_part_is_settled_at_the_first_look_and_not_before() -> None:
+def test_a_resting_part_is_settled_at_the_first_check_and_not_before() -> None:
     test = SettleTest(SETTLE, 5.0)
     assert [test.update(t, REST, REST) for t in (5.0, 5.5, 5.99, 6.0)] == ["moving"] * 3 + ["settled"]
 
@@ -135,7 +135,7 @@ def test_a_threshold_of_zero_is_refused() -> None:
         Settle(speed=0.0, acceleration=1.0)
 
 
-@pytest.mark.parametrize("change", [{"timeout": np.inf}, {"interval": np.nan}, {"first_look": np.nan}, {"first_look": -1.0}])
+@pytest.mark.parametrize("change", [{"timeout": np.inf}, {"interval": np.nan}, {"first_check": np.nan}, {"first_check": -1.0}])
 def test_times_that_would_never_end_an_action_are_refused(change: dict[str, float]) -> None:
     with pytest.raises(InvalidValue, match=f"settle {next(iter(change))}"):
         Settle(speed=0.02, acceleration=0.9, **change)

@@ -10,7 +10,7 @@ from tests.mobee.control.one_law import OneLaw
 
 
 def limit_force(q: float, low: float, high: float, below: float, above: float, slope: float) -> float:
-    law = OneLaw(low=low, high=high, below=below, above=above, limit_slope=slope)
+    law = OneLaw(low=low, high=high, low_zone=below, high_zone=above, limit_slope=slope)
     return float(law.force("limits", np.array([q]), np.zeros(1))[0])
 
 

@@ -64,8 +64,8 @@ def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> No
             columns = np.zeros((6, len(q)))
             columns[:, found.motors["motor"]] = found.motors["column"].T
             pose = model.evaluate(q)
-            assert list(found.struct.at) == pytest.approx(pose.position(marker), abs=1e-12)
-            assert list(found.struct.facing) == pytest.approx(pose.normal(marker), abs=1e-12)
+            assert list(found.struct.marker_position) == pytest.approx(pose.position(marker), abs=1e-12)
+            assert list(found.struct.marker_normal) == pytest.approx(pose.normal(marker), abs=1e-12)
             assert columns == pytest.approx(model.jacobian(q, marker) * motor_units(robot), abs=1e-12)
 
 
@@ -86,10 +86,10 @@ def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> N
         fresh.reach_toward("right_arm", "right_palm", target)
         fresh.step(q, 0.01)
         one, other = old.reaches["right_arm"], fresh.reaches["right_arm"]
-        for name in ("at", "facing", "error"):
+        for name in ("marker_position", "marker_normal", "error"):
             assert list(getattr(one.struct, name)) == list(getattr(other.struct, name))
-        assert one.struct.missing == other.struct.missing
-        for name in ("column", "slope"):
+        assert one.struct.distance == other.struct.distance
+        for name in ("column", "descent"):
             assert np.array_equal(one.motors[name], other.motors[name])
 
 

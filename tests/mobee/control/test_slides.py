@@ -99,10 +99,10 @@ def test_a_slide_settles_within_a_millimetre_from_5_to_95_percent_of_its_range(s
 
 def test_play_and_noise_of_a_slide_follow_its_range_unless_given_for_each_motor() -> None:
     common = OfflinePlant(Model(SLIDING), motors=MotorParameters(backlash=0.01)).motors
-    assert common.numbers["play"] == pytest.approx([0.005, 0.005 * 0.25 * 0.03, 0.005 * 0.25 * 0.4])
+    assert common.constants["half_backlash"] == pytest.approx([0.005, 0.005 * 0.25 * 0.03, 0.005 * 0.25 * 0.4])
     assert common.noise(0.02) == pytest.approx(np.deg2rad(0.1) * np.array([1.0, 0.25 * 0.03, 0.25 * 0.4]))
     own = OfflinePlant(Model(SLIDING), motors=MotorParameters(backlash=[0.01, 0.001, 0.002])).motors
-    assert own.numbers["play"] == pytest.approx([0.005, 0.0005, 0.001])
+    assert own.constants["half_backlash"] == pytest.approx([0.005, 0.0005, 0.001])
 
 
 @pytest.mark.parametrize("home", [-1.2, -1.15, 1.0])

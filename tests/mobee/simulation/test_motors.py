@@ -70,8 +70,8 @@ def test_motors_side_by_side_do_what_each_does_alone(lively: float) -> None:
         at_once.move(int(substeps), STEP)
         for _ in range(substeps):
             one_by_one.drive(STEP)
-            dragged = one_by_one.state["dragged"]
-            dragged[:] = np.clip(dragged, one_by_one.numbers["low"], one_by_one.numbers["high"])
+            dragged = one_by_one.state["pulled_q"]
+            dragged[:] = np.clip(dragged, one_by_one.constants["low"], one_by_one.constants["high"])
             one_by_one.adopt(dragged)
         for name in at_once.state.dtype.names or ():
             mine, its = (np.nan_to_num(m.state[name], nan=1e9) for m in (at_once, one_by_one))

@@ -108,7 +108,7 @@ def test_without_contact_forces_the_part_goes_through() -> None:
 
 def test_a_second_of_action_is_a_second_of_control() -> None:
     """The goal counts from the tick after it was set, as in the controller's process."""
-    at_once = Settle(speed=1e3, acceleration=1e3, first_look=1.0)
+    at_once = Settle(speed=1e3, acceleration=1e3, first_check=1.0)
     plant = arm_plant(gains=replace(Gains.default(), settle=at_once))
     for _ in range(2):
         before = plant.time

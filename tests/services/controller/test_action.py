@@ -21,7 +21,7 @@ def test_an_action_moves_and_settles_at_its_goal(run: Stage) -> None:
     run.play(lambda: run.motion("left_arm").status != "moving", "the end")
     done = run.motion("left_arm")
     assert (done.status, done.action_id, done.touched) == ("settled", "go", ["table"])
-    assert (done.since_k - done.start_k) * 0.01 >= SETTLE.first_look
+    assert (done.since_k - done.start_k) * 0.01 >= SETTLE.first_check
     np.testing.assert_allclose(done.goal, near("left_arm"), atol=1e-15)
     moves = Gains.published_2014().weight(ROBOT.part("left_arm").motors) > 0  # the published gains leave the fingers alone
     np.testing.assert_allclose(np.array(done.q)[moves], near("left_arm")[moves], atol=0.05)

@@ -52,7 +52,7 @@ def test_a_reach_is_drawn_to_its_target_and_back_and_settles_twice(run: Stage, t
     run.play(lambda: phase(told) == "returning", "the force's end")
     end = next(one for one in told if one.phase == "returning")
     assert (end.action_id, end.marker, end.object, end.touched, end.settled) == ("r", "right_palm", "thing", ["thing"], True)
-    assert (end.end_k - started.k) * 0.01 >= SETTLE.first_look
+    assert (end.end_k - started.k) * 0.01 >= SETTLE.first_check
     assert end.missing == pytest.approx(np.linalg.norm(np.array(end.position) - target))
     assert end.missing < np.linalg.norm(at - target)
     assert run.motion("right_arm").status == "moving"
@@ -60,7 +60,7 @@ def test_a_reach_is_drawn_to_its_target_and_back_and_settles_twice(run: Stage, t
     run.play(lambda: phase(told) == "over", "the return")
     motion = run.motion("right_arm")
     assert (motion.status, motion.action_id, motion.start_k) == ("settled", "r", started.k)
-    assert (motion.since_k - end.end_k) * 0.01 >= SETTLE.first_look
+    assert (motion.since_k - end.end_k) * 0.01 >= SETTLE.first_check
     assert np.abs(np.array(motion.q) - before).max() < 0.3 * drawn
     np.testing.assert_allclose(motion.goal, before, atol=1e-15)  # the attractor has not moved
     assert (told[-1].q, told[-1].position) == (end.q, end.position)
