@@ -31,7 +31,7 @@ def encoding_of(cls: type[Struct]) -> str:
 
 
 def encode(message: Struct) -> bytes:
-    """The message as msgpack."""
+    """Return a message encoded as msgpack."""
     return _encoder.encode(message)
 
 

@@ -24,7 +24,7 @@ WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the two files and the options of a URDF."""
+    """Add the input file, the output file and the options for URDF files."""
     parser.add_argument("source", metavar="IN", help="shipped robot, or a .xml or .urdf file, or a world in .xml")
     parser.add_argument("target", metavar="OUT", type=Path, help=".xml or .urdf file to write")
     add_urdf_options(parser)

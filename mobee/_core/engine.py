@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots, scenes and evaluations; declares core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
 
-Handles are objects of the core; each frees its own, and keeps alive what its own refers to.
+A `Handle` owns an object of the core: it frees the object, and keeps alive the objects to which that object refers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NO_NUMBERS, NO_REALS = np.empty((0, NUMBERS), dtype=np.int64), np.empty((0, REALS))
-MANY = 128  # contacts for which a room has space from the beginning
+MANY = 128  # contacts for which a new room has space
 
 
 class Handle:
@@ -128,33 +128,37 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
 def robot(counts: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> Handle:
-    """Return a robot made from its tables, which are copied; see mobee/model/robot_tables.py."""
+    """Return a robot of the core, made from tables that the core copies; see mobee/model/robot_tables.py."""
     tables = _RobotTables(**counts, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 
 def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
-    """Return a robot among a world's free objects; `carried`: those that it carries; `side`: see mobee/model/engine.py."""
+    """Return a scene of the core: a robot and the objects of a world.
+
+    `volumes` and `roles`: of each object. `carried`: indices of the objects that the robot carries. `side`: number of grid cells along the
+    longest side, see mobee/model/engine.py.
+    """
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 
 
 def link_poses(of: Handle, q: Array, links: int) -> Array:
-    """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
+    """Return the transforms (B, L, 4, 4) of all links to the root frame, in the poses q (B, n) [rad]."""
     out = np.empty((len(q), links, 4, 4))
     _link_poses(of.at, q.tobytes(), len(q), address(out))
     return out
 
 
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
-    """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
+    """Return the Jacobians (B, 6, n) of a point of a link in the poses q (B, n) [rad]; `point` (3,) [m]: root frame, at zero pose."""
     out = np.empty((len(q), 6, q.shape[1]))
     _jacobians(of.at, q.tobytes(), len(q), link, point.tobytes(), address(out))
     return out
 
 
 class Room:
-    """The buffers of one evaluation at a time; they are reused, since new memory costs more than the arithmetic of a pose."""
+    """The buffers of an evaluation; they are reused, since allocating memory takes longer than evaluating a pose."""
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
 
@@ -176,19 +180,19 @@ class Room:
         return *_rows(_room_rows, self._at, count), torque
 
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        """Set the arguments of `evaluate_one` from now on; the caller keeps the scene alive."""
+        """Set the scene, the reaching hands and `cut` for the next calls of `evaluate_one`; the caller keeps the scene alive."""
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
     def make_space(self, most: int) -> None:
-        """Allocate the rows of at most so many contacts, which `evaluate_one` writes."""
+        """Allocate the buffer in which `evaluate_one` writes up to `most` contacts."""
         self.most, self.rows = most, bytearray(most * ROW_BYTES)
         self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:
-    """The neighbour list of a robot in a scene, kept from pose to pose; for one thread at a time.
+    """A neighbour list of a robot in a scene, which is reused from pose to pose; for one thread at a time.
 
-    `at` is where the core has it, for what finds contacts there: only while this lives, and after `enter`.
+    `at` is the address of the list in the core, which a plant of the core uses. It is valid after `enter`, while this object exists.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -197,19 +201,19 @@ class Following:
         self._scene: Handle | None = None
 
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
-        """Change the scene or the hands that reach."""
+        """Set the scene and the reaching hands; targets do not repel these hands."""
         self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)
         _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
-        """Do the same as `Room.evaluate` for poses q (B, n) one after the other."""
+        """Return contacts and their projection to the motors as `Room.evaluate` does, for consecutive poses q (B, n) [rad]."""
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """The state of the list (nothing, a pose, a list, a pose to renew), its number of pairs, and of poses that it has served."""
+        """Return the state of the list (0 nothing, 1 a pose, 2 a list, 3 a pose to renew), its number of pairs and of poses served."""
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()

@@ -90,9 +90,9 @@ class _NextCounts(ctypes.Structure):
 
 Observation = Callable[[int, int, int, int], float]
 gain: Observation = function("gain", ADDRESS, INTEGER, INTEGER, INTEGER, result=REAL)
-"""Of counts, by their address, a state, an action and an outcome: what observing it would pay now, in nats."""
+"""Return the reward [nats] of observing an outcome, without counting it; arguments: address of the counts, state, action, outcome."""
 observe: Observation = function("observe", ADDRESS, INTEGER, INTEGER, INTEGER, result=REAL)
-"""Likewise, and count it; below 0 if it was not counted: there has to be one more bin first."""
+"""Observe an outcome and return its reward; below 0 if it was not counted because the table needs one more bin."""
 believe: Callable[[int, int, int, int], None] = function("believe", ADDRESS, ADDRESS, INTEGER, INTEGER)
 """Let beliefs follow counts, both by their addresses, of a state and an action."""
 _expected_gains = function("expected_gains", ADDRESS, ADDRESS, ADDRESS, ADDRESS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Passes arrays to the core, as address and length, or as one column for each member of a structure."""
+"""Types for passing arrays to the native core: an address with a length, and tables of C structures."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ ROW_BYTES = 8 * (NUMBERS + REALS)
 
 
 class View(ctypes.Structure):
-    """An array whose owner is elsewhere."""
+    """Address and length of an array; the caller keeps the array alive."""
 
     _fields_ = (("data", ADDRESS), ("size", INTEGER))
 
 
 def view(array: Array | Ints | Table) -> View:
-    """Return a C-contiguous array, which the caller keeps alive, as the core reads it."""
+    """Return address and length of a C-contiguous array; the caller keeps the array alive."""
     return View(address(array), len(array))
 
 
 def columns(*names: str, whole: tuple[str, ...] = ()) -> np.dtype[np.void]:
-    """Return the type of a structure of these real numbers, followed by these whole numbers."""
+    """Return the dtype of a structure: a double for each of `names`, then a 64-bit integer for each of `whole`."""
     return np.dtype([*((name, "f8") for name in names), *((name, WHOLE) for name in whole)])
 
 

@@ -266,7 +266,7 @@ class Controller:
         return Command(*commands)
 
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
-        """Return the forces together with those that are absent."""
+        """Return the given forces, completed by the forces of `terms` and those that depend on the law's state."""
         more = self.own_forces(q, dt, pose)
         if any(name not in forces for name in state_term_names()):
             more |= self.forces(self._track.evaluate(q) if pose is None else pose)

@@ -47,7 +47,7 @@ The scores must follow from the agent's settings and its transitions alone; each
 
 @dataclass(frozen=True, slots=True)
 class SampledBeliefs:
-    """Probabilities (S, A, B) drawn for the outcomes (S, A, B) of a transition model."""
+    """Transition probabilities (S, A, B) sampled from the posterior of a transition model, with the outcome state of each bin (S, A, B)."""
 
     outcomes: Ints
     probabilities: Array

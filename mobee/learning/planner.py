@@ -36,7 +36,10 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return the states between such actions, with the probability of the best action into and out of each."""
+    """Return, for each state with actions into it and out of it, the product of the probabilities of its best ones.
+
+    `actions`: probability of success of each action, by start and goal state.
+    """
     entry: dict[int, float] = {}
     leaving: dict[int, float] = {}
     for (state, goal), chance in actions.items():

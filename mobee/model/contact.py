@@ -145,7 +145,7 @@ class ContactTable:
 
 
 def _read(rows: bytearray) -> tuple[Column, Array]:
-    """Return numbers and reals as views of one block."""
+    """Return the integer columns (c, NUMBERS) and real columns (c, REALS) of contacts, as views of the core's buffer."""
     count = len(rows) // ROW_BYTES
     numbers: Column = np.ndarray((count, NUMBERS), np.int64, rows)
     return numbers, np.ndarray((count, REALS), np.float64, rows, offset=numbers.nbytes)

@@ -172,7 +172,10 @@ def _contact(first: Any, second: Any) -> tuple[float, ...] | None:
 
 
 def _ball_overlap(first: Any, second: Any, ball: Array, radius: float, sign: float) -> tuple[float, ...] | None:
-    """Return the same where one is a ball, for which fcl has closed forms; `sign`: 1.0 if it is the first, -1.0 if the second."""
+    """Return depth, normal and point of a contact with a ball, for which fcl has closed forms; None: apart.
+
+    `ball` (3,) and `radius` [m]; `sign`: 1.0 if the ball is the first volume, -1.0 if it is the second.
+    """
     found = _contact(first, second)
     if found is None:
         return None

@@ -91,7 +91,7 @@ class View:
 
 
 def view(r: Reach, q: Array) -> View:
-    """Return the marker's errors and derivatives at q (n,) rad."""
+    """Return the errors of the marker's position and normal, and their derivatives by the joints, at q (n,) [rad]."""
     frames, target = link_frames(r.robot, q), r.target
     place, normal = marker_at(r.robot, frames, r.marker)
     error = target.position - place

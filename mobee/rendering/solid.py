@@ -164,7 +164,7 @@ def _rotation_with_z(z: Array) -> Array:
 
 
 def _thinned(points: Array) -> Array:
-    """The points without those nearer than the shortest piece to the one before; the last one stays."""
+    """Return the points of a line without points closer than SHORTEST_PIECE to the kept point before; the last point is kept."""
     kept = [points[0]]
     for point in points[1:]:
         if np.linalg.norm(point - kept[-1]) >= SHORTEST_PIECE:

@@ -86,7 +86,7 @@ class Barrier:
         return sorted(self._expected - self._present)
 
     def missing(self, k: int) -> list[str]:
-        """Present participants that must still answer tick k."""
+        """Return the names of the present participants that have not answered tick k yet and must."""
         waiting = {who for who in self._present if self._answered.get(who, -1) < k}
         if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
             waiting.difference_update(self._busy)

@@ -69,7 +69,7 @@ class Action:
 
 
 def busy_owners(actions: Iterable[Action]) -> list[str]:
-    """Services with nothing to decide, because every part that they own is moving."""
+    """Return the names of the services all of whose parts are moving, so that they have nothing to decide in this tick."""
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:

@@ -89,7 +89,7 @@ class ControllerNode:
             self._step()
 
     def _step_without_model(self) -> None:
-        """Lockstep: a tick waits for its forces without a time limit, but not if there is no model."""
+        """In lockstep, take the pending step without the model's forces if no model is running; otherwise the step waits for them."""
         if self._tick is not None and not self._service.alive.get("model"):
             self._law.forces.forget()
             self._step()

@@ -139,7 +139,7 @@ class CommandPublisher:
         return all(ready) and self._commands.heard
 
     def _answer(self) -> None:
-        """Answer the tick, once no part is being armed."""
+        """Send the answer to the tick of lockstep; it is delayed while a part is being armed."""
         if self._to_answer is not None and not self._drives.is_arming:
             (k, answer), self._to_answer = self._to_answer, None
             busy = busy_owners(self._actions.values())

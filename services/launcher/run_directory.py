@@ -46,7 +46,7 @@ def _new_folder(runs: Path, name: str) -> Path:
 
 
 def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
-    """The settings as they are used: files by absolute paths, so that a command in another folder finds the run's robot."""
+    """Return a service's settings with the endpoint, absolute paths of robot and world files, and the run's directory."""
     named = {field: getattr(config, field, "") for field in ("robot", "world")}
     files = {field: str(Path(name).resolve()) for field, name in named.items() if is_path(name)}
     config = structs.replace(config, endpoint=endpoint, **files)

@@ -36,7 +36,7 @@ class Switch:
         self.restart(0.01)
 
     def restart(self, dt: float) -> None:
-        """A new run with ticks of dt s: nothing is recorded."""
+        """Start a new run with ticks of dt [s], with an empty record of the reflex."""
         self.reflex = Reflex(self._settings, dt, self._max_velocity)
 
     def tick(self, q: Array) -> Array | None:

@@ -114,5 +114,5 @@ class KinematicBackend:
         return {}
 
     def gap(self) -> float:
-        """Not measured."""
+        """Return -1.0: this backend does not measure the distance to the table."""
         return -1.0

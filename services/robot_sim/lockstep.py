@@ -57,7 +57,7 @@ class Lockstep:
         return self._service.bus.k == self._last_tick > 0
 
     def is_degraded(self) -> bool:
-        """Whether an expected participant is absent."""
+        """Whether a process that lockstep expects to take part is absent."""
         return bool(self._barrier.absent())
 
     def note_flaw(self, why: str) -> None:

@@ -56,7 +56,10 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
 
 
 def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
-    """Border pixels (m, 2) as column, row, and area [px] of each connected red region that may be large enough, without its holes."""
+    """Return the border pixels, (m, 2) as column and row, and the area [px] of each connected red region; holes are filled.
+
+    Regions of less than MIN_AREA pixels are ignored.
+    """
     regions = label(_red_pixels(picture), diagonal=True)
     blobs = []
     for number, where in enumerate(boxes(regions), start=1):

@@ -138,7 +138,7 @@ class ReachAgent(ReachLearner):
         return self._step(outcome, state, action, following, failed=failed, reward=self.penalty if failed else 0.0)
 
     def _reached(self, state: int) -> Step:
-        """Reach from a state."""
+        """Reach for the target from a state; return the step with its reward and remaining error."""
         expected = self.expected(state)
         outcome, following = reach(self.plant, self.space, self.marker)
         reward = reward_of(outcome.missing, self.reaches.scale)

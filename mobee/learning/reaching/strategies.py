@@ -26,7 +26,7 @@ class Progress:
         self._interest: Array = np.ones(len(reaches))
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append a reward to the last ones of the state."""
+        """Add a reward to the state's recent rewards and update the state's interest: how much these rewards have changed."""
         lately = self._lately[state]
         lately.append(reward)
         if len(lately) > 1:

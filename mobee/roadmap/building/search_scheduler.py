@@ -181,7 +181,7 @@ class SearchScheduler:
         self.near[number, : len(near)] = self._frontier.points[near]
 
     def _note_vertex(self, active: Ints, point: Array) -> None:
-        """Replace the furthest known vertex of active searches by a new vertex, where this is nearer."""
+        """Update the nearest vertices of active searches: a new vertex replaces the furthest of them if the new one is nearer."""
         centres = self.aim[active] if self._settings.frontier else self._frontier.points[self.vertex[active]]
         squares = ((self.near[active] - centres[:, None]) ** 2).sum(axis=-1)
         furthest = squares.argmax(axis=1)

@@ -23,7 +23,7 @@ _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 def solid_model(model: Model) -> Model:
-    """Return the model without fields, in the same world; cached per model."""
+    """Return a model in the same world whose robot has solid shapes but no repelling fields; cached per model."""
     known = _KNOWN.get(model)
     if known is None:
         known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)

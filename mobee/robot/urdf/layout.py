@@ -67,7 +67,7 @@ def _locked(joint: UrdfJoint) -> Frame | None:
 
 
 def read_markers(tree: Tree, skeleton: Skeleton, where: dict[tuple[str, str], str]) -> Iterator[Marker]:
-    """A marker for the frame of every link that a fixed joint holds, and of every link at an end of the tree."""
+    """Yield a marker at the frame of each link that is attached by a fixed joint, and of each leaf link of the tree."""
     notes = {link: note for link in skeleton.marked for note in tree.links[link] if note.tag == "mobee" and "marker" in note.attributes}
     taken: set[str] = set()
     for link in sorted(skeleton.marked, key=lambda name: name not in notes):  # names that write_urdf noted come first

@@ -81,9 +81,9 @@ def joint_limits(joint: UrdfJoint) -> Array:
 
 
 def stated_limits(joint: UrdfJoint) -> Array:
-    """The interval (2,) in [rad] or [m] that the file gives a joint, infinite where it states no limit.
+    """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite where the file gives no limit.
 
-    A limit farther than 1e6 is none, and both are none where lower is above upper, which is how files for PyBullet write it.
+    A limit beyond 1e6 counts as infinite. If lower is above upper, both count as infinite: files for PyBullet use this notation.
     """
     limit = child(joint.node, "limit")
     if joint.kind == "continuous":

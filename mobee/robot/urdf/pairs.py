@@ -30,7 +30,7 @@ OwnFields = Literal["none", "far apart", "all"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRules:
-    """What is left out, by links and by links of the URDF; and which fields of one part are tested against each other."""
+    """Rules for the pairs of links whose contacts are not computed, and for the fields of one part that are tested with each other."""
 
     links: dict[str, int]  # URDF link -> link of the robot
     adjacent: dict[LinkPair, str]

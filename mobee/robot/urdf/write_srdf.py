@@ -104,7 +104,10 @@ def _merged(base: Path, lines: list[str]) -> bytes:
 
 
 def _check(unfinished: Path, base: Path, lines: list[str]) -> None:
-    """Raise unless the new text says what the old one said, and the lines: its last </robot> may stand in a comment."""
+    """Raise RobotFileError unless the new file has the elements of the old one plus the new lines.
+
+    They differ if the last </robot> of the old file is inside a comment.
+    """
     before, after = read_xml(base), read_xml(unfinished)
     if [_content(node) for node in after][: len(before.children)] != [_content(node) for node in before] or len(after.children) != len(
         before.children

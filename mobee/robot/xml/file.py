@@ -164,7 +164,7 @@ def _without_second(content: bytes, error: MalformedXml) -> Mended | None:
 
 
 def _as_utf8(content: bytes, error: MalformedXml) -> Mended | None:
-    """Read bytes that are not UTF-8 as unknown letters."""
+    """Replace bytes that are not UTF-8 by U+FFFD and report their first line; None if all bytes are UTF-8."""
     try:
         content.decode("utf-8")
     except UnicodeDecodeError as wrong:

@@ -53,7 +53,7 @@ def rewrite_world_list(root: Node) -> list[Remark]:
 
 
 def _world_volume(thing: Node, volume: Node, name: str) -> Node:
-    """One volume of an object, placed in the root frame; raises RobotFileError for another type than obstacle or target."""
+    """Return one volume of an object with its pose in the root frame; raises RobotFileError if its type is not obstacle or target."""
     attributes = {key: text for key, text in volume.attributes.items() if key not in (*PLACE, *AXIS, "angle", "name")}
     frame, mirrored = _turned(thing)
     turn, _ = _turned(volume)

@@ -47,7 +47,7 @@ class Points:
 
 
 def points(arm: LinearArm, state: Ints, target: Array) -> Points:
-    """Return the reaches from states (n,) for targets (n, 3) m, or for one (3,) m."""
+    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m]."""
     targets = np.broadcast_to(target, (len(state), 3))
     vector = targets - arm.reaches.hands[state]
     return Points(state, targets, vector, arm.remaining(state, vector))
@@ -89,7 +89,7 @@ class Covariance:
 
     @property
     def prior(self) -> float:
-        """Variance of a mean reward before any reach."""
+        """The prior variance of the mean reward of a reach, before any reach was observed."""
         return float(OFFSET + self._value[[_PLACE, _APPROACH, _DISTANCE]].sum())
 
     def between(self, a: Points, b: Points) -> Array:
