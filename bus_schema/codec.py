@@ -17,7 +17,7 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 class Refused(Exception):
-    """A message that must not be used; `reason` is what is counted: type, version, decode, length or value."""
+    """Raised for a message that must not be used; counters group these by `reason`: type, version, decode, length or value."""
 
     def __init__(self, reason: str, text: str) -> None:
         super().__init__(text)

@@ -20,12 +20,18 @@ def meta(part: str) -> str:
 
 
 def drive(part: str, verb: str) -> str:
-    """Ownership of a part's motors: robot_sim; take, arm, release, hold.  The part * stands for all."""
+    """Return the key of a call to robot_sim that owns a part's motors.
+
+    `verb`: take, arm, release or hold.  The part * means all parts.
+    """
     return f"{_part_or_all(part)}/rpc/drive/{chunk(verb)}"
 
 
 def goal(part: str, verb: str) -> str:
-    """Ownership and use of a part's attractor: controller; take, release, goal, force, reach.  The part * stands for all."""
+    """Return the key of a call to the controller that owns or uses a part's attractor.
+
+    `verb`: take, release, goal, force or reach.  The part * means all parts.
+    """
     return f"{_part_or_all(part)}/rpc/{chunk(verb)}"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a message travels on the bus: its key, its delivery class, the services that write and read it."""
+"""Streams of the bus: the key and the delivery class of each message, and the services that write and read it."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 
 class MobeeError(Exception):
-    """The base class; a message says what was given, where, what is valid, and what to do next."""
+    """The base class of MoBeE's exceptions. A message states what was given, where, what is valid, and what to do next."""
 
 
 class RobotFileError(MobeeError):
@@ -37,7 +37,7 @@ class UnknownName(MobeeError, KeyError):
 
 
 class NotInstalled(MobeeError):
-    """A package or a built library is missing, or not for this machine; the message says what to do."""
+    """Raised if a package or the native core is not installed, or was built for another machine; the message gives the remedy."""
 
 
 class ActionInterrupted(MobeeError):
@@ -45,9 +45,9 @@ class ActionInterrupted(MobeeError):
 
 
 class BatchInterrupted(ActionInterrupted):
-    """Some of the plants that went on together did not end as they should; the others did.
+    """Raised if some plants of a batch were interrupted or failed; the other plants ended normally.
 
-    `results`: in the order of the plants, what each came to, or the exception that ended it.  The first of these is the cause.
+    `results`: the result of each plant, in the order of the plants, or the exception that ended it.  The first exception is the cause.
     """
 
     def __init__(self, results: Sequence[object]) -> None:

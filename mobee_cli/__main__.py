@@ -69,7 +69,7 @@ def _main(arguments: list[str]) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Prints what is wrong with the arguments in one line."""
+    """An argument parser that prints an error in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see `{self.prog} --help`\n")

@@ -68,12 +68,12 @@ class LivePlant(BusPlant):
                 raise UserError(f"{error}. `mobee launch reach` starts a system in which no agent owns it.", FAILED) from None
 
     def act(self, part: str, target: Array) -> Outcome:
-        """As a BusPlant, but with an end."""
+        """Do the same as `BusPlant`, but raise an error after REACH_TIMEOUT."""
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """As a BusPlant, but with an end."""
+        """Do the same as `BusPlant`, but raise an error after REACH_TIMEOUT."""
         self._asked, self._begun = time.monotonic(), np.inf
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().reach(part, marker, stay)

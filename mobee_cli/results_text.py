@@ -28,7 +28,7 @@ def _entries(results: Mapping[str, Any], indent: str, width: int) -> Iterator[st
 
 
 def _columns(value: Any) -> tuple[str, ...]:
-    """The names in a row of a table; () for what is no row."""
+    """Return the column names of a table's row; () if the value is not a row."""
     return tuple(value) if isinstance(value, dict) and not any(isinstance(cell, dict) for cell in value.values()) else ()
 
 
@@ -55,7 +55,7 @@ def _entry(label: str, value: Any, indent: str, width: int) -> Iterator[str]:
 
 
 def _needed(rows: Sequence[Sequence[str]]) -> int:
-    """How many of the first cells tell the rows apart; 1 if all do not."""
+    """Return the number of leading cells that make all rows different; 1 if no number does."""
     return next((count for count in range(1, len(rows[0]) + 1) if len({tuple(row[:count]) for row in rows}) == len(rows)), 1)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee topic`: what is published on the bus: list, echo, hz."""
+"""`mobee topic`: shows the messages on the bus: list, echo, hz."""
 
 from __future__ import annotations
 

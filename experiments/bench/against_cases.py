@@ -74,7 +74,10 @@ def _one_arm() -> Work:
 
 
 def _many_plants() -> Work:
-    """The same number of actions of an arm: by one plant in checkouts without batches, by a batch in others."""
+    """Measure actions of an arm: in a batch of plants if the checkout has batches, else on one plant.
+
+    The number of actions is the same.
+    """
     import mobee
 
     workload = _plant_workload()

@@ -43,7 +43,7 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How two runs of the same agents compare, over the actions that both made."""
+    """Comparison of two runs of equal agents, over the actions that occur in both runs."""
 
     actions: int
     worst: float  # rad, between the postures in which they ended
@@ -57,7 +57,7 @@ class Agreement:
 
 
 def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transition]], dict[str, Any]]:
-    """Run live agents for so many ticks; returns what they observed, by part, and the summary.  The run stays in the folder."""
+    """Run live agents for `ticks` ticks; return the transitions of each part and the summary.  The run's files stay in `folder`."""
     summary = summary_of("lockstep", [f"shared.seed={seed}", PATIENCE], ticks=ticks, runs=folder)
     file = Path(summary["run"]) / "transitions.sqlite"
     return {part: TransitionStore(file, part).load() for part in AGENTS}, summary

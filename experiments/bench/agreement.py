@@ -137,7 +137,7 @@ def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Ag
 
 
 def _depths_agree(peer: str, difference: Mapping[str, float]) -> bool:
-    """Whether the depths are the same where this peer has closed forms for them, or finds them to its tolerance."""
+    """Return whether the depths agree within the peer's tolerance, except for pairs of kinds whose depths the peer finds by search."""
     judged = [value for kinds, value in difference.items() if not _SEARCHED & set(kinds.split("-"))]
     return peer not in _PEER_TOLERANCE or max(judged, default=0.0) <= _PEER_TOLERANCE[peer]
 

@@ -208,7 +208,10 @@ def _end(ends: Sequence[socket.socket], processes: Sequence[subprocess.Popen[byt
 
 
 def _serve(receives: int, sends: int) -> None:
-    """Do the work that each message asks for and send the answer on, until the other end is closed.  Arguments: file descriptors."""
+    """Do the work that each received message names and send the answer, until the other end is closed.
+
+    Arguments: file descriptors for receiving and sending.
+    """
     while received := os.read(receives, 65536):
         if received[:1] == _LOOP:
             loop()

@@ -46,7 +46,7 @@ PLAN_STYLES = {  # colour, line
 
 @dataclass(frozen=True, slots=True)
 class CostFigure:
-    """How one figure is made: `measure(quick, rounds)` returns curves, `draw` puts them on two axes."""
+    """The functions of one figure: `measure(quick, rounds)` returns curves, `draw` plots them on two axes."""
 
     measure: Callable[..., Curves]
     draw: Callable[[Any, Any, Curves], None]

@@ -39,7 +39,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How dense the map is [m], and how often all is measured."""
+    """Settings: the spacing of the roadmap [m], and the number of repetitions."""
 
     spacing: float = 0.008  # 5300 vertices
     rounds: int = 5

@@ -58,7 +58,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How many targets there are for torso and arm, for all motors, and for the rivals."""
+    """Settings: the numbers of targets for torso and arm, for all motors, and for the peer solvers."""
 
     targets: int = 300
     whole: int = 60
@@ -152,7 +152,7 @@ def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
 
 
 def fine_target(aim: Target) -> Target:
-    """Return the same pose with tolerances of 1 mm and 1 degree."""
+    """Return the target with tolerances of 1 mm and 1 degree."""
     return replace(aim, metres=0.001, radians=float(np.deg2rad(1.0)))
 
 
@@ -195,7 +195,7 @@ def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
 
 @dataclass(slots=True)
 class Tries:
-    """What a solver needed for each target, in order, whether it was reached or not."""
+    """The costs of a solver for each target, in order, reached or not."""
 
     reached: list[bool] = field(default_factory=list)
     evaluations: list[int] = field(default_factory=list)

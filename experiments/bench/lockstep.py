@@ -34,7 +34,7 @@ CASES = (Case("kinematic", 50, 15.0, 26.0), Case("pybullet", 50, 10.0, 20.0), Ca
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How long each run lasts [s], and the runs."""
+    """Settings: the duration of each run [s], and the cases to run."""
 
     seconds: float = 20.0
     cases: Sequence[Case] = CASES

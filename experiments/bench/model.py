@@ -53,7 +53,7 @@ Rates = dict[str, Array]
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much is measured; `boxes` are around the iCub."""
+    """Settings: sizes and repetitions of the measurements; `boxes`: numbers of boxes around the iCub."""
 
     boxes: tuple[int, ...] = (0, 10, 100, 1000)
     rounds: int = 15

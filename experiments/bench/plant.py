@@ -45,7 +45,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much is run."""
+    """Settings: sizes and repetitions of the runs."""
 
     actions: int = 1000
     reaches: int = 500
@@ -113,7 +113,7 @@ def report(result: dict[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast something ran."""
+    """Times and rates of one run."""
 
     seconds: float  # processor time of this process
     plant_seconds: float  # of all plants

@@ -47,7 +47,7 @@ _TIMED = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How often the library is loaded, how often the system is started, and how long it runs [s]."""
+    """Settings: numbers of imports of the library and of starts of the system, and the duration of its run [s]."""
 
     rounds: int = 15
     systems: int = 3

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How benchmarks measure: on chosen cores, by turns, in processor time."""
+"""Timing for benchmarks: on chosen cores, with the competitors in turns, in processor time."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def verdict(requirements: Sequence[Mapping[str, Any]], **conditions: bool) -> di
 
 
 def calibration_line(speed: float) -> str:
-    """Return the line of a report that says how fast this machine is, as a multiple of the standard machine."""
+    """Return the line of a report with the speed of this machine, as a multiple of the standard machine."""
     return f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"
 
 

@@ -43,7 +43,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How many problems are solved, and how often."""
+    """Settings: the number of problems, and of repetitions."""
 
     problems: int = 1000
     rounds: int = 15
@@ -177,7 +177,7 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
 
 
 def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
-    """Return the model that a curious agent of 81 states and 16 actions has after so many transitions, and its next observations."""
+    """Return the model of a curious agent of 81 states and 16 actions after `transitions` transitions, and its next observations."""
     space = arm_space(neighbours=ACTIONS)
     agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
     agent.run(transitions)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What experiments share: sweeps, statistics, figures, records, live runs."""
+"""Common code of the experiments: sweeps, statistics, figures, records and live runs."""

@@ -57,7 +57,7 @@ def _undecided(claim: Claim, seeds: int) -> Claim:
 
 
 class Method(Protocol):
-    """How an experiment is run and drawn.
+    """The functions that run an experiment and draw its figure.
 
     `run` writes into the folder of a run and may be interrupted at any time: finished parts are on disk, and the next call
     continues after them.  If its result `passed` is False, the command fails.

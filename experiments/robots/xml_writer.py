@@ -14,7 +14,7 @@ from mobee.robot.xml.volume import Y, angle_about, height_and_angle
 
 
 def number(value: float, digits: int = 7) -> str:
-    """Return the shortest text of a number with at most so many decimals."""
+    """Return the shortest text of a number with at most `digits` decimals."""
     text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 

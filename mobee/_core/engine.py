@@ -242,7 +242,7 @@ def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
 
 
 class Grid(NamedTuple):
-    """How a scene sorts its objects: the large ones first, then cell by cell."""
+    """The grid of a scene, in which objects are sorted by cell; large objects come first."""
 
     large: int
     cells: tuple[int, ...]  # along x, y and z

@@ -34,7 +34,7 @@ def machine_levels() -> tuple[str, ...]:
 
 
 def missing(level: str, flags: Iterable[str]) -> list[str]:
-    """What a processor with these flags lacks for a level."""
+    """Return the flags that a level needs and that are not among the processor's flags; empty if the level is unknown."""
     if level not in NEEDS:
         return []
     needed = [flag for name in NEEDS if name <= level for flag in NEEDS[name]]
@@ -48,7 +48,7 @@ def possible_levels(flags: Iterable[str]) -> list[str]:
 
 
 def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
-    """What this processor can do; where the kernel does not tell, what every x86-64 since 2010 can."""
+    """Return the flags of this processor from /proc/cpuinfo; without that file, those of x86-64-v2."""
     try:
         lines = cpuinfo.read_text().splitlines()
     except OSError:

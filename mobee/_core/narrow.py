@@ -103,7 +103,10 @@ def distances(first: Volumes, second: Volumes) -> Reals:
 
 
 def cut(points: Reals, line: Reals, room: int) -> Reals:
-    """What is left of a convex polygon (n, 2) in front of a line (a point on it, its inward normal), in `room` corners at most."""
+    """Clip a convex polygon (n, 2) by a half-plane; return the clipped polygon, which has at most `room` corners.
+
+    `line` (4,): a point on the border of the half-plane, and its inward normal.
+    """
     points, line, out = np.ascontiguousarray(points, float), np.ascontiguousarray(line, float), np.full((room + 8, 2), np.nan)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or line.shape != (4,):
         raise ValueError(f"a polygon is (n, 2) and a line (4,), not {points.shape} and {line.shape}")

@@ -77,7 +77,7 @@ class Subject:
 
     @cached_property
     def limited(self) -> Robot:
-        """The same robot with limits for all motors, as a model needs them."""
+        """The robot with finite limits for all motors: `range` replaces the limits of the file. A model needs finite limits."""
         motors = zip(self.robot.motor_table, self.range, strict=True)
         return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
 

@@ -336,7 +336,10 @@ def _target(path: Path, out: Path | None, used: Path | None, srdf: str | Path | 
 
 
 def _require_links(robot: Robot, path: Path) -> None:
-    """Raise RobotFileError if several links are in one line: only its line says which link of the URDF a shape is on."""
+    """Raise RobotFileError if several links of the URDF are on one line of the file.
+
+    The line number is the only record of which link a shape belongs to.
+    """
     subject = Subject(robot)
     unknown = next((shape for shape in robot.shapes if subject.urdf_link(shape.name) is None), None)
     if unknown is not None:

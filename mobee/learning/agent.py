@@ -130,7 +130,7 @@ class CuriousAgent(CuriousLearner):
         return self.observe(outcome)
 
     def run(self, transitions: int) -> None:
-        """Observe so many more transitions; an interrupted action does not count and is decided again."""
+        """Observe `transitions` more transitions; an interrupted action does not count, and the agent then decides again."""
         end = self.transitions + transitions
         while self.transitions < end:
             try:
@@ -155,7 +155,7 @@ class ConcurrentPlant(Plant, Protocol):
 
 
 def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
-    """Let agents of different parts act at once on their common plant until they have made so many more transitions in all.
+    """Run agents of different parts at once on their common plant until they have made `transitions` more transitions in total.
 
     No action is begun beyond that number, so at the end every part has settled and every transition was observed.
     Raises InvalidValue unless each agent has its own part and all share a plant with `begin` and `advance`.

@@ -31,7 +31,7 @@ class OutcomeModel(Protocol):
 
     @property
     def probabilities(self) -> Array:
-        """Their probabilities, shape (S, A, B), all 0 where a state has no such action."""
+        """Probabilities of the outcomes, shape (S, A, B); all 0 for an action that a state does not have."""
 
 
 class Tabled:

@@ -89,7 +89,7 @@ class Engine:
         return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the same for one pose, given as the bytes of its q."""
+        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
         try:
             room = self._rooms.pop()  # atomic: other threads take buffers too
         except IndexError:

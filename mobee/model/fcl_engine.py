@@ -49,9 +49,9 @@ class FclEngine:
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the projection of those of fields, (B, n).
+        """Return all contacts in the poses q (B, n) [rad], and the projection of the contacts of fields to the motors, (B, n).
 
-        `reaching`, `cut`: as of the compiled engine; `threads` is ignored.
+        `reaching`, `cut`: as for the compiled engine; `threads` is ignored.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -64,7 +64,7 @@ class FclEngine:
         return _table(self.robot, snapshot, numbers, reals), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the same for one pose, given as the bytes of its q."""
+        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
 
@@ -162,7 +162,7 @@ def _overlap(first: Any, second: Any) -> tuple[float, ...] | None:
 
 
 def _contact(first: Any, second: Any) -> tuple[float, ...] | None:
-    """Return the same, computed by fcl.collide; the point is any that both share."""
+    """Return depth, normal and a point that both volumes share, computed by fcl.collide; None: apart."""
     result = fcl.CollisionResult()
     fcl.collide(first, second, _COLLISION, result)
     if not result.contacts or not result.contacts[0].penetration_depth > 0.0:

@@ -22,7 +22,7 @@ class Finder(Protocol):
     """An object that computes contacts."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the projection of those of fields (see `Pose.projection`), (B, n)."""
+        """Return all contacts in the poses q (B, n), and the projection of those of fields to the motors, (B, n), see `Pose.projection`."""
 
 
 class Engine(Protocol):
@@ -35,10 +35,10 @@ class Engine(Protocol):
         """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the projection of those of fields, (B, n)."""
+        """Return all contacts in the poses q (B, n), and the projection of the contacts of fields to the motors, (B, n)."""
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the same for one pose, given as the bytes of its q."""
+        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
 
 
 class Pose:

@@ -102,7 +102,7 @@ def limit_force(s: State) -> Array:
 
 
 def clause_force(s: State) -> Array:
-    """Return f_cst (eqs. 5.14 to 5.17): a clause pushes while none of its rows holds with margin; the robot wants all clauses to hold.
+    """Return f_cst (eqs. 5.14 to 5.17), which keeps all clauses satisfied; a clause acts while none of its rows holds with margin.
 
     A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
     """

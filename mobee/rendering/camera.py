@@ -47,7 +47,7 @@ class Camera:
     eye: Array | None = None
 
     def finer(self, times: int) -> Camera:
-        """Return the same picture with that many times the pixels in both directions."""
+        """Return a camera of the same view with `times` as many pixels in both directions."""
         return replace(self, scale=self.scale * times, width=self.width * times, height=self.height * times)
 
     def pixels(self, points: Array) -> Array:

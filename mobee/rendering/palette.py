@@ -44,7 +44,7 @@ def faded(color: Color, share: float) -> Color:
 
 
 def of_object(kind: str, role: str, given: Sequence[float] | None = None) -> Rgba:
-    """An object's colour: the given one, channels in 0..1, else by what it is."""
+    """Return the colour of an object as bytes: `given` (channels in 0..1) if there is one, else a colour by role and kind."""
     if given is not None:
         red, green, blue, opacity = (round(255 * channel) for channel in given)
         return red, green, blue, opacity

@@ -44,7 +44,7 @@ def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, ra
 
 
 class _Lamp:
-    """A lamp above the camera's left shoulder; what it lights is what a camera in its place sees."""
+    """A lamp above and to the left of the camera; it lights the surfaces that a camera at its position would see."""
 
     def __init__(self, camera: Camera, solids: Sequence[Solid]) -> None:
         self._axes = _lamp_axes(camera)
@@ -106,7 +106,7 @@ def _floor(camera: Camera, lamp: _Lamp, height: float | None) -> Floats:
 
 
 def _outlines(seen: Raster) -> Floats:
-    """How dark the outlines are in each pixel, (H, W): where the group or the depth changes, or at a fold."""
+    """Return the darkness of outlines in each pixel, (H, W): lines are where the group, the depth or the surface direction changes."""
     lines = np.zeros(seen.depth.shape, np.float32)
     for first, second in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
         with np.errstate(invalid="ignore"):  # between two pixels of nothing
@@ -120,7 +120,7 @@ def _outlines(seen: Raster) -> Floats:
 
 
 def _hollows(seen: Raster, camera: Camera, times: int) -> Floats:
-    """How far behind its surroundings each surface is, (H, W) of the coarse picture, in 0..1."""
+    """Return how far each surface is behind its surroundings, in 0..1, (H, W) of the coarse picture; used to darken hollows."""
     something = np.isfinite(seen.depth)
     weight = _coarse(something.astype(np.float32), times)
     depth = _coarse(np.where(something, seen.depth, np.float32(0.0)), times)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The volumes of a picture with their colours, and how a robot, a world and a path become such volumes."""
+"""Coloured volumes of a picture, and their construction from a robot, a world and a path."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
 
 
 def world_from_json(objects: Sequence[dict[str, Any]]) -> World:
-    """Return a new world of such objects; raises KeyError or InvalidValue if they are not valid."""
+    """Return a new world with the objects of a roadmap file; raises KeyError or InvalidValue if they are not valid."""
     world = World()
     for one in objects:
         place = {"position": one["position"], "rotation": one["rotation"]}

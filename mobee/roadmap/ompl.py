@@ -137,7 +137,7 @@ def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, ex
 def grown(
     kind: str, checker: ValidityChecker, milestones: int, neighbours: int | None, seed: int, resolution: float | None = None
 ) -> Grown:
-    """Grow a PRM or PRMstar over the box until it has so many vertices.
+    """Grow a PRM or PRMstar over the box until it has `milestones` vertices.
 
     `neighbours`: the nearest ones that each is tried to be joined with; None: the planner's own rule.  `resolution`: of the ranges,
     between poses of a motion that OMPL checks itself, one by one; None: the checker checks motions.  Raises OmplMissing.
@@ -283,7 +283,7 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap as `prm`, with so many neighbours that its paths are asymptotically optimal (Karaman and Frazzoli 2011)."""
+    """Grow a roadmap as `prm` does, with the number of neighbours for asymptotically optimal paths (Karaman and Frazzoli 2011)."""
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 

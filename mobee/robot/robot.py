@@ -210,7 +210,7 @@ def _fixed(array: Array) -> Array:
 
 
 def per_robot(build: Callable[[Robot], T]) -> Callable[[Robot], T]:
-    """Decorate a function of a robot so that it is called once for each robot object; nobody may change what it returned."""
+    """Decorate a function of a robot to cache its result for each robot object; callers must not change the result."""
     kept: WeakKeyDictionary[Robot, T] = WeakKeyDictionary()
 
     @wraps(build)

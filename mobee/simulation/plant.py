@@ -235,7 +235,7 @@ class OfflinePlant:
         self.model.world.follow(self.model.evaluate(self._q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
-        """Call a function with the plant's time [s] every so many ticks; it may edit the world.  None: stop calling."""
+        """Call `callback` with the plant's time [s] every `ticks` ticks; it may edit the world.  None: stop calling."""
         if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
             raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
         self._period, self._callback = ticks, callback
@@ -267,7 +267,7 @@ class OfflinePlant:
         finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
-        """Run so many ticks, whether actions end or not; returns the trace."""
+        """Run `ticks` ticks, also if actions end before; return the trace."""
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:

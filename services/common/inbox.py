@@ -101,7 +101,7 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """As `offer`, but do not wake the main thread: the handler runs before the next one that `put` queues."""
+        """Queue a handler as `offer` does, but without waking the main thread; it runs before the next handler that `put` queues."""
         if len(self._later) >= crowd:
             self.dropped += 1
             return False
@@ -124,7 +124,7 @@ class Inbox:
         self._spin(until, enough, self._awaited)
 
     def serve(self, until: float) -> None:
-        """As spin, but other threads may run handlers by `handle` while this one waits.
+        """Run handlers as `spin` does; other threads may run handlers by `handle` while this thread waits.
 
         The thread that has received a message then also answers it, which saves two changes of threads.
         """
@@ -158,7 +158,10 @@ class Inbox:
         return self._queue.get(timeout=seconds) if seconds > 0 else self._queue.get_nowait()
 
     def _called(self, seconds: float) -> Handler:
-        """The same, but other threads may run handlers meanwhile; none is taken out of the queue before, to keep the order."""
+        """Wait for a handler while other threads may run handlers.
+
+        A handler stays in the queue until this thread continues, which keeps the order.
+        """
         if seconds > 0 and self._queue.empty():
             self._turn.release()
             try:

@@ -96,7 +96,7 @@ class Listener:
         self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
-        """As on_clock, with the newest state of every part in each tick."""
+        """Call a handler at each tick of the clock, with the newest state of every part."""
 
         def whole(tick: Tick) -> None:
             if tick.parts.keys() == self.bus.part_sizes.keys():

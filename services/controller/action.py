@@ -37,7 +37,7 @@ class Action:
         self.settle_again(k, t)
 
     def settle_again(self, k: int, t: float) -> None:
-        """The same action continues at tick k, and ends when the part has settled once more."""
+        """Continue the action at tick k with a new settle test; it ends when the part has settled again."""
         self._test = SettleTest(self._settle, t)
         self._set_status("moving", k)
 

@@ -30,7 +30,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Posture of a part without owner, rad, by part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: the robot must be able to take the posture, and the terms must be there."""
+        """Check also that the robot can take the posture, and that the terms can be loaded; raises MobeeError."""
         super().check_robot(robot)
         if self.terms:
             load_terms(self.terms)

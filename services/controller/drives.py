@@ -69,7 +69,7 @@ class Drives:
         return not self._stopped and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:
-        """Begin to take and arm a part that is idle or in hold; `is_armed` tells when it has succeeded."""
+        """Begin to take and arm a part that is idle or in hold; `is_armed` becomes true when the part is armed."""
         now = self._now()
         if not self.can_arm(state) or now < self._next_try[part] or part in self._attempts:
             return

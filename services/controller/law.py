@@ -109,7 +109,7 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Not under control: at rest where the part was measured."""
+        """Set the state of a part that is not controlled: at rest at its measured position."""
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:

@@ -11,7 +11,7 @@ AGENT = "agent_"
 
 @dataclass(frozen=True)
 class Entry:
-    """A service as the launcher knows it before it reads its settings."""
+    """The fixed properties of a service, before its settings are read."""
 
     module: str  # run with `python -m mobee_system.run`
     config: str  # its configuration: module:class

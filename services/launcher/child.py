@@ -64,7 +64,7 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Of the present process, 0 when there is none."""
+        """The process id; 0 while no process runs."""
         return 0 if self.process is None else self.process.pid
 
     def enter(self, phase: Phase) -> None:

@@ -41,7 +41,7 @@ class Supervisor:
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
-        """Start all processes; those that wait for no other join at once, the others while the launcher spins."""
+        """Start all processes; those without dependencies connect at once, the others when their dependencies are ready."""
         for child in self.children.values():
             child.spawn()
         self._check_all()

@@ -50,7 +50,7 @@ class WorldServer:
             self._service.bus.event("info", "expired", f"{name} was removed: it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
-        """Positions of those named objects that are in the world, m, root frame."""
+        """Return the positions [m], root frame, of the named objects; names that are not in the world are left out."""
         known = self._model.world.objects
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 

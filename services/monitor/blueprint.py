@@ -31,7 +31,7 @@ def extent_of(robot: Robot) -> tuple[Array, float]:
 
 
 def eye_of(robot: Robot) -> tuple[Array, Array]:
-    """From where the whole robot is seen, and the middle of what is seen, each (3,) m."""
+    """Return the position of the camera that sees the whole robot, and the centre of its view, each (3,) m."""
     centre, diameter = extent_of(robot)
     eye: Array = centre + DISTANCE * diameter * VIEWPOINT / np.linalg.norm(VIEWPOINT)
     return eye, centre
@@ -47,7 +47,7 @@ TABS = ("robot", "learning")
 
 @dataclass(frozen=True)
 class Shown:
-    """What is on the page.
+    """The content of the monitor's page.
 
     `name`: of the robot.  `parts`: those with plots.  `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
     """

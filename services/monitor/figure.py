@@ -36,7 +36,7 @@ def drawn(
 
 
 def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
-    """What changes the colour of a volume that is drawn already."""
+    """Return the Rerun components that change the colour of a volume of this kind."""
     if kind == "convex":
         return rr.Mesh3D.from_fields(albedo_factor=color)
     if kind == "box":
@@ -104,7 +104,7 @@ class Figure:
         self._columns(["plots", "motors"], times, rr.Scalars.columns(scalars=shares.ravel()).partition([len(low)] * len(poses)))
 
     def say(self, begin: float, text: str) -> None:
-        """What happens from `begin` [s] on."""
+        """Log a text of the event that begins at `begin` [s]."""
         self._stream.set_time(TIMELINE, duration=begin)
         self._stream.log("events", rr.TextLog(text, level="INFO"))
 

@@ -90,7 +90,7 @@ class Scene:
         self._looks += 1
 
     def set_objects(self, objects: list[ObjectState]) -> None:
-        """What the model has in its world."""
+        """Show the objects of the model's world and remove those that are no longer in it."""
         known = {thing.name: thing for thing in objects}
         for name in self._objects.keys() - known.keys():
             self._stream.log(f"scene/objects/{name}", rr.Clear(recursive=False))
@@ -165,7 +165,10 @@ class Scene:
 
 
 def _plain(path: Path) -> Path:
-    """The same URDF file in neutral colours, for red means contact, and without collision geometry, which would double the data."""
+    """Return the URDF file in neutral colours and without collision geometry.
+
+    Red is the colour of contacts; collision geometry would double the data.
+    """
     tree = defusedxml.ElementTree.parse(path)
     for color in tree.getroot().iter("color"):
         red, green, blue, _ = (float(channel) for channel in color.attrib["rgba"].split())

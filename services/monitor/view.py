@@ -46,7 +46,7 @@ def sweep(robot: Robot) -> list[Stretch]:
 
 
 def _reach(robot: Robot, motor: Motor) -> str:
-    """How far a motor moves its first joint."""
+    """Return the range of a motor's first joint as text, in degrees or m."""
     if not motor.joints:
         return "moves no joint"
     index, scale, offset = motor.joints[0]

@@ -25,7 +25,7 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Share:
-    """What each joint gets in a substep: a torque where `free`, else a velocity; each (d,)."""
+    """The command of each joint in a substep: a torque where `free`, else a velocity; each (d,)."""
 
     free: Mask
     torque: Array  # N m, what passes the gear; 0 where not free
@@ -33,7 +33,7 @@ class Share:
 
 
 class Gears:
-    """Solves a substep of motor, gear and arm as one, implicitly, and says what torque passes the gear.
+    """Solves a substep of motor, gear and arm together, implicitly, and returns the torque that passes the gear.
 
     A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside.
     Both are far larger than the inertia of a wrist, so an explicit step of 5 ms would explode.  What acts from outside (contacts)
@@ -75,7 +75,7 @@ class Gears:
         return share
 
     def _outside(self, now: Motion, h: float) -> Array:
-        """What acted on the joints that were free in the last substep, beside torque and bias, N m."""
+        """Return the external torques [N m] on the joints that were free in the last substep; 0 for the other joints."""
         if self._last is None:
             return self._nothing
         then, share = self._last

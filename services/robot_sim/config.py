@@ -52,7 +52,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: PyBullet moves the iCub only, and only some robots' motors were identified."""
+        """Check also that PyBullet can simulate the robot, and that identified motor parameters exist for it; raises MobeeError."""
         super().check_robot(robot)
         if self.backend == "pybullet":
             require_simulated(robot)
@@ -73,6 +73,6 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """Vertical field of view, in degrees."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: a robot needs eyes."""
+        """Check also that the robot has eyes; raises MobeeError."""
         super().check_robot(robot)
         require_eyes(robot)

@@ -146,7 +146,7 @@ class Admission:
         return _all(np.isfinite(reference))
 
     def _refuse(self, mode: str, reference: Array) -> None:
-        """Raise Refused with what is wrong."""
+        """Raise Refused for a reference that is not valid; the message gives the defect."""
         if not np.isfinite(reference).all():
             raise Refused("value", f"{self._part}: NaN or infinity")
         if mode == "position":
@@ -326,7 +326,7 @@ class Gate:
         self._in_force = InForce(order, now + order.ttl * 1_000_000)
 
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
-        """What the motors do in tick k; `q` rad and `velocity` rad/s (n,): measured."""
+        """Return the order for the motors in tick k; `q` [rad] and `velocity` [rad/s] (n,) are measured."""
         current = self._in_force
         if current is not None and self._has_expired(current, k, now):
             current = None

@@ -17,7 +17,7 @@ SIMULATED = "icub"  # the robot that PyBullet's URDF describes
 
 
 class BackendUnavailable(InvalidValue):
-    """A back-end that cannot be used; the message says what to do instead."""
+    """Raised if a back-end cannot be used; the message gives the alternative."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 @dataclass(slots=True)
 class Stops:
-    """How fast held parts stop: the stop in progress of each part, and the largest time and distance of the stops that ended."""
+    """Statistics of the stops of held parts: the stop in progress of each part, and the largest time and distance of ended stops."""
 
     count: int = 0
     time_max: float = 0.0  # s

@@ -21,6 +21,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """How long a position may be used after the picture was taken, in s of simulated time."""
 
     def check_robot(self, robot: Robot) -> None:
-        """As ServiceConfig: a robot needs eyes."""
+        """Check also that the robot has eyes; raises MobeeError."""
         super().check_robot(robot)
         require_eyes(robot)

@@ -195,7 +195,7 @@ class Run:
 
     @property
     def value_jump_before(self) -> float:
-        """The same in a time of the same length before the change."""
+        """The highest value of these actions in a window of equal length before the change, over their value just before that window."""
         return self._jump(self.checks_before - WINDOW // CHECK_PERIOD)
 
     def _jump(self, check: int) -> float:

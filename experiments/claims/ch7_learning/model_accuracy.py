@@ -100,7 +100,7 @@ def plant_of(world: str) -> Callable[[int], Plant]:
 
 
 def half_space_plant(seed: int) -> TabularPlant:
-    """Return the half-space in which the states 24, 51 and 78 are separated from the others."""
+    """Return the plant with a half-space obstacle that separates the states 24, 51 and 78 from the other states."""
     space = space_of("half-space")
     return TabularPlant(space, *half_space(space), seed)
 

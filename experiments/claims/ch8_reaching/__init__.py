@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thesis chapter 8, and what it promises in 4.3, 5.3 and 9: learning to reach, beside planners."""
+"""Experiments on learning to reach (thesis chapter 8 and the claims of 4.3, 5.3 and 9), compared with planners."""

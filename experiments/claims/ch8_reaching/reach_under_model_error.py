@@ -137,7 +137,7 @@ class Contestant(Protocol):
     """Makes tries; an evaluation leaves what it has learned unchanged."""
 
     def learn(self, tries: int) -> None:
-        """Make so many more tries, each of the target least tried (thesis 8.3.2)."""
+        """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2)."""
 
     def evaluate(self, repetitions: int) -> Score:
         """Reach for all targets in random order, from a random state in each repetition (thesis 8.3.3)."""
@@ -178,7 +178,7 @@ class Learner:
 
 
 class Planner:
-    """The planner peer, which learns nothing but what it remembers."""
+    """The planner that is compared: it plans with the model, and remembers its earlier tries."""
 
     def __init__(self, scene: Scene, memory: Memory, seed: int) -> None:
         self._scene, self._seed, self._tries, self._seconds = scene, seed, 0, 0.0

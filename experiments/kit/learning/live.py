@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same agents on the offline plant, and on the live processes in lockstep; finished transitions are kept on disk."""
+"""Runs equal agents on the offline plant and on the live processes in lockstep; stores finished transitions on disk."""
 
 from __future__ import annotations
 

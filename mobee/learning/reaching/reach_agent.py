@@ -97,7 +97,10 @@ class ReachAgent(ReachLearner):
         return self.last
 
     def learn(self, problems: Sequence[ReachTarget], tries: int) -> None:
-        """Make so many more problem-tries, each of the least-tried problem, ties random; interrupted actions are decided again (8.3.2)."""
+        """Make `tries` more problem-tries, each of the least-tried problem; ties are broken at random (thesis 8.3.2).
+
+        After an interrupted action the agent decides again.
+        """
         end = self.tries + tries
         while self.tries < end:
             target = self.problems.targets[self.under_way] if self.under_way is not None else None

@@ -114,7 +114,7 @@ class UpperBound(Greedy):
 
 
 class Thompson(Greedy):
-    """One draw of the reward function for the problem-try; needs a predictor that can be sampled."""
+    """Thompson sampling: one sample of the reward function for each problem-try; needs a predictor that can be sampled."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the drawn rewards, shape (S,)."""

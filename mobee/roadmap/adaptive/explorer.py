@@ -58,7 +58,10 @@ class MapExplorer(Walker):
         return super().settings | {"seed": self.seed}
 
     def explore(self, edges: int | None = None) -> bool:
-        """Try at most so many edges; return whether all reachable ones were tried.  Raises ActionInterrupted if the plant does."""
+        """Try at most `edges` edges (None: no limit); return whether all reachable edges were tried.
+
+        Raises ActionInterrupted if the plant interrupts an action.
+        """
         done = 0
         while edges is None or done < edges:
             here = self.enter()

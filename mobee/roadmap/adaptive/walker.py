@@ -70,7 +70,7 @@ class Walker:
         return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
 
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
-        """Move to one of the goals over at most so many edges, with a new plan after each edge that fails.
+        """Move to one of the goals over at most `most` edges (None: no limit), with a new plan after each edge that fails.
 
         Raises MobeeError if no path is left, ActionInterrupted if the plant does.
         """

@@ -175,7 +175,7 @@ FIRST_ROUNDS = 8  # of tries at random points, until the first pose is found
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """How long a point is tried that was not reached from its neighbours' postures.
+    """Limits of the work on a lattice point that was not reached from its neighbours' postures.
 
     `starts`: least-squares starts per try.  `tries`: number of tries; `hopeless`: number of tries of a point that no solution reaches
     even with contacts; `between`: number of tries of an intermediate point.  `scouts`: random points tried at once, far from all vertices.

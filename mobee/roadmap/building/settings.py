@@ -55,7 +55,7 @@ class SearchSettings:
 
 @dataclass(frozen=True, slots=True)
 class RoadmapSettings:
-    """How `build_roadmap` finds the poses of a roadmap and joins them by edges.
+    """Settings of `build_roadmap`: the search for poses, and the edges between them.
 
     Raises InvalidValue or UnknownName for a value that is not valid.
 

@@ -78,7 +78,10 @@ class Descent:
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
-    """Return a pose (n,) within all tolerances, the cheapest of those found at once; None if there are no aims or none was found."""
+    """Return a pose (n,) [rad] within all tolerances, or None if the problem has no aims or no such pose was found.
+
+    Of several poses found in the same run, it is the one with the lowest cost.
+    """
     descent = Descent(problem)
     if not descent.count:
         return None

@@ -89,7 +89,7 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 
 
 class Problem:
-    """The terms of a cost over some motors, the others stay at the start; counts the evaluated poses."""
+    """A cost, the sum of its terms, over the motors that may move; the other motors keep their start. Counts evaluated poses."""
 
     def __init__(
         self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None, margin: float = 0.0

@@ -219,7 +219,7 @@ def _blocks(folder: Path) -> list[Block]:
 
 
 def _touchable() -> frozenset[int]:
-    """Return the numbers of those of the 27 targets that can be reached."""
+    """Return the indices of the reachable targets among the 27."""
     known = belief()
     return frozenset(number for number, target in enumerate(grid_targets()) if touchable(known, target))
 

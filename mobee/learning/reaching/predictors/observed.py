@@ -47,7 +47,7 @@ class Reached:
 
     @property
     def count(self) -> Array:
-        """How often each pair was tried, shape (n,)."""
+        """The number of reaches observed for each pair of state and target, shape (n,)."""
         return self._count[: len(self)]
 
     @property
