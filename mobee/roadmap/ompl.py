@@ -20,7 +20,7 @@ RANGE = 0.25  # of the ranges, the longest extension
 
 
 class OmplMissing(MobeeError):
-    """Raised when a planner of OMPL is asked for and OMPL is not installed."""
+    """Raised if a planner of OMPL is used and OMPL is not installed."""
 
 
 def require_ompl() -> tuple[Any, Any, Any]:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot is, and the files that describe robots and worlds."""
+"""The description of a robot, and the readers and writers of robot and world files."""

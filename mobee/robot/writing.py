@@ -14,7 +14,7 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """How one motor drives a joint: joint = scale * motor + offset."""
+    """The drive of a joint by one motor: joint = scale * motor + offset."""
 
     motor: int
     scale: float

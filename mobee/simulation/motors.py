@@ -171,7 +171,7 @@ class Motors:
 
     @property
     def efforts(self) -> Array:
-        """What the motors exert [N m]."""
+        """Torques that the motors exert [N m]."""
         return self.state["effort"].copy()
 
     @efforts.setter
@@ -185,7 +185,7 @@ class Motors:
 
     @property
     def torques(self) -> Array:
-        """What left the delay line in the last substep [N m], 0 where a motor is not in torque mode."""
+        """Torque commands that left the delay line in the last substep [N m]; 0 for a motor that is not in torque mode."""
         return self.state["applied_torque"].copy()
 
     @property
@@ -229,7 +229,7 @@ class Motors:
         return velocity
 
     def move(self, substeps: int, dt: float) -> None:
-        """Advance by so many substeps of dt [s] under the same load; only the hard stops block the joint sides."""
+        """Advance by `substeps` substeps of dt [s] with constant load; only the hard stops block the joint sides."""
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)
 

@@ -279,7 +279,7 @@ class OfflinePlant:
         return Trace.of(np.concatenate(rows))
 
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
-        """Run up to so many ticks, fewer if an action ends; returns the record (ticks, 3 n + 2), empty unless `traced` or hashed."""
+        """Run up to `most` ticks, until an action ends; return the record (ticks, 3 n + 2), which is empty unless `traced` or hashed."""
         if self._callback is not None:
             most = min(most, self._period - self._ticks % self._period)
         address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced, self.reaching)

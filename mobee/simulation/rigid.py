@@ -96,7 +96,7 @@ def _stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool, solids:
 
 
 def _brought(robot: Robot, kept: NDArray[np.bool_]) -> Array:
-    """Return the link poses (L, 4, 4) with the kept joints at zero and the others at home."""
+    """Return the link poses (L, 4, 4) with the kept joints at zero and all other joints at home."""
     still = tuple(_driving(motor, ~kept, np.arange(len(kept))) for motor in robot.motor_table)
     return link_transforms(replace(robot, motor_table=still), robot.home)
 

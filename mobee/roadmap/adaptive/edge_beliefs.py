@@ -81,7 +81,7 @@ class EdgeBeliefs:
         self.last[state, action] = arrived
 
     def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
-        """Return the same beliefs for another table of goals: entry (states, actions) there was entry `before` here."""
+        """Return these beliefs in a new table of goals; its entries (states, actions) are the entries `before` of this table."""
         found = EdgeBeliefs(goals, self.mode, self.forgetting)
         for name in ("worked", "failed", "tried", "last"):
             getattr(found, name)[states, actions] = getattr(self, name)[before]

@@ -32,7 +32,7 @@ class TaskIK:
         self._descent = Descent(problem, [pair for number, low in enumerate(task.box[:, 0]) for pair in self._aims(number, float(low))])
 
     def random_starts(self, count: int, rng: np.random.Generator) -> Array:
-        """Draw starts (count, n): random for the motors that affect the aims and terms, the problem's start for the others."""
+        """Draw start poses (count, n): random for motors that affect aims or terms; all other motors keep the problem's start."""
         low, high = self._problem.limits.T
         drawn = rng.uniform(low, high, (count, len(low)))
         return self._problem.whole(np.where(self._descent.drawn, drawn, self._problem.start[self._problem.free]))

@@ -52,7 +52,7 @@ def unit_vector(name: str, given: ArrayLike) -> Array:
 
 
 def lengths(vectors: Array) -> Array:
-    """Of vectors (..., d), (...,)."""
+    """Return the lengths (...,) of vectors (..., d)."""
     found: Array = np.sqrt((vectors**2).sum(axis=-1))
     return found
 

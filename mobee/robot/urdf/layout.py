@@ -56,7 +56,7 @@ def lay_out(tree: Tree) -> Skeleton:
 
 
 def _locked(joint: UrdfJoint) -> Frame | None:
-    """Where a joint whose limits leave it one place holds what it carries; None for one that moves."""
+    """Return the fixed pose of a joint whose lower and upper limits are equal; None for a joint that can move."""
     if child(joint.node, "mimic") is not None or child(joint.node, "limit") is None:
         return None
     low, high = stated_limits(joint)

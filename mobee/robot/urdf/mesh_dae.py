@@ -104,7 +104,7 @@ def _points(path: Path, geometry: _Element) -> Array:
 
 
 def _corners(path: Path, geometry: _Element, vertices: str) -> Ints:
-    """The numbers of the points that faces name, of those that the element <vertices> of that id stands for."""
+    """Return the indices of the points that the faces of a geometry use; `vertices`: the id of its element <vertices>."""
     found = [np.empty(0, dtype=np.intp)]
     for faces in (element for tag in FACES for element in geometry.all(tag)):
         inputs = [element for element in faces.children if element.tag == "input"]
@@ -127,7 +127,7 @@ def _offset(path: Path, given: _Element) -> int:
 
 
 def _placed(path: Path, root: _Element, shapes: dict[str, Array]) -> list[Array]:
-    """The points of every geometry that the scene shows, each where it stands."""
+    """Return the points of all geometries of the scene, each transformed by its nodes."""
     nodes = {node.attributes.get("id", ""): node for node in root.all("node")}
     stack = [(scene, np.eye(4)) for scene in root.all("visual_scene")]
     placed: list[Array] = []

@@ -85,7 +85,7 @@ def _matrix(pairs: dict[NamePair, str] | set[NamePair], names: dict[str, int]) -
 
 
 def untested_links(shapes: Sequence[Shape], solid_pairs: Ints, rules: PairRules) -> dict[LinkPair, str]:
-    """Of every two links that are never tested against each other the reason."""
+    """Return the pairs of links that are never tested for contact, each with the reason."""
     enabled = {frozenset(rules.links[name] for name in pair) for pair in rules.srdf.enabled}
     tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in solid_pairs.tolist()}
     untested = {pair: reason for pair, reason in rules.adjacent.items() if pair not in enabled}

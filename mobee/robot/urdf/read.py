@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a robot from a URDF and its SRDF; docs/robots.md lists what is read as what."""
+"""Reads a robot from a URDF and its SRDF; docs/robots.md lists the meaning of each element."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from mobee.robot.xml.pairs import without_ignored
 
 @dataclass(frozen=True, slots=True)
 class UrdfOptions:
-    """How a URDF is to be read.
+    """Options for reading a URDF.
 
     `field`: how much farther than the body the fields reach, in [m]; None: no fields. `meshes`: the convex hull of a mesh
     ("hull"), or the smallest sphere, capsule, cylinder or box around it ("bounding"). `corners`: how many a hull may have, from 8
@@ -163,7 +163,7 @@ class _Body:
 
 
 def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], options: UrdfOptions, where: dict[tuple[str, str], str]) -> _Body:
-    """What is on the base belongs to the part of the first joint."""
+    """Read the shapes of all links; shapes on the base belong to the part of the first joint."""
     part_of = {joint + 1: motor.part for motor in motors for joint, _, _ in motor.joints}
     part_of[0] = part_of[1]
     reader = ShapeReader(options.meshes, options.corners, {motor.part for motor in motors})

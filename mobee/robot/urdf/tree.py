@@ -25,7 +25,7 @@ FREE = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfJoint:
-    """A joint as its element says; `axis` is a unit vector in the joint's own frame."""
+    """A joint with the values of its element; `axis` is a unit vector in the joint's own frame."""
 
     node: Node
     name: str

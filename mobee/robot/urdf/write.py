@@ -30,7 +30,7 @@ class GeometryWriter:
     written: int = 0
 
     def solid(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
-        """Add a solid to a link whose frame stands at `point`; a capsule is drawn as a cylinder with two spheres."""
+        """Add a solid to a link with its frame at `point` (root frame); a capsule is written as a cylinder and two spheres."""
         for name, part in _parts(shape):
             geometry = self._geometry(part)
             for tag in ("visual", "collision"):

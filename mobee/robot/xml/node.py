@@ -139,7 +139,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """How an element was interpreted; a warning if it was not read literally."""
+    """A note or warning on the interpretation of an element; a warning if the element was not read literally."""
 
     node: Node
     what: str

@@ -42,7 +42,7 @@ GENERATION = "VirtualSkin or MoBeE, 2011 to 2014"
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What shows that a file is of 2010 to 2014; `certain` where MoBeE 0.1 could not read it."""
+    """A sign that a file was written in 2010 to 2014; `certain` if MoBeE 0.1 could not read the file."""
 
     node: Node
     what: str
@@ -55,7 +55,10 @@ class Evidence:
 
 
 def find_evidence(root: Node) -> Evidence | None:
-    """What shows best that a robot file is of 2010 to 2014, first what names a generation; certain where anything in the file is."""
+    """Return the clearest sign that a robot file was written in 2010 to 2014; None if there is none.
+
+    A sign that names the generation of the format comes first. The result is certain if any sign in the file is.
+    """
     found = sorted(_evidence(root), key=lambda one: (one.generation == GENERATION, not one.certain))
     return replace(found[0], certain=any(one.certain for one in found)) if found else None
 
@@ -139,7 +142,10 @@ def _rewrite_structure(root: Node, old: bool) -> list[Remark]:
 
 
 def _known_children(node: Node, old: bool) -> tuple[list[Node], list[Remark]]:
-    """What an element holds, with the content of unknown tags in their place; `old`: a file of 2010, in which <branch> is known."""
+    """Return the children of an element, in which unknown tags are replaced by their own children.
+
+    `old`: the file is of 2010, when <branch> was a tag of the format.
+    """
     kept, remarks = list[Node](), list[Remark]()
     waiting = list(reversed(node.children))
     while waiting:
@@ -214,7 +220,7 @@ def _fixed(node: Node) -> Remark:
 
 
 def _named_again(node: Node, first: Node) -> list[Remark]:
-    """What the second element of a motor says of it in vain."""
+    """Return remarks on the attributes that a second element of a motor changes; these are ignored."""
     vain = [
         name
         for name in ("minPos", "maxPos", "home", "idx")
@@ -297,7 +303,10 @@ def _has_row(node: Node) -> bool:
 
 
 def _rewrite_bodies(root: Node) -> list[Remark]:
-    """Radii that draw nothing, flags that are not set, what stands in a joint, and markers without a name or with one that is taken."""
+    """Rewrite the bodies of an old file and return the remarks.
+
+    Changed are radii without effect, missing flags, shapes inside a joint, and markers whose name is absent or already used.
+    """
     remarks: list[Remark] = []
     taken: Counter[str] = Counter()
     waiting = [(root, False)]

@@ -100,9 +100,9 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """What still has to be left out of one role where the file's rule leaves out `untested`.
+    """Return the elements by which a file excludes the pairs of a role that its rule `untested` still includes.
 
-    `own`: by that rule fields of one part are tested against each other too.
+    `pairs`: indices of the shapes to be tested with each other. `own`: the rule also tests fields of one part with each other.
     """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)

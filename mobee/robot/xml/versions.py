@@ -106,7 +106,7 @@ def _version(root: Node) -> tuple[Version, list[Remark], bool]:
 
 
 def _extensions(root: Node) -> Iterator[str]:
-    """What in a file without a clear version MoBeE 0.1 brought: "<joint motor=> in line 7"."""
+    """Yield the tags and attributes of a file that MoBeE 0.1 introduced, for example "<joint motor=> in line 7"."""
     for node in descendants(root):
         if node.tag in _TAGS_OF_0_1:
             yield f"<{node.tag}> in line {node.line}"
