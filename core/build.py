@@ -152,7 +152,7 @@ def compiler_for(levels: Sequence[str]) -> Compiler:
 
 def zig_requirement() -> str:
     """The package that stands in for a system's compiler, in the version that is known to work."""
-    return re.search(r"^ziglang==[\w.]+", COMPILER_LOCK.read_text(), re.MULTILINE)[0]  # type: ignore[index]
+    return re.search(r"^ziglang==[\w.]+", COMPILER_LOCK.read_text(), re.MULTILINE)[0]  # type: ignore[index]  # the lock has this line
 
 
 def oldest_glibc(library: Path) -> tuple[int, int] | None:

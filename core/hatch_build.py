@@ -56,4 +56,4 @@ def wheel_platform(libraries: list[Path]) -> str:
     needed = [core.oldest_glibc(library) for library in libraries]
     if None in needed:
         return f"{sys.platform}_{platform.machine()}"
-    return "manylinux_{}_{}_{}".format(*max(needed), platform.machine())  # type: ignore[type-var]
+    return "manylinux_{}_{}_{}".format(*max(needed), platform.machine())  # type: ignore[type-var]  # None was excluded above

@@ -33,7 +33,7 @@ def main() -> None:
     if fuzzer:
         command = command[1:]
     if not command:
-        sys.exit(f"usage: {__doc__.splitlines()[2].strip()}")  # type: ignore[union-attr]
+        sys.exit(f"usage: {__doc__.splitlines()[2].strip()}")  # type: ignore[union-attr]  # this file has a docstring
     try:
         level, folder = knowledge().SANITIZED, knowledge().FOLDER
         compiler = compiler_for([level])

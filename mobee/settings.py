@@ -88,7 +88,7 @@ def accepts(settings: type[Settings]) -> Callable[[C], C]:
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=field.type)
             for name, field in defined.items()
         ]
-        constructor.__signature__ = own.replace(parameters=listed)  # type: ignore[attr-defined]
+        constructor.__signature__ = own.replace(parameters=listed)  # type: ignore[attr-defined]  # read by inspect.signature
         return constructor
 
     return decorate

@@ -96,7 +96,7 @@ def _run(verb: str, arguments: list[str]) -> int:
             raise
         print(f'mobee {verb}: needs {error.name}, which is not installed: pip install "mobee[{EXTRAS[error.name]}]"', file=sys.stderr)
         return ENVIRONMENT
-    except Exception as error:
+    except Exception as error:  # NotInstalled is checked by name: importing mobee.errors here would slow down every verb
         if not _is_not_installed(error):
             raise
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)

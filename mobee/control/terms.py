@@ -59,7 +59,7 @@ class Term:
         """Return the force of the function; raises InvalidValue with the name of the term if it fails or is not valid."""
         try:
             given = self.function(state)
-        except Exception as error:
+        except Exception as error:  # code of the user, which may raise anything
             raise InvalidValue(f"term {self.name!r}: its function raised {type(error).__name__}: {error}") from error
         return checked_force(f"term {self.name!r}", given, len(state.q))
 

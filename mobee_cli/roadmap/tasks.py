@@ -131,7 +131,7 @@ def _explained(path: Path) -> Iterator[None]:
     """Turn any exception in a user's file into a UserError with the line."""
     try:
         yield
-    except Exception as error:
+    except Exception as error:  # code of the user, which may raise anything
         line = next((frame.lineno for frame in reversed(traceback.extract_tb(error.__traceback__)) if frame.filename == str(path)), None)
         at = getattr(error, "lineno", None) if isinstance(error, SyntaxError) else line
         where = f"{path}:{at}" if at is not None else str(path)

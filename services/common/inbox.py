@@ -84,7 +84,7 @@ class Inbox:
                 self._run(handler)
             else:
                 self.put(handler)
-        except BaseException as error:
+        except BaseException as error:  # this is another library's thread: the main thread must raise it
             self.put(partial(_raise, error))
         finally:
             self._turn.release()

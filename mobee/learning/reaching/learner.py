@@ -205,6 +205,6 @@ class ReachLearner:
 def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches) -> RewardPredictor:
     """Make the predictor of a name, a class or a function; one that is made already is returned as it is."""
     if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
-        make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]
+        make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]  # `named` returns any callable
         return make(reaches)
     return given
