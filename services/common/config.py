@@ -7,7 +7,7 @@ import difflib
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -44,6 +44,10 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """free: in real time; lock: in lockstep, where every tick waits for all participants and time runs as fast as they answer."""
     patience: Annotated[float, Meta(ge=2, le=60)] = 2.0
     """Lockstep: s of real time after which a participant without answer is dropped; more if others use the machine too."""
+
+    def packages(self) -> Mapping[str, str]:
+        """The packages that these settings need beside those of the service, by import name, each with the extra that brings it."""
+        return {}
 
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if the service cannot serve the robot with these settings; the message says why and what to do instead.

@@ -29,9 +29,7 @@ _NICE_PICTURES = 10  # niceness of services that may be late
 _NICE_PLANS = 9  # of agents: after the control chain, before pictures
 
 _ENTRIES = {
-    "robot_sim": Entry(
-        "services.robot_sim", "services.robot_sim.config:Config", 0, participates=False, needs={"pybullet": "sim", "icub_models": "sim"}
-    ),
+    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, participates=False),
     "model": Entry("services.model", "services.model.config:Config", 1),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),

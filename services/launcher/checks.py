@@ -29,20 +29,15 @@ class PortInUse(Exception):
 def check_extras(scenario: Scenario) -> None:
     """Raise MissingExtra for the first service whose packages are not installed."""
     for part in scenario.parts:
-        if part.entry.module == "services.robot_sim" and getattr(part.config, "backend", "pybullet") == "kinematic":
-            continue
-        for package, extra in part.entry.needs.items():
+        for package, extra in {**part.entry.needs, **part.config.packages()}.items():
             if importlib.util.find_spec(package) is None:
                 raise MissingExtra(f"{part.who} needs {package}, which is not installed{_remedy(package, extra)}")
 
 
 def _remedy(package: str, extra: str) -> str:
-    if package == "pybullet" and sys.version_info[:2] >= (3, 12):
+    if package == "pybullet" and sys.version_info[:2] >= (3, 14):
         version = "{}.{}".format(*sys.version_info)
-        return (
-            f" and has no wheel for Python {version}: use Python 3.11, or the motor model alone, which runs on every version: "
-            "mobee launch kinematic"
-        )
+        return f' and has no wheel for Python {version}: set backend = "mujoco", the physics for every robot and every version'
     return f': pip install "mobee[{extra}]"'
 
 

@@ -17,7 +17,7 @@ from services.common.config import ServiceConfig
 from services.common.worlds import is_path
 from services.launcher.scenario import Scenario
 
-_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "icub-models", "rerun-sdk")
+_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco", "icub-models", "rerun-sdk")
 
 
 def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pybullet
@@ -14,10 +14,8 @@ from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
 from services.robot_sim.bullet_scene import BulletScene, load_solid_pairs
 from services.robot_sim.bullet_torque import Gears, Mask, Share
-from services.robot_sim.kinematic import SolidContact
+from services.robot_sim.kinematic import GAP_LINKS, MAX_GAP, SolidContact
 
-GAP_LINKS = ("forearm", "hand")  # links whose distance from the table is measured
-MAX_GAP = 2.0  # m; larger distances are not searched for
 NO_CONTACT = SolidContact()
 
 
@@ -27,6 +25,9 @@ class BulletBackend:
     A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight, as it does on the robot. In
     torque mode it gets the torque itself, through a gear (bullet_torque.py), and must include the torque that carries the weight.
     """
+
+    name = "pybullet"
+    notes: Sequence[str] = ()
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """`dt`: the tick, s.  Raises BackendUnavailable or MobeeError."""

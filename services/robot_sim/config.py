@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -12,7 +13,7 @@ from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
 from services.common.config import WorldConfig
 from services.common.eyes import require_eyes
-from services.robot_sim.kinematic import require_simulated
+from services.robot_sim.choice import EXTRA, PACKAGES, choose
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
@@ -20,8 +21,8 @@ NotNegative = Annotated[float, Meta(ge=0)]
 class Config(WorldConfig, frozen=True, kw_only=True):
     """The simulated robot's settings."""
 
-    backend: Literal["pybullet", "kinematic"] = "pybullet"
-    """Physics with contacts, or the motor model alone."""
+    backend: Literal["auto", "pybullet", "mujoco", "kinematic"] = "auto"
+    """Physics with contacts: PyBullet for the iCub or MuJoCo for every robot; kinematic: the motor model alone; auto: what is installed."""
     rate: Annotated[float, Meta(ge=1, le=1000)] = 100.0
     """Ticks a second."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
@@ -51,11 +52,14 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 
+    def packages(self) -> Mapping[str, str]:
+        """See ServiceConfig: those of a back-end that is chosen by name."""
+        return {} if self.backend == "auto" else dict.fromkeys(PACKAGES[self.backend], EXTRA)
+
     def check_robot(self, robot: Robot) -> None:
-        """Check also that PyBullet can simulate the robot, and that identified motor parameters exist for it; raises MobeeError."""
+        """Check also that the back-end can move the robot, and that identified motor parameters exist for it; raises MobeeError."""
         super().check_robot(robot)
-        if self.backend == "pybullet":
-            require_simulated(robot)
+        choose(self.backend, robot)
         if self.motors == "identified":
             MotorParameters.identified(robot.name)
 

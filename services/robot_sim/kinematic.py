@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,6 +12,9 @@ from mobee.model.masses import gravity_torque
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
+
+GAP_LINKS = ("forearm", "hand")  # links whose distance from the table is measured
+MAX_GAP = 2.0  # m; larger distances are not searched for
 
 SIMULATED = "icub"  # the robot that PyBullet's URDF describes
 
@@ -33,13 +36,17 @@ def require_simulated(robot: Robot) -> None:
     if robot.name != SIMULATED:
         raise BackendUnavailable(
             f'backend = "pybullet" cannot move {robot.name!r}: the physics simulates the links and motors of the {SIMULATED} only. '
-            'Set backend = "kinematic": the motor model alone, which moves every robot.'
+            'Set backend = "mujoco", physics for every robot, or "kinematic": the motor model alone.'
         )
 
 
 class Backend(Protocol):
     """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
 
+    name: str
+    """As in the settings."""
+    notes: Sequence[str]
+    """What the back-end assumed about the robot, a sentence each."""
     pairs_watched: int
 
     @property
@@ -80,6 +87,8 @@ class Backend(Protocol):
 class KinematicBackend:
     """The motor model alone: joints follow their motors exactly."""
 
+    name = "kinematic"
+    notes: Sequence[str] = ()
     pairs_watched = 0
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int) -> None:

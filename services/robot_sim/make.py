@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
+from services.robot_sim.choice import EXTRA, choose
 from services.robot_sim.config import Config
 from services.robot_sim.kinematic import Backend, BackendUnavailable, KinematicBackend
 from services.robot_sim.watch import Recorded
@@ -35,13 +36,18 @@ def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
 
 def _make_backend(config: Config, robot: Robot) -> Backend:
     parameters = motor_parameters(config, robot)
-    if config.backend == "kinematic":
+    chosen, dt = choose(config.backend, robot).name, round(1e9 / config.rate) / 1e9
+    if chosen == "kinematic":
         return KinematicBackend(robot, config.load_world, parameters, config.seed)
     try:
-        from services.robot_sim.bullet import BulletBackend  # the only way to PyBullet, which not every Python has
+        if chosen == "mujoco":
+            from services.robot_sim.mujoco_backend import MujocoBackend  # optional, as PyBullet
+
+            return MujocoBackend(robot, config.load_world, parameters, config.seed, dt)
+        from services.robot_sim.bullet import BulletBackend  # which not every Python has
+
+        return BulletBackend(robot, config.load_world, parameters, config.seed, dt)
     except ModuleNotFoundError as error:
         raise BackendUnavailable(
-            f'the pybullet back-end needs the module {error.name!r}: pip install "mobee[sim]" on Python 3.11. '
-            'Without it: backend = "kinematic".'
+            f'backend = "{chosen}" needs the module {error.name!r}: pip install "mobee[{EXTRA}]". Without it: backend = "kinematic".'
         ) from error
-    return BulletBackend(robot, config.load_world, parameters, config.seed, round(1e9 / config.rate) / 1e9)

@@ -15,6 +15,7 @@ from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
+from services.robot_sim.choice import choose
 from services.robot_sim.config import Config
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend
@@ -46,6 +47,10 @@ class Node:
         self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))
         self._rate = Rate(self._period)
         self._lockstep = Lockstep(service, config.participants, self._guard, config.ticks) if service.locked else None
+        if warning := choose(config.backend, robot).warning:
+            self._bus.event("warning", "no_physics", warning)
+        for note in backend.notes:
+            self._bus.event("info", "backend", note)
         service.describe, service.words = self._describe, self._words
         service.mark = self._mark
         for verb, handler in (("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
@@ -139,7 +144,7 @@ class Node:
 
     def _describe(self) -> tuple[str, Mapping[str, float]]:
         states = [gate.state for gate in self._guard.gates.values()]
-        text = f"{self._config.backend} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
+        text = f"{self._backend.name} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
         numbers = self._watch.counters.numbers(self._rate.missed, self._backend.pairs_watched)
         if self._lockstep is None:
             return text, numbers

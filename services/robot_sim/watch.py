@@ -151,7 +151,7 @@ class Recorded:
             self._contacts = (folder / CONTACTS).open("w", buffering=1)
         except OSError as error:
             raise InvalidValue(f"record: cannot write {error.filename} ({error.strerror})") from None
-        self.pairs_watched = inner.pairs_watched
+        self.name, self.notes, self.pairs_watched = inner.name, inner.notes, inner.pairs_watched
         self._begin()
 
     @property

@@ -199,7 +199,12 @@ VERTICAL = '<marker name="left_eye" nz="1"/><marker name="right_eye" nz="1"/>'
         (seer(eyes=NO_EYES), "[services.vision]\n", "vision: 'seer' cannot see: pictures are taken from", "has no right_eye. Leave"),
         (seer(head="neck"), "[services.vision]\n", "vision: 'seer' cannot see: each picture is sent", "has no part head. Leave"),
         (seer(eyes=VERTICAL), "[services.renderer]\n", "renderer: 'seer' cannot see: the normal of", "Give the marker a normal"),
-        (ARM, "[services.robot_sim]\n", "robot_sim: backend = \"pybullet\" cannot move 'arm'", 'Set backend = "kinematic"'),
+        (
+            ARM,
+            '[services.robot_sim]\nbackend = "pybullet"\n',
+            "robot_sim: backend = \"pybullet\" cannot move 'arm'",
+            'Set backend = "mujoco"',
+        ),
         (ARM, '[services.agent_arm]\njoints = ["pan"]\n', "agent_arm: neighbours", "2"),
         (
             ARM,
@@ -239,10 +244,10 @@ def test_the_command_ends_with_two_and_one_line_when_a_service_cannot_serve_the_
     (tmp_path / "own.xml").write_text(ARM)
     done = mobee("launch", "kinematic", "--set", f"shared.robot={tmp_path}/own.xml")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    (tmp_path / "own.toml").write_text(f'[services.robot_sim]\nrobot = "{tmp_path}/own.xml"\n')
+    (tmp_path / "own.toml").write_text(f'[services.robot_sim]\nrobot = "{tmp_path}/own.xml"\nbackend = "pybullet"\n')
     done = mobee("launch", str(tmp_path / "own.toml"), "--runs", str(tmp_path / "runs"))
     assert (done.returncode, done.stderr.count("\n"), (tmp_path / "runs").exists()) == (2, 1, False)
-    assert 'Set backend = "kinematic"' in done.stderr
+    assert 'Set backend = "mujoco"' in done.stderr
 
 
 def test_an_unknown_scenario_names_the_nearest() -> None:
@@ -276,23 +281,25 @@ def missing(monkeypatch: pytest.MonkeyPatch, package: str, *settings: str) -> st
     ("package", "service", "remedy"),
     [
         ("icub_models", "robot_sim", "mobee[sim]"),
+        ("pybullet", "robot_sim", "mobee[sim]"),
         ("rerun", "monitor", "mobee[viz]"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch, package: str, service: str, remedy: str) -> None:
-    text = missing(monkeypatch, package)
+    text = missing(monkeypatch, package, "services.robot_sim.backend=pybullet")
     assert text.startswith(f"{service} needs {package}")
     assert f'pip install "{remedy}"' in text
 
 
-def test_on_a_newer_python_the_motor_model_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "version_info", (3, 13, 1))
-    assert "mobee launch kinematic" in missing(monkeypatch, "pybullet")
+def test_where_pybullet_has_no_wheel_mujoco_is_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "version_info", (3, 14, 0))
+    assert 'set backend = "mujoco"' in missing(monkeypatch, "pybullet", "services.robot_sim.backend=pybullet")
 
 
-def test_the_kinematic_robot_needs_no_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("settings", [(), ("services.robot_sim.backend=auto",)])
+def test_a_robot_without_physics_needs_no_extra(monkeypatch: pytest.MonkeyPatch, settings: tuple[str, ...]) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    check_extras(read_scenario("kinematic"))
+    check_extras(read_scenario("kinematic", settings))
 
 
 def test_a_port_in_use_is_named_with_its_remedy() -> None:

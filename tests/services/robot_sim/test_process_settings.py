@@ -15,7 +15,7 @@ from tests.services.harness import free_endpoint, rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
 
-@pytest.mark.parametrize(("rate", "backend"), [(200, "pybullet"), (1000, "kinematic")])
+@pytest.mark.parametrize(("rate", "backend"), [(200, "pybullet"), (200, "mujoco"), (1000, "kinematic")])
 def test_it_runs_at_other_rates(tmp_path: Path, rate: int, backend: str) -> None:
     with rig(tmp_path, ROBOT) as bus:
         bench = Bench(bus, "--backend", backend, "--rate", str(rate))
@@ -71,7 +71,7 @@ def test_a_new_process_is_a_new_run_in_which_no_old_epoch_fits(tmp_path: Path) -
         (["--rate", "0"], "rate"),
         (["--robot", "icup"], "'icub'"),
         (["--world", "tabel", "--backend", "kinematic"], "'table'"),
-        (["--robot", "icub_2014"], "kinematic"),
+        (["--robot", "icub_2014", "--backend", "pybullet"], "mujoco"),
     ],
 )
 def test_a_setting_that_cannot_be_used_is_told_at_once(tmp_path: Path, arguments: list[str], says: str) -> None:

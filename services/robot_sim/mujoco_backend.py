@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The physics back-end for every robot: MuJoCo's joints follow the velocities or torques of the motor model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array
+from mobee.control.law import FRICTION, INERTIA
+from mobee.model.world import World
+from mobee.robot.robot import Robot
+from mobee.simulation.motors import MotorParameters, Motors
+from services.robot_sim.kinematic import GAP_LINKS, MAX_GAP, SolidContact
+from services.robot_sim.mujoco_scene import MujocoScene, reflected_inertia
+
+STOP = 1e6  # N m, of a mechanical stop: more than any motor has
+
+Mask = NDArray[np.bool_]
+
+
+class MujocoBackend:
+    """All joints of any robot with gravity, its base fixed.
+
+    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight.  In torque mode it gets the
+    torque itself, behind a gear with the inertia and the friction of the law, and must include the torque that carries the weight.
+    """
+
+    name = "mujoco"
+
+    def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
+        """`dt`: the tick, s.  Raises MobeeError."""
+        self._robot, self._load_world, self._parameters = robot, load_world, parameters
+        self._substeps = parameters.substeps(dt)
+        self._substep = dt / self._substeps
+        self._lower, self._upper = robot.limits.T
+        self._torques = np.array([motor.max_torque for motor in robot.motor_table])
+        self._fastest = np.array([motor.max_velocity for motor in robot.motor_table])
+        self._near = _links_near(robot)
+        self.reset(seed)
+
+    def reset(self, seed: int) -> None:
+        """Back home, at rest, in hold, the world as it was."""
+        self.world = self._load_world()
+        self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
+        self._scene = MujocoScene(self._robot, self.world, self._substep)
+        self.pairs_watched = self._scene.pairs_watched
+        self.notes: Sequence[str] = self._scene.notes
+        self._obstacles = [name for name, thing in self.world.objects.items() if thing.role == "obstacle"]
+        self._untouchable = {*self._robot.links, *self._obstacles}  # the ball is there to be touched
+        self._gains = self._scene.data.efc_KBIP[self._scene.rows, 1]  # 1/s, of a constraint's acceleration to its velocity
+        self._geared = np.zeros(len(self._robot.motors), dtype=np.bool_)
+        self._deepest: dict[str, float] = {}  # m, by pair, in the last tick
+
+    def step(self, dt: float) -> None:
+        """Advance by a tick of dt [s], the same as at the start."""
+        self._deepest.clear()
+        for _ in range(self._substeps):
+            self._advance(self._substep)
+            for pair, depth in self._scene.contacts().items():
+                if self._untouchable.issuperset(pair):
+                    name = " ".join(pair)
+                    self._deepest[name] = max(depth, self._deepest.get(name, 0.0))
+
+    def place(self, name: str, position: tuple[float, float, float]) -> None:
+        """Put a world object somewhere, m; raises MobeeError."""
+        self.world.move(name, position=position)
+        self._scene.move(name, position)
+
+    def contact(self) -> SolidContact:
+        """The deepest solid contact of the last tick."""
+        if not self._deepest:
+            return SolidContact()
+        pair = max(self._deepest, key=self._deepest.__getitem__)
+        return SolidContact(self._deepest[pair], pair)
+
+    def contacts(self) -> Mapping[str, float]:
+        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        return self._deepest
+
+    def gap(self) -> float:
+        """Closest distance of hands and forearms to the obstacles, m; -1 when there is none."""
+        if not self._obstacles or not self._near:
+            return -1.0
+        return max(self._scene.distance(self._near, self._obstacles, MAX_GAP), 0.0)
+
+    def _advance(self, h: float) -> None:
+        scene, motors = self._scene, self.motors
+        velocity, q = motors.drive(h), motors.q
+        in_torque = motors.in_torque
+        if (in_torque != self._geared).any():
+            self._change_gears(in_torque)
+        target = np.clip(velocity, (self._lower - q) / h, (self._upper - q) / h)
+        data, rows = scene.data, scene.rows
+        if in_torque.any():
+            free, target = self._apply_torques(in_torque, target, q, h)
+            data.efc_frictionloss[rows[free]], data.efc_frictionloss[rows[in_torque & ~free]] = 0.0, STOP
+        data.efc_aref[rows] += self._gains * target * scene.scale
+        mujoco.mj_step2(scene.model, data)
+        efforts = data.efc_force[rows] * scene.scale
+        if in_torque.any():
+            passed = motors.torques - FRICTION * data.qvel[scene.dofs] / scene.scale - INERTIA * data.qacc[scene.dofs] / scene.scale
+            efforts = np.where(free, passed, np.clip(efforts, -self._torques, self._torques))
+        scene.refresh()
+        motors.adopt(scene.motor_positions())
+        motors.efforts = efforts
+
+    def _apply_torques(self, in_torque: Mask, target: Array, q: Array, h: float) -> tuple[Mask, Array]:
+        """Give the motors in torque mode their torques; returns which motors are free, and the velocities (n,) rad/s of the others.
+
+        A motor that would leave its range, or be faster than it may, is not free: it goes at the end of the range.
+        """
+        scene = self._scene
+        data = scene.data
+        torques = np.where(in_torque, self.motors.torques / scene.scale, 0.0)
+        data.qfrc_applied[scene.dofs] = torques
+        mujoco.mj_fwdActuation(scene.model, data)
+        mujoco.mj_fwdAcceleration(scene.model, data)
+        coming = (data.qvel + h * data.qacc_smooth)[scene.dofs] / scene.scale
+        slowest = np.maximum((self._lower - q) / h, -self._fastest)
+        fastest = np.minimum((self._upper - q) / h, self._fastest)
+        within = np.clip(coming, slowest, fastest)
+        free = in_torque & (within == coming)
+        data.qfrc_applied[scene.dofs] = np.where(free, torques, 0.0)
+        return free, np.where(in_torque, within, target)
+
+    def _change_gears(self, in_torque: Mask) -> None:
+        """Give motors in torque mode the inertia and the friction of the law, the others those of their own."""
+        scene = self._scene
+        for index, (motor, geared) in enumerate(zip(self._robot.motor_table, in_torque.tolist(), strict=True)):
+            scene.set_gear(motor, INERTIA if geared else reflected_inertia(motor), FRICTION if geared else 0.0)
+            if not geared:
+                scene.data.qfrc_applied[scene.dofs[index]] = 0.0
+        self._geared = in_torque
+        scene.refresh()
+
+
+def _links_near(robot: Robot) -> list[str]:
+    """Return the links whose distance from obstacles is measured: forearms, hands and their fingers, else the last link of each chain."""
+    near = np.array([link.endswith(GAP_LINKS) for link in robot.links])
+    for index, joint in enumerate(robot.joints):
+        near[index + 1] |= near[joint.parent]
+    if not near.any():
+        near = ~np.isin(np.arange(len(robot.links)), [joint.parent for joint in robot.joints])
+    return [link for link, is_near in zip(robot.links, near.tolist(), strict=True) if is_near]

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot and its world in MuJoCo: all joints, the solids that the model tests, masses, and motors as constraints of velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mobee import Model
+from mobee.arrays import Array, Ints
+from mobee.control.law import INERTIA
+from mobee.model.kinematics import quaternion_from_matrix
+from mobee.model.world import World
+from mobee.robot.bodies import WATER_DENSITY, ball_of_water, can_be
+from mobee.robot.robot import Body, Motor, Robot
+from services.robot_sim.mujoco_spec import add_tree, add_volume, joint_name
+
+GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
+NEGLIGIBLE = 1e-6  # kg, of a link without mass in a robot with masses: what carries the link includes its weight
+HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of motors, couplings and stops: as hard as MuJoCo allows
+SOLID = (0.99, 0.99, 0.001, 0.5, 2.0)  # solimp of contacts
+FRICTION = (0.5, 0.5, 0.0, 0.0, 0.0)  # of contacts, as PyBullet's
+ARENA = 64 * 2**20  # bytes; holds some 100 000 contacts, so that none is left out
+
+GeomPair = tuple[str, str]
+
+
+class MujocoScene:
+    """The compiled model, its state, and which degrees of freedom and constraints belong to which motor.
+
+    A motor acts on one of its joints, the one with the largest scale, which the others of the motor follow.  It is a constraint that brings
+    this joint to a velocity with a limited torque: MuJoCo's friction, whose velocity is 0, with a velocity that is set for every substep.
+
+    `scale`, `offset` (n,): joint = scale * motor + offset; `dofs` (n,): the joints' degrees of freedom; `rows` (n,): of the constraints.
+    """
+
+    def __init__(self, robot: Robot, world: World, substep: float) -> None:
+        """`substep`: s."""
+        self._robot, self._substep = robot, substep
+        self.left_out = touching_at_home(robot, world)
+        """Pairs of names that touch at home, with the depth in m; they are not tested."""
+        spec = _options(substep)
+        bodies, origins = add_tree(spec, robot, self._weigh)
+        for index, shape in enumerate(robot.shapes):
+            if shape.role == "solid":
+                geom = add_volume(spec, bodies[shape.link], _of_shape(index), shape, shape.position - origins[shape.link])
+                geom.contype = geom.conaffinity = 0  # only the pairs below are tested
+                geom.density = WATER_DENSITY  # counts where `_weigh` gives the link no mass
+        for name, thing in world.objects.items():
+            body = spec.worldbody.add_body(
+                name=_of_object(name), mocap=True, pos=thing.position, quat=quaternion_from_matrix(thing.rotation)
+            )
+            geom = add_volume(spec, body, _of_object(name), thing, np.zeros(3))
+            geom.quat, geom.contype, geom.conaffinity = (1.0, 0.0, 0.0, 0.0), 0, 0
+        self.pairs_watched = self._add_pairs(spec, world)
+        self.notes = self._assumptions()
+        joints = [max(motor.joints, key=lambda one: abs(one[1])) for motor in robot.motor_table]
+        self.scale, self.offset = np.array([scale for _, scale, _ in joints]), np.array([offset for _, _, offset in joints])
+        for motor, (joint, scale, offset) in zip(robot.motor_table, joints, strict=True):
+            self._add_motor(spec, motor, joint, scale, offset)
+        self.model: Any = spec.compile()
+        self.data: Any = mujoco.MjData(self.model)
+        self._number(world, [joint for joint, _, _ in joints])
+        self.set_posture(robot.home)
+
+    def set_posture(self, q: Array) -> None:
+        """Put the joints at q (n,) rad of the motors, at rest."""
+        matrix, offset = self._robot.coupling
+        self.data.qpos[self._all_qpos] = matrix @ q + offset
+        self.data.qvel[:] = 0.0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Compute what depends on positions and velocities: masses, contacts, constraints."""
+        mujoco.mj_step1(self.model, self.data)
+
+    def motor_positions(self) -> Array:
+        """Positions (n,) rad of the motors, of their own joints."""
+        q: Array = (self.data.qpos[self._qpos] - self.offset) / self.scale
+        return q
+
+    def move(self, name: str, position: Iterable[float]) -> None:
+        """Put a world object somewhere, m."""
+        self.data.mocap_pos[self._mocap[name]] = tuple(position)
+        self.refresh()
+
+    def set_gear(self, motor: Motor, inertia: float, friction: float) -> None:
+        """Set the inertia [kg m^2] and the viscous friction [N m s/rad] of a motor behind its gear; `refresh` must follow."""
+        for joint, scale, _ in motor.joints:
+            dof = self._all_dofs[joint]
+            self.model.dof_armature[dof] = _share(inertia, motor, scale)
+            self.model.dof_damping[dof] = _share(friction, motor, scale)
+
+    def contacts(self) -> Mapping[tuple[str, str], float]:
+        """Depth [m] by pair of the names of links or objects, sorted: the deepest point of each pair that overlaps."""
+        data, found = self.data, dict[tuple[str, str], float]()
+        if data.ncon == 0:
+            return found
+        contact = data.contact
+        for (first, second), distance in zip(contact.geom.tolist(), contact.dist.tolist(), strict=True):
+            if distance < 0.0:
+                one, other = self._names[first], self._names[second]
+                pair = (one, other) if one < other else (other, one)
+                found[pair] = max(-distance, found.get(pair, 0.0))
+        return found
+
+    def distance(self, links: Iterable[str], objects: Iterable[str], within: float) -> float:
+        """Smallest distance [m] of links from objects, negative when they overlap; `within` if there is none nearer."""
+        ours = [geom for link in links for geom in self._solids.get(link, ())]
+        theirs = [self.model.geom(_of_object(name)).id for name in objects]
+        return min((mujoco.mj_geomDistance(self.model, self.data, a, b, within, None) for a in ours for b in theirs), default=within)
+
+    def _weigh(self, body: Any, link: int, origin: Array) -> None:
+        """Give the link its mass; without masses in the robot's file, MuJoCo computes it from the link's solids."""
+        known = {one.link: one for one in self._robot.bodies}.get(link)
+        if known is None or known.mass < NEGLIGIBLE:
+            solid = any(shape.link == link and shape.role == "solid" for shape in self._robot.shapes)
+            if not self._robot.bodies and solid:
+                return
+            known = Body(link, NEGLIGIBLE, origin)
+        inertia = known.inertia
+        if inertia is None or not can_be(inertia) or np.linalg.eigvalsh(inertia)[0] <= 0.0:
+            inertia = ball_of_water(known.mass)
+        body.explicitinertial, body.mass, body.ipos = True, known.mass, known.centre - origin
+        body.fullinertia = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+    def _assumptions(self) -> tuple[str, ...]:
+        notes = []
+        if not self._robot.bodies:
+            notes.append(f"the robot's file has no masses: those of its solids at {WATER_DENSITY:g} kg/m^3 are taken")
+        if self.left_out:
+            (first, second), depth = max(self.left_out.items(), key=lambda item: item[1])
+            some = f"{len(self.left_out)} pairs of solids overlap at home and are not tested for contact"
+            notes.append(f"{some}; the deepest is {first} and {second}, by {depth * 1e3:.1f} mm")
+        return tuple(notes)
+
+    def _add_pairs(self, spec: Any, world: World) -> int:
+        """Add the pairs of geoms that are tested for contact; returns how many pairs of links, or of link and object, they belong to."""
+        robot, watched = self._robot, set()
+        for first, second in robot.solid_pairs.tolist():
+            links = robot.links[robot.shapes[first].link], robot.links[robot.shapes[second].link]
+            self._add_pair(spec, (_of_shape(first), _of_shape(second)), (robot.shapes[first].name, robot.shapes[second].name))
+            watched.add(frozenset(links))
+        for index, shape in enumerate(robot.shapes):
+            if shape.role == "solid" and index not in robot.base_shapes:
+                for name, thing in world.objects.items():
+                    if thing.role != "ghost":
+                        self._add_pair(spec, (_of_shape(index), _of_object(name)), (shape.name, name))
+                        watched.add(frozenset((robot.links[shape.link], name)))
+        return len(watched)
+
+    def _add_pair(self, spec: Any, geoms: GeomPair, names: GeomPair) -> None:
+        if names not in self.left_out:
+            spec.add_pair(geomname1=geoms[0], geomname2=geoms[1], condim=3, friction=FRICTION, solref=self._soonest, solimp=SOLID)
+
+    @property
+    def _soonest(self) -> tuple[float, float]:
+        """The solref of what is as hard as a substep allows."""
+        return 2.0 * self._substep, 1.0
+
+    def _add_motor(self, spec: Any, motor: Motor, joint: int, scale: float, offset: float) -> None:
+        low, high = sorted(scale * limit + offset for limit in motor.limits)
+        own = spec.joint(joint_name(joint))
+        own.frictionloss, own.solref_friction, own.solimp_friction = motor.max_torque / abs(scale), self._soonest, HARDEST
+        own.limited, own.range, own.solref_limit, own.solimp_limit = True, (low, high), self._soonest, HARDEST
+        for other, factor, shift in motor.joints:
+            spec.joint(joint_name(other)).armature = _share(reflected_inertia(motor), motor, factor)
+            if other != joint:
+                ratio = factor / scale
+                spec.add_equality(
+                    type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=joint_name(other), name2=joint_name(joint),
+                    data=[shift - ratio * offset, ratio, *[0.0] * (mujoco.mjNEQDATA - 2)], solref=self._soonest, solimp=HARDEST,
+                )  # fmt: skip
+
+    def _number(self, world: World, joints: list[int]) -> None:
+        model, robot = self.model, self._robot
+        at = [model.joint(joint_name(index)) for index in range(len(robot.joints))]
+        self._all_qpos: Ints = np.array([one.qposadr[0] for one in at])
+        self._qpos: Ints = self._all_qpos[joints]
+        self._all_dofs: Ints = np.array([one.dofadr[0] for one in at])
+        self.dofs: Ints = self._all_dofs[joints]
+        self.rows: Ints = np.empty(len(joints), dtype=np.intp)
+        self.rows[np.argsort(self.dofs)] = model.neq + np.arange(len(joints))  # MuJoCo's order: equalities, then friction by dof
+        self._mocap = {name: int(model.body(_of_object(name)).mocapid[0]) for name in world.objects}
+        self._names: dict[int, str] = {model.geom(_of_object(name)).id: name for name in world.objects}
+        self._solids: dict[str, list[int]] = {}
+        for index, shape in enumerate(robot.shapes):
+            if shape.role == "solid":
+                geom, link = model.geom(_of_shape(index)).id, robot.links[shape.link]
+                self._names[geom] = link
+                self._solids.setdefault(link, []).append(geom)
+
+
+def reflected_inertia(motor: Motor) -> float:
+    """Return the inertia [kg m^2] of a motor's rotor behind its gear: that of the law, or less for a motor too weak to accelerate it."""
+    return min(INERTIA, 0.5 * motor.max_torque / motor.max_acceleration)
+
+
+def _share(amount: float, motor: Motor, scale: float) -> float:
+    """Return the inertia or friction of one of the motor's joints, all of which together are `amount` at the motor."""
+    return amount / (len(motor.joints) * scale**2)
+
+
+def touching_at_home(robot: Robot, world: World) -> dict[GeomPair, float]:
+    """Return the pairs of solids, by name, that the model finds in contact at home, with the depth in m."""
+    contacts = Model(robot, world).evaluate(robot.home).contacts
+    return {(one.first, one.second): one.depth for one in contacts if one.kind == "solid"}
+
+
+def _options(substep: float) -> Any:
+    spec = mujoco.MjSpec()
+    spec.memory, spec.compiler.degree = ARENA, False
+    option, flag = spec.option, mujoco.mjtDisableBit
+    option.timestep, option.gravity = substep, GRAVITY
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.disableflags |= int(flag.mjDSBL_AUTORESET | flag.mjDSBL_ISLAND)  # the watch reports positions that are not finite
+    return spec
+
+
+def _of_shape(index: int) -> str:
+    """Return the name of a solid's geom: by number, since shapes may share a name with each other or with an object."""
+    return f"shape{index}"
+
+
+def _of_object(name: str) -> str:
+    return f"object {name}"
