@@ -13,7 +13,7 @@ import numpy as np
 from experiments.bench.peers import import_peer
 from mobee.arrays import Array, Ints
 from mobee.model.world import WorldObject
-from mobee.robot.robot import LinkPair, Robot, Shape
+from mobee.robot.robot import LinkPair, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
 from mobee.simulation.rigid import stiffened
 
@@ -83,26 +83,24 @@ class MujocoPeer:
 
 
 def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
+    from services.robot_sim.mujoco_spec import add_tree, add_volume, link_name  # needs MuJoCo
+
     spec = mujoco.MjSpec()
     spec.memory = _ARENA
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)  # the robot's own table says which links are tested
-    bodies = [spec.worldbody.add_body(name="link0")]
-    origins = [np.zeros(3)]
-    for index, joint in enumerate(robot.joints):
-        parent = bodies[joint.parent]
-        body = parent.add_body(
-            name=f"link{index + 1}", pos=joint.point - origins[joint.parent], mass=1.0, inertia=np.ones(3), explicitinertial=True
-        )
-        body.add_joint(name=f"joint{index}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis)
-        bodies.append(body)
-        origins.append(joint.point)
+    bodies, origins = add_tree(spec, robot, _weigh)
     for shape in robot.shapes:
-        _add_volume(mujoco, spec, bodies[shape.link], shape, shape.position - origins[shape.link])
-    for item in objects.values():
-        _add_volume(mujoco, spec, spec.worldbody, item, item.position)
+        add_volume(spec, bodies[shape.link], shape.name, shape, shape.position - origins[shape.link])
+    for name, item in objects.items():
+        add_volume(spec, spec.worldbody, name, item, item.position)
     for one, other in map(sorted, robot.untested):
-        spec.add_exclude(bodyname1=f"link{one}", bodyname2=f"link{other}")
+        spec.add_exclude(bodyname1=link_name(one), bodyname2=link_name(other))
     return spec
+
+
+def _weigh(body: Any, link: int, origin: Array) -> None:
+    """Give a link a mass of 1 kg at its joint."""
+    body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
 
 
 def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
@@ -110,20 +108,6 @@ def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
     for index in range(joints):
         servo = spec.add_actuator(name=f"servo{index}", target=f"joint{index}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_velocity(gain)
-
-
-def _add_volume(mujoco: Any, spec: Any, body: Any, volume: Shape | WorldObject, position: Array) -> None:
-    kinds = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in ("sphere", "capsule", "cylinder", "box", "mesh")}
-    size = np.zeros(3)
-    size[: len(volume.size)] = volume.size
-    size[slice(None) if volume.kind == "box" else slice(1, None)] /= 2.0  # MuJoCo has half lengths
-    turn = np.empty(4)
-    mujoco.mju_mat2Quat(turn, np.ascontiguousarray(volume.rotation).reshape(9))
-    if isinstance(volume, Shape) and volume.vertices is not None:
-        mesh = spec.add_mesh(name=volume.name, uservert=volume.vertices.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
-        body.add_geom(name=volume.name, type=kinds["mesh"], meshname=mesh.name, pos=position, quat=turn, margin=0.0)
-        return
-    body.add_geom(name=volume.name, type=kinds[volume.kind], size=size, pos=position, quat=turn, margin=0.0)
 
 
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
