@@ -63,8 +63,8 @@ def _number(help: str, type: Callable[[str], Any] = positive_whole, metavar: str
 
 BENCHES = {
     "lockstep": Bench(
-        "the live system in lockstep, in multiples of real time, on the motor model alone and on PyBullet",
-        options={"--seconds": _number("how long each of the four runs lasts (default: 20)", positive_number, "S")},
+        "the live system in lockstep, in multiples of real time, on the motor model alone, on PyBullet and on MuJoCo",
+        options={"--seconds": _number("how long each of the six runs lasts (default: 20)", positive_number, "S")},
     ),
     "agree": Bench(
         "the live system in lockstep beside the offline plant: the same agents, action by action, encoder noise included",
@@ -82,7 +82,7 @@ BENCHES = {
         options={
             "--rates": {"type": _rate, "nargs": "+", "metavar": "HZ", "help": "ticks a second (default: 100 200 500 1000)"},
             "--seconds": _number("how long each run lasts (default: 30)", positive_number, "S"),
-            "--backend": {"choices": ("kinematic", "pybullet"), "help": "the robot (default: kinematic)"},
+            "--backend": {"choices": ("kinematic", "pybullet", "mujoco"), "help": "the robot (default: kinematic)"},
         },
     ),
     "plant": Bench(

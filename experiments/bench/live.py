@@ -27,7 +27,7 @@ _COLUMNS = ("rate", "age p50", "p99", "bare", "allowed", "most", "jitter p50", "
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Rates [Hz], how long each run lasts [s], and the robot: kinematic or pybullet."""
+    """Rates [Hz], how long each run lasts [s], and the robot: kinematic, pybullet or mujoco."""
 
     rates: Sequence[int] = (100, 200, 500, 1000)
     seconds: float = 30.0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live system in lockstep: how much faster than real time it runs, on the motor model alone and on PyBullet.
+"""The live system in lockstep: how much faster than real time it runs, on the motor model alone, on PyBullet and on MuJoCo.
 
 Claim: robot_sim, model, controller and three agents, each a process, make at least 15 s of robot time a second on the motor model
 and 10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured in
-messages between processes that work a little at each.  Run time: four runs of `seconds` each and their start.
+messages between processes that work a little at each.  Run time: six runs of `seconds` each and their start.
 """
 
 from __future__ import annotations
@@ -29,7 +29,14 @@ class Case:
 
 
 HELPERS = 2  # as model and controller: the agents have little to do
-CASES = (Case("kinematic", 50, 15.0, 26.0), Case("pybullet", 50, 10.0, 20.0), Case("kinematic", 100), Case("pybullet", 100))
+CASES = (
+    Case("kinematic", 50, 15.0, 26.0),
+    Case("pybullet", 50, 10.0, 20.0),
+    Case("mujoco", 50),
+    Case("kinematic", 100),
+    Case("pybullet", 100),
+    Case("mujoco", 100),
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ fig. 4.7.  Published: no number; aim of this reproduction: the new path under wa
 Run time: 6 minutes on 2 cores, in real time.
 
 The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
-shorter through the ball than over it.  The real processes with PyBullet, in free mode, ticks of 10 ms, the default law at full speed.
+shorter through the ball than over it.  The real processes with PyBullet (with --backend mujoco MuJoCo), in
+free mode, ticks of 10 ms, the default law at full speed.
 Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
 simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the motion ends there, the
 edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which a command is in
@@ -43,7 +44,7 @@ from experiments.claims.ch3_roadmaps.replanning_live import (
 )
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Claim, Experiment, Steps
-from experiments.kit.live.launch import launch, read_done, write_job
+from experiments.kit.live.launch import PHYSICS, add_backend, launch, read_done, write_job
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from experiments.kit.plots import new_figure
 from mobee.arrays import Array
@@ -73,6 +74,7 @@ DEEP = 2e-3  # m
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
+    add_backend(parser)
     parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="number of crossings (default: 20)")
     parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same result on any machine")
     parser.add_argument("--quick", action="store_true", help="a short version, to check that the experiment works")
@@ -88,7 +90,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             place = folder / f"launch-{number:03}"
             progress.show(number / len(pieces), f"launch {number + 1} of {len(pieces)}")
             if not (place / MEASURED).exists():
-                cross(place, Job(piece), arguments.seed + number, arguments.lockstep)
+                cross(place, Job(piece), arguments.seed + number, arguments.lockstep, arguments.backend)
                 keep_poses(place)
                 measure(place)
                 for name in (POSITIONS, CONTACTS):
@@ -96,12 +98,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return findings(_crossings(folder))
 
 
-def cross(folder: Path, job: Job, seed: int, lockstep: bool = False) -> dict[str, Any]:
+def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: str = PHYSICS[0]) -> dict[str, Any]:
     """Launch a system that makes the crossings of a job, recorded in the folder; returns its summary.  Raises LaunchFailed."""
     write_job(folder, job)
-    worlds = {"world": str(WORLD), "simulated": str(SIMULATED)}
+    names = {"world": str(WORLD), "simulated": str(SIMULATED), "backend": backend}
     seconds = LONGEST * (1 + len(job.after))
-    return launch(folder, PERFORM, title="Replanning", seed=seed, rate=RATE, speed=SPEED, seconds=seconds, lockstep=lockstep, **worlds)
+    return launch(folder, PERFORM, title="Replanning", seed=seed, rate=RATE, speed=SPEED, seconds=seconds, lockstep=lockstep, **names)
 
 
 def _crossings(folder: Path) -> list[Measured]:

@@ -4,9 +4,10 @@
 Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second
 MoBeE completes more of the commands, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
 hours over several trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all
-of them", on the robot.  Here: the PyBullet robot, every process in lockstep, postures uniform over the whole ranges of torso (3
-motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is a posture of one part; it
-is completed when all its motors end within 10 degrees, returned when the part ends where it began, else deflected.
+of them", on the robot.  Here: the PyBullet robot (with --backend mujoco MuJoCo's), every process in lockstep, postures uniform over
+the whole ranges of torso (3 motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is
+a posture of one part; it is completed when all its motors end within 10 degrees, returned when the part ends where it began, else
+deflected.
 
 Run time: 2 h of robot time in each of three modes take about an hour; an interrupted run continues with --resume.
 """
@@ -37,6 +38,7 @@ from experiments.claims.ch4_reflex.babbling_trial import (
 )
 from experiments.kit.command_line import Progress, positive_number
 from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.live.launch import add_backend
 from experiments.kit.live.recordings import POSITIONS, Touch
 from experiments.kit.plots import new_figure
 from mobee import load_robot
@@ -67,6 +69,7 @@ Rows = Mapping[str, Mapping[str, Any]]  # by mode
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Options."""
+    add_backend(parser)
     parser.add_argument("--minutes", type=positive_number, default=120.0, metavar="M", help="of robot time in each mode (default: 120)")
     parser.add_argument("--trial", type=positive_number, default=10.0, metavar="M", help="robot time of a trial (default: 10)")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), metavar="MODE", help=f"of {', '.join(MODES)}")
@@ -84,7 +87,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 if not (place / TRIAL).exists():
                     text = f"{TITLES[mode]}, trial {number + 1} of {len(lengths)}"
                     seed, ticks = SEED_STRIDE * arguments.seed + number, round(60.0 * minutes * RATE)
-                    _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text))
+                    _run_until_repeatable(place, mode, robot, seed, ticks, _shower(progress, done, total, text), arguments.backend)
                 done += 1
     rows = {mode: summarise(read_trials(folder, mode)) for mode in arguments.modes}
     judged = verdict(rows)
@@ -93,10 +96,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return {"passed": all(judged.values()), "judged": judged, **({"modes": rows} if arguments.json else {})}
 
 
-def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
+def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str) -> None:
     """Repeat a trial until no process was late for a tick; raises TrialFailed."""
     for _ in range(MAX_ATTEMPTS):
-        run_trial(place, mode, robot, seed, ticks, show)
+        run_trial(place, mode, robot, seed, ticks, show, backend)
         trial = measure(place, robot, 1.0 / RATE)
         if trial.lockstep.repeatable:
             write_trial(place / TRIAL, trial)

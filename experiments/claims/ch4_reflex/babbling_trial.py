@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from experiments.kit.live.launch import TABLE, free_endpoint, stop
+from experiments.kit.live.launch import PHYSICS, TABLE, free_endpoint, stop
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
 from mobee.arrays import Array
 from mobee.errors import MobeeError
@@ -111,6 +111,7 @@ seed = {seed}
 {gains}
 
 [services.robot_sim]
+backend = "{backend}"
 rate = {rate:g}
 ticks = {ticks}
 record = {record}
@@ -145,13 +146,14 @@ SUMMARY = "summary.json"  # of the launcher
 Outcome = Literal["completed", "deflected", "returned"]
 
 
-def scenario(mode: str, folder: Path, seed: int, ticks: int) -> str:
+def scenario(mode: str, folder: Path, seed: int, ticks: int, backend: str = PHYSICS[0]) -> str:
     """Return the text of the scenario; recordings go to the folder."""
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
     between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
-    robot = _ROBOT.format(title=TITLES[mode], gains=gains, seed=seed, rate=RATE, ticks=ticks, record=where, world=_quoted(TABLE))
+    values = {"title": TITLES[mode], "gains": gains, "seed": seed, "rate": RATE, "ticks": ticks, "record": where, "backend": backend}
+    robot = _ROBOT.format(world=_quoted(TABLE), **values)
     return robot + between + _BABBLER.format(at=at, robot_of=robot_of, speed=SPEED, folder=where)
 
 
@@ -163,7 +165,9 @@ class TrialFailed(MobeeError):
     """Raised when a trial fails; the message names its logs."""
 
 
-def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None]) -> None:
+def run_trial(
+    folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str = PHYSICS[0]
+) -> None:
     """Run a trial; writes commands, positions and contacts into the folder.
 
     `show` is called with the finished share.  Raises TrialFailed.
@@ -172,7 +176,7 @@ def run_trial(folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show
     for left in (COMMANDS, POSITIONS):  # of an interrupted trial
         (folder / left).unlink(missing_ok=True)
     file = folder / f"{mode}.toml"
-    file.write_text(scenario(mode, folder.resolve(), seed, ticks))
+    file.write_text(scenario(mode, folder.resolve(), seed, ticks, backend))
     due = ticks * 8 * len(robot.motors)  # bytes of a whole record
     with _launched(file, folder) as process:
         written, deadline = 0, time.monotonic() + START_TIMEOUT

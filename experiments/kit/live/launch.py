@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import os
@@ -128,6 +129,14 @@ def read_done(folder: Path, kind: type[T]) -> list[T]:
     return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()] if path.exists() else []
 
 
+PHYSICS = ("pybullet", "mujoco")  # back-ends of robot_sim; the published numbers are of the first
+
+
+def add_backend(parser: argparse.ArgumentParser) -> None:
+    """Add the option --backend."""
+    parser.add_argument("--backend", choices=PHYSICS, default=PHYSICS[0], help=f"the physics (default: {PHYSICS[0]})")
+
+
 TICK_TIMEOUT = 60.0  # s for a tick of lockstep; the performer plans within one tick
 
 _SCENARIO = """# Written by an experiment.
@@ -140,6 +149,7 @@ seed = {seed}
 {mode}
 
 [services.robot_sim]
+backend = "{backend}"
 world = "{simulated}"
 rate = {rate:g}
 record = "{folder}"
@@ -169,17 +179,19 @@ def launch(
     seconds: float,
     lockstep: bool = True,
     simulated: str = "",
+    backend: str = PHYSICS[0],
 ) -> dict[str, Any]:
-    """Launch the live robot with PyBullet and a performer; returns the summary and leaves the recording in `folder`.
+    """Launch the live robot with physics and a performer; returns the summary and leaves the recording in `folder`.
 
     `perform`: the performer's function, see `performer.config.Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: robot
-    time after which the system ends; `simulated`: the simulator's world if it is not the model's.  Raises LaunchFailed.
+    time after which the system ends; `simulated`: the simulator's world if it is not the model's; `backend`: of PHYSICS.  Raises
+    LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {TICK_TIMEOUT:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
     values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
-    values |= {"rate": rate, "speed": speed, "perform": perform}
+    values |= {"rate": rate, "speed": speed, "perform": perform, "backend": backend}
     scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the learned reacher with a planner on the live PyBullet robot, in lockstep.
+"""Compare the learned reacher with a planner on the live robot, in lockstep.
 
 Claim: trained offline and refined live, the learned reacher brings the palm to within 2 cm of the surface of at least 95 % of those of the
 thesis' 27 targets that can be reached, and of 90 % of new random targets, from random poses, without a solid contact deeper than 2 mm.
 Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
-The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet, with gravity.  In each start a
+The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet
+(with --backend mujoco MuJoCo), with gravity.  In each start a
 learner (predictor gp, strategy ucb, failures alike) makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant
 with the identified motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new targets, each from another pose,
 with up to three reaches per try.  The planner peer (inverse kinematics and RRT-Connect, replanned after every change) has the same targets,
@@ -54,7 +55,7 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, Judged, measure, nearest_reach, read_block, write_block
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Claim, Experiment, Steps
-from experiments.kit.live.launch import TABLE, summary_of, write_job
+from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, summary_of, write_job
 from experiments.kit.live.recordings import POSITIONS
 from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
@@ -103,7 +104,7 @@ MAX_TRY = 120.0  # s of robot time for a try, on average over a block
 PATIENCE = 60.0  # s for a tick, in which a plan may be made
 
 _SCENARIO = """# Written by the experiment `live-reach`.
-title = "Reaching with PyBullet: {kind}"
+title = "Reaching with {backend}: {kind}"
 
 [shared]
 robot = "{robot}"
@@ -114,6 +115,7 @@ mode = "lock"
 patience = {patience}
 
 [services.robot_sim]
+backend = "{backend}"
 rate = {rate}
 record = "{folder}"
 
@@ -144,7 +146,8 @@ QUICK = Sizes(500, 30, 2, 2, 2, 1, 2)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add --starts and --quick."""
+    """Add --starts, --quick and --backend."""
+    add_backend(parser)
     parser.add_argument(
         "--starts", type=positive_whole, default=3, metavar="N", help="learners, each with other poses and new targets (default: 3)"
     )
@@ -164,7 +167,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             jobs = list(_jobs(place, seed, sizes))
             for done, (name, job, rate) in enumerate(jobs):
                 progress.show((number + done / len(jobs)) / starts, f"start {number + 1} of {starts}: {name}")
-                _do(place / name, job, seed, rate)
+                _do(place / name, job, seed, rate, arguments.backend)
     blocks, known = _blocks(folder), _touchable()
     targets = grid_targets()
     left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= SUCCESS_DISTANCE)
@@ -192,9 +195,9 @@ def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, floa
     yield "first", Job("first motion", seed, store, fresh[: sizes.timed]), FAST_RATE
 
 
-def _do(folder: Path, job: Job, seed: int, rate: float) -> None:
+def _do(folder: Path, job: Job, seed: int, rate: float, backend: str) -> None:
     if not (folder / BLOCK).exists():
-        repeatable = perform(folder, job, seed, rate)
+        repeatable = perform(folder, job, seed, rate, backend)
         write_block(folder, measure(folder, job, rate, repeatable))
         (folder / POSITIONS).unlink()
 
@@ -224,16 +227,15 @@ def _touchable() -> frozenset[int]:
     return frozenset(number for number, target in enumerate(grid_targets()) if touchable(known, target))
 
 
-def perform(folder: Path, job: Job, seed: int, rate: float = RATE) -> bool:
+def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str = PHYSICS[0]) -> bool:
     """Launch a system with one job, which records every tick in the folder; returns whether the run is repeatable.
 
     `seed`: of the simulated robot.  Raises LaunchFailed.
     """
     write_job(folder, job)
     world = WITH_OBSTACLE if job.kind == "moving" else TABLE
-    text = _SCENARIO.format(
-        kind=job.kind, robot=ROBOT, world=world, gains=GAINS, seed=seed, patience=PATIENCE, rate=rate, folder=folder.resolve()
-    )
+    names = {"kind": job.kind, "robot": ROBOT, "world": world, "gains": GAINS, "backend": backend, "folder": folder.resolve()}
+    text = _SCENARIO.format(seed=seed, patience=PATIENCE, rate=rate, **names)
     scenario = folder / "scenario.toml"
     scenario.write_text(text)
     tries = max(1, len(job.problems) + job.tries)

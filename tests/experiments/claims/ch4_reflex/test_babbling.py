@@ -144,9 +144,10 @@ def test_every_mode_is_a_scenario_that_the_launcher_accepts(tmp_path: Path) -> N
 
     for mode in MODES:
         file = tmp_path / f"{mode}.toml"
-        file.write_text(scenario(mode, tmp_path / 'a "quoted" folder', seed=3, ticks=3000))
+        file.write_text(scenario(mode, tmp_path / 'a "quoted" folder', seed=3, ticks=3000, backend="mujoco"))
         read = {part.who: part.config for part in read_scenario(str(file)).parts}
         assert read["robot_sim"].mode == read["babbler"].mode == "lock" and read["robot_sim"].ticks == 3000
+        assert read["robot_sim"].backend == "mujoco"
         assert read["robot_sim"].record == read["babbler"].run_dir
         assert ("controller" in read, "port_filter" in read) == (mode == "two", mode == "one")
         if mode == "two":
@@ -169,7 +170,7 @@ class Trials:
         self.late -= 1
         return trial(repeatable=False) if self.late >= 0 else GOOD[folder.parent.name]
 
-    def _run(self, folder: Path, mode: str, robot: Any, seed: int, ticks: int, show: Any) -> None:
+    def _run(self, folder: Path, mode: str, robot: Any, seed: int, ticks: int, show: Any, backend: str) -> None:
         if len(self.run) == self.breaks_at:
             raise TrialFailed("made to fail")
         self.run.append((mode, seed, ticks))
