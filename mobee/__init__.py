@@ -154,7 +154,11 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the module of a public name when the name is first used: a process loads what it needs."""
+    """Import the module of a public name when the name is first used: a process loads only what it needs."""
+    if name == "__version__":
+        from importlib import metadata
+
+        return metadata.version("mobee")
     if name not in _HOME:
         raise AttributeError(f"module 'mobee' has no attribute {name!r}")
     module = importlib.import_module(_HOME[name])

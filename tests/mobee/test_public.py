@@ -4,6 +4,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -48,3 +49,7 @@ def test_type_checkers_and_the_interpreter_see_the_same_names():
 def test_a_name_that_is_not_public_is_refused():
     with pytest.raises(AttributeError, match="module 'mobee' has no attribute 'Modle'"):
         _ = mobee.Modle
+
+
+def test_the_library_gives_its_version() -> None:
+    assert mobee.__version__ == metadata.version("mobee")
