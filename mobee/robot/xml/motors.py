@@ -12,12 +12,13 @@ import numpy as np
 from mobee.robot.robot import Clause, Joint, Motor, Part
 from mobee.robot.xml.node import Node
 
-NARROWEST = 1e-6  # deg between the limits of a motor
+UNITS = ("deg", "m")  # of the positions of a motor
+NARROWEST = 1e-6  # deg or m between the limits of a motor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorDraft:
-    """A motor as written in its element, before its joints are known; angles in [deg]."""
+    """A motor as written in its element, before its joints are known; positions in the unit of the file."""
 
     node: Node
     name: str
@@ -26,25 +27,31 @@ class MotorDraft:
     low: float
     high: float
     home: float
+    in_metres: bool = False  # unit="m", of a motor that slides; else degrees
+
+    def si(self, value: float) -> float:
+        """Return a number of the file in rad or m."""
+        return value if self.in_metres else float(np.deg2rad(value))
 
 
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     """Return the motor of a <motor>; `count`: motors before it."""
     low, high = node.number("minPos"), node.number("maxPos")
+    unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")
     if low == high:
         remedy = "Write a <link> instead of the joint if it shall not move, or another interval"
         node.fail("minPos", f"equals maxPos {high:g}, so the motor cannot move", remedy)
     if low > high:
         node.fail("minPos", f"{low:g} is not below maxPos {high:g}", "Swap the two")
     if high - low < NARROWEST:
-        node.fail("minPos", f"is less than {NARROWEST:g} deg below maxPos", "Write limits in degrees, or a <link> instead of the joint")
+        node.fail("minPos", f"is less than {NARROWEST:g} {unit} below maxPos", "Write limits in degrees, or a <link> instead of the joint")
     home = node.number("home", min(max(0.0, low), high))
     if not low <= home <= high:
         node.fail("home", f"{home:g} is outside of {low:g} .. {high:g}", "Choose a home between minPos and maxPos")
     index = node.number("idx", float(count))
     if not index.is_integer() or index < 0:
         node.fail("idx", f"{index:g} is not a whole number from 0 on", "Count the motors of a part from 0")
-    return MotorDraft(node, node.optional("name") or f"{part}_{count}", part, int(index), low, high, home)
+    return MotorDraft(node, node.optional("name") or f"{part}_{count}", part, int(index), low, high, home, unit == "m")
 
 
 def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:
@@ -73,10 +80,10 @@ def finish_joints(
             node.fail(
                 "minPos", f"equals maxPos {high:g}, so the joint cannot move", 'Write type="fixed" without limits, or another interval'
             )
-        span = np.deg2rad(motor.high - motor.low)
+        span = motor.si(motor.high - motor.low)
         unit = np.deg2rad(1.0) if joint.kind == "revolute" else 1.0
         scale = (high - low) * unit / span
-        driven[places[name]].append((index, float(scale), float(low * unit - scale * np.deg2rad(motor.low))))
+        driven[places[name]].append((index, float(scale), float(low * unit - scale * motor.si(motor.low))))
         finished.append(replace(joint, limits=np.array([min(low, high), max(low, high)]) * unit))
     for motor, joints_of_motor in zip(motors, driven, strict=True):
         if not joints_of_motor:
@@ -85,15 +92,15 @@ def finish_joints(
 
 
 def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> Motor:
-    limits = np.deg2rad([draft.low, draft.high])
-    motor = Motor(draft.name, draft.part, limits, float(np.clip(np.deg2rad(draft.home), *limits)), joints)
-    node = draft.node
+    limits = np.array([draft.si(draft.low), draft.si(draft.high)])
+    motor = Motor(draft.name, draft.part, limits, float(np.clip(draft.si(draft.home), *limits)), joints)
+    node, unit = draft.node, "metres" if draft.in_metres else "degrees"
     if node.flag("zoneEndsAtHome"):
         motor = replace(motor, zone_ends_at_home=True)
     if "velocity" in node.attributes:
-        motor = replace(motor, max_velocity=float(np.deg2rad(node.positive("velocity", unit="degrees per second"))))
+        motor = replace(motor, max_velocity=draft.si(node.positive("velocity", unit=f"{unit} per second")))
     if "acceleration" in node.attributes:
-        motor = replace(motor, max_acceleration=float(np.deg2rad(node.positive("acceleration", unit="degrees per second squared"))))
+        motor = replace(motor, max_acceleration=draft.si(node.positive("acceleration", unit=f"{unit} per second squared")))
     if "torque" in node.attributes:
         motor = replace(motor, max_torque=node.positive("torque", unit="newton metres"))
     return motor

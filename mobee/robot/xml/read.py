@@ -119,7 +119,7 @@ KNOWN = {
     "joint": frozenset(
         {"name", "moves", "motor", "type", *STEP, "minPos", "maxPos", "length", "radius", "field", "noSelfCollision", "base"}
     ),
-    "motor": frozenset({"name", "idx", "minPos", "maxPos", "home", "velocity", "acceleration", "torque", "zoneEndsAtHome"}),
+    "motor": frozenset({"name", "idx", "unit", "minPos", "maxPos", "home", "velocity", "acceleration", "torque", "zoneEndsAtHome"}),
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation", "turns"}),
     "mass": MASS_ATTRIBUTES,
     "constraintlist": frozenset[str](),

@@ -12,6 +12,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.robot.bodies import to_six
+from mobee.robot.motor_units import slides
 from mobee.robot.robot import Body, Clause, Joint, Motor, Robot, Shape
 from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
 from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
@@ -33,7 +34,7 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
     for part in robot.parts.values():
         element = ET.SubElement(root, "bodypart", name=part.name)
         for motor in robot.motor_table[part.slice]:
-            element.append(_motor(motor))
+            element.append(_motor(robot, motor))
         for clause in robot.clauses:
             if clause.part == part.name:
                 element.append(_clause(robot, clause))
@@ -63,13 +64,16 @@ def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
     return remarks
 
 
-def _motor(motor: Motor) -> ET.Element:
+def _motor(robot: Robot, motor: Motor) -> ET.Element:
+    """Write a motor: in metres if it slides and its position is that of a joint, else in degrees."""
     low, high = motor.limits
     values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
     values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
-    angles = {name: degrees(value) for name, value in values.items()}
+    in_metres = slides(robot, motor) and any(abs(scale) == 1.0 for _, scale, _ in motor.joints)
+    texts = {"unit": "m"} if in_metres else {}
+    texts |= {name: (number if in_metres else degrees)(value) for name, value in values.items()}
     zone = {"zoneEndsAtHome": "true"} if motor.zone_ends_at_home else {}
-    return ET.Element("motor", {"name": motor.name} | angles | {"torque": number(motor.max_torque)} | zone)
+    return ET.Element("motor", {"name": motor.name} | texts | {"torque": number(motor.max_torque)} | zone)
 
 
 def _clause(robot: Robot, clause: Clause) -> ET.Element:

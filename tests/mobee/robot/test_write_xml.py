@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.xml.write import write_xml
@@ -170,3 +170,26 @@ def test_a_chain_of_500_joints_is_written_and_read_again(tmp_path: Path) -> None
 def test_a_tree_too_deep_for_a_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidValue, match="is too deep in the tree: a file holds 2000 elements inside each other"):
         write_xml(chain(1100), tmp_path / "x.xml")
+
+
+def test_a_slide_is_written_in_metres(tmp_path: Path) -> None:
+    urdf = tmp_path / "gripper.urdf"
+    urdf.write_text(
+        '<robot name="gripper"><link name="palm"/><link name="finger"/><joint name="slide" type="prismatic"><parent link="palm"/>'
+        '<child link="finger"/><axis xyz="1 0 0"/><limit lower="0.01" upper="0.04" effort="1" velocity="0.2"/></joint></robot>'
+    )
+    robot = load_robot(urdf)
+    text = write_xml(robot, tmp_path / "gripper.xml").read_text()
+    assert 'unit="m" minPos="0.01" maxPos="0.04"' in text
+    assert 'velocity="0.2"' in text
+    again = load_robot(tmp_path / "gripper.xml")
+    assert again.limits.tolist() == robot.limits.tolist() == [[0.01, 0.04]]
+    assert again.motor_table[0].joints == robot.motor_table[0].joints
+    assert again.motor_table[0].max_velocity == 0.2
+
+
+def test_an_unknown_unit_of_a_motor_is_refused(tmp_path: Path) -> None:
+    text = write_xml(load_robot("katana"), tmp_path / "katana.xml").read_text()
+    (tmp_path / "katana.xml").write_text(text.replace("<motor ", '<motor unit="rad" ', 1))
+    with pytest.raises(RobotFileError, match="unknown unit 'rad'.*Valid: deg, m"):
+        load_robot(tmp_path / "katana.xml")
