@@ -108,8 +108,12 @@ def _why(result: Result) -> str:
     if result.beyond == 0.0:
         learn = "" if result.path else "; a run that has learned to reach may know it (--run)"
         return f"Part {result.part} can reach this far: another posture, or a path without contacts, may succeed{learn}."
-    far = f"{1e3 * result.beyond:.0f} mm from the target's surface"
-    return f"The nearest position that part {result.part} can reach is {_place(result.nearest.position)}, {far}, without obstacles."
+    far = f"{1e3 * result.beyond:.0f} mm from its surface if no obstacle is in between"
+    place = " ".join(f"{x:.3f}" for x in result.nearest.position)
+    return (
+        f"The target is out of reach of {result.part}: the nearest position that {result.marker} can come to is {place}, {far}. "
+        "Move the target nearer, or give a position with --target X Y Z."
+    )
 
 
 def _place(position: Array) -> str:

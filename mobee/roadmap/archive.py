@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +45,12 @@ def robot_digest(robot: Robot) -> str:
     return _digest(parts)
 
 
-def world_digest(world: World) -> str:
+def world_digest(world: World, *, roles: Collection[str] = ("obstacle", "target")) -> str:
     """Return 16 hex digits of the objects that can be touched: shapes, poses, roles, and the links that carry them.
 
-    Neither their names nor their order nor their colours count, and ghosts are not there.
+    Neither their names nor their order nor their colours count; an object counts if its role is one of `roles`.
     """
-    return _digest([b"world", *sorted(_object(one) for one in world.objects.values() if one.role != "ghost")])
+    return _digest([b"world", *sorted(_object(one) for one in world.objects.values() if one.role in roles)])
 
 
 def _shape(shape: Shape) -> bytes:

@@ -85,19 +85,25 @@ def _played(plant: BusFollower, running: Running, path: Array, speed: float) -> 
 
 
 def in_running_world(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
-    """Return the map in the world of the running system; raises UserError if its robot or world differs from that of the map."""
+    """Return the map in the world of the running system; raises UserError if its robot or its obstacles differ from those of the map.
+
+    Targets may be elsewhere: vision moves them, and the path is checked where they are now.
+    """
     made, now = robot_digest(trm.model.robot), robot_digest(running.robot)
     if made != now:
         raise UserError(f"the map is of robot {made}, and the running robot {running.robot.name} is {now}: build a map for it", BAD_INPUT)
-    made, now = world_digest(trm.model.world), world_digest(running.world)
+    made, now = (world_digest(world, roles=("obstacle",)) for world in (trm.model.world, running.world))
     if made != now and not other_world:
-        there = ", ".join(running.world.objects) or "nothing"
         raise UserError(
-            f"the map is of world {made}, and the world of the running model is {now} ({there}): build a map in it, or use "
-            "--other-world: then only the path is checked there",
+            f"the obstacles of the map's world ({_obstacles(trm.model.world)}) and of the running model's world "
+            f"({_obstacles(running.world)}) differ: build a map in that world, or use --other-world: then only the path is checked there",
             BAD_INPUT,
         )
     return replace(trm, model=Model(running.robot, running.world))
+
+
+def _obstacles(world: World) -> str:
+    return ", ".join(name for name, one in world.objects.items() if one.role == "obstacle") or "none"
 
 
 @contextmanager

@@ -52,7 +52,9 @@ def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest
     assert main(["reach", "--offline", "--target", "-3", "0.2", "0.1"]) == 1
     said = capsys.readouterr().out
     assert "right_palm did not reach the target at (-3.000, 0.200, 0.100)" in said
-    assert "The nearest position that part right_arm can reach is (" in said
+    flat = " ".join(said.split())
+    assert "The target is out of reach of right_arm: the nearest position that right_palm can come to is" in flat
+    assert "give a position with --target X Y Z" in flat
     assert max(map(len, said.splitlines())) <= 80
 
 

@@ -3,9 +3,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ import pytest
 import mobee
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
+from mobee_cli.errors import UserError
+from mobee_cli.roadmap.live import Running, in_running_world
 from mobee_cli.roadmap.show import TOUR_PLACES, tour
+from services.common.service import Service
 from tests.services.robots import chain
 
 MOTORS = ("r_shoulder_pitch", "r_shoulder_roll")
@@ -165,6 +169,22 @@ def test_bad_input_is_told_in_a_line(say: Say, free: Path, words: list[str], tex
     code, out, err = say(*(word.replace("{map}", str(free)) for word in words))
     assert code == 2 and out == ""
     assert text in err and err.count("\n") == 1
+
+
+def test_live_the_ball_may_have_moved_but_not_the_table(free: Path) -> None:
+    made = mobee.load_roadmap(free)
+    made = replace(made, model=mobee.Model(made.model.robot, mobee.load_world("table")))
+
+    def now(name: str) -> Running:
+        world = mobee.load_world("table")
+        world.move(name, position=world.objects[name].position + np.array([0.001, 0.0, 0.0]))
+        return Running(made.model.robot, world, mobee.Gains.default(), cast("Service", None))
+
+    vision = now("ball")
+    assert in_running_world(made, vision, other_world=False).model.world is vision.world
+    with pytest.raises(UserError, match=r"world \(table\) and of the running model's world \(table\) differ: build a map in that world"):
+        in_running_world(made, now("table"), other_world=False)
+    in_running_world(made, now("table"), other_world=True)
 
 
 def test_without_a_system_live_says_so(say: Say, free: Path) -> None:
