@@ -12,6 +12,7 @@ bus begins with::
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 
@@ -27,6 +28,10 @@ if sys.path[:1] != [str(FOLDER)]:
 
 def main() -> int:
     """Run the command `mobee`; return its exit code."""
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends the process without a traceback
     from mobee_cli.__main__ import main as run_command
 
+    signal.signal(signal.SIGINT, handler)
     return run_command()

@@ -6,16 +6,23 @@ from __future__ import annotations
 import importlib.util
 import socket
 import sys
+import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from bus_schema import keys
+from bus_schema.rpc import Empty, Stat
 from mobee.errors import MobeeError, OlderVersion, UnknownName
 from mobee.robot.robot import Robot
+from services.common import rpc
 from services.common.config import ConfigError, nearest
+from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 from services.common.worlds import NO_WORLD
 from services.launcher.scenario import Part, Scenario
+
+_CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at once
 
 
 class MissingExtra(Exception):
@@ -24,6 +31,10 @@ class MissingExtra(Exception):
 
 class PortInUse(Exception):
     """A port on which a service wants to listen is taken; the message holds the remedy."""
+
+
+class SystemRuns(Exception):
+    """Another system runs at the endpoint, or holds a port; the message describes it and holds the remedy."""
 
 
 def check_extras(scenario: Scenario) -> None:
@@ -41,15 +52,57 @@ def _remedy(package: str, extra: str) -> str:
     return f': pip install "mobee[{extra}]"'
 
 
-def check_ports(scenario: Scenario) -> None:
-    """Raise PortInUse for the first `..._port` setting whose port on the loopback interface is taken."""
-    for part in scenario.parts:
-        for name in part.config.__struct_fields__:
-            if name.endswith("_port") and not _is_free(port := getattr(part.config, name)):
-                raise PortInUse(
-                    f"port {port} of {part.who} is in use: choose another with --set services.{part.who}.{name}=..., "
-                    f"or leave {part.who} out with --headless"
-                )
+def check_ports(scenario: Scenario, endpoint: str) -> None:
+    """Raise SystemRuns if a system runs at the endpoint; else PortInUse for the first `..._port` setting whose loopback port is taken.
+
+    A port may belong to a system at the default endpoint: then SystemRuns describes that one.
+    """
+    ports = [(part.who, name, getattr(part.config, name)) for part in scenario.parts for name in part.config.__struct_fields__]
+    ports = [(who, name, port) for who, name, port in ports if name.endswith("_port")]
+    taken = [(who, name, port) for who, name, port in ports if not _is_free(port)]
+    for place in dict.fromkeys([endpoint, *([DEFAULT_ENDPOINT] if taken else [])]):
+        if stat := launcher_at(place):
+            raise SystemRuns(_two_systems(stat, place, endpoint, ports))
+    for who, name, port in taken:
+        raise PortInUse(
+            f"port {port} of {who} is in use: choose another with --set services.{who}.{name}={_free_port(port + 1)}, "
+            f"or leave {who} out with --headless"
+        )
+
+
+def launcher_at(endpoint: str) -> Stat | None:
+    """Return the status of the launcher whose router listens at a TCP endpoint; None if none answers."""
+    host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_TIMEOUT).close()
+        with open_client(endpoint, patience=0.0) as session:
+            return rpc.call(session, "mobee", keys.service_rpc("launcher", "stat"), Empty, Stat, timeout=_ANSWER_TIMEOUT, tries=2)
+    except (OSError, ValueError, BusUnreachable, rpc.CallFailed):  # nobody listens, it is no router, or one without a launcher
+        return None
+
+
+def _two_systems(stat: Stat, place: str, endpoint: str, ports: Sequence[tuple[str, str, int]]) -> str:
+    """Describe the system that runs, how to end it, and how to start another beside it."""
+    since = time.strftime("%H:%M:%S", time.localtime(time.time() - stat.uptime))
+    at = "" if place == DEFAULT_ENDPOINT else f" --endpoint {place}"
+    options = [f"--endpoint {_next_endpoint(endpoint)}" if place == endpoint else ""]
+    chosen: list[int] = []
+    for who, name, port in ports:
+        chosen.append(_free_port(port + 1, without=chosen))
+        options.append(f"--set services.{who}.{name}={chosen[-1]}")
+    return (
+        f"a system runs already at {place}, since {since} ({stat.uptime / 60:.0f} min, launcher {stat.pid}): {stat.text}. "
+        f"End it with `mobee stop{at}`, or start this one beside it with {' '.join(filter(None, options))}"
+    )
+
+
+def _next_endpoint(endpoint: str) -> str:
+    host, _, port = endpoint.rpartition(":")
+    return f"{host}:{_free_port(int(port) + 1)}"
+
+
+def _free_port(first: int, without: Collection[int] = ()) -> int:
+    return next((port for port in range(first, 65536) if port not in without and _is_free(port)), first)
 
 
 def _is_free(port: int) -> bool:

@@ -26,6 +26,7 @@ from services.common.session import DEFAULT_ENDPOINT, LEASE, LOCAL_ENDPOINT, Bus
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
+    SystemRuns,
     check_extras,
     check_gains,
     check_lockstep,
@@ -78,8 +79,8 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         check_services(scenario, robots)
         check_rate(scenario, robots)
         check_extras(scenario)
-        check_ports(scenario)
         endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+        check_ports(scenario, endpoint)
         lease = LEASE
         if scenario.is_locked:
             spare_threads()
@@ -87,7 +88,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         session = open_meanwhile.enter_context(open_router(endpoint, lease, local))
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (CoreUnavailable, MissingExtra, PortInUse, BusUnreachable) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before any service was started", INTERRUPTED)

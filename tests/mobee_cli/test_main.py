@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -94,6 +95,18 @@ def test_ctrl_c_ends_a_page_but_breaks_off_a_recording(monkeypatch: pytest.Monke
     monkeypatch.setattr(services.monitor.view, "view", interrupt)
     assert main(["view", "katana"]) == 0
     assert main(["view", "katana", "--save", str(tmp_path / "katana.rrd")]) == 130
+
+
+def test_ctrl_c_during_the_imports_prints_no_traceback() -> None:
+    code = (
+        "import builtins, os, signal, mobee_system\nreal = builtins.__import__\n"
+        "def interrupted(name, *given, **named):\n"
+        "    if name.startswith('mobee_cli'): os.kill(os.getpid(), signal.SIGINT)\n"
+        "    return real(name, *given, **named)\n"
+        "builtins.__import__ = interrupted\nmobee_system.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
 
 
 def test_the_command_itself_imports_nothing_heavy() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import re
 import signal
+import socket
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -194,14 +195,24 @@ def test_services_of_a_killed_launcher_end_when_the_next_one_comes(launch: Launc
     assert len(launched.children()) == 1
 
 
-def test_a_second_launcher_at_the_same_endpoint_is_refused_in_one_line(launch: Launch, endpoint: str) -> None:
-    launch(toys(one="healthy")).wait_for("all ready")
+def test_a_second_launcher_at_the_same_endpoint_describes_the_first_in_one_line(launch: Launch, endpoint: str) -> None:
+    first = launch(toys(one="healthy"))
+    first.wait_for("all ready")
     second = launch(toys(one="healthy"))
     assert second.end() == (3, {})
     assert len(second.news.splitlines()) == 1
-    assert f"cannot listen at {endpoint}" in second.news
-    assert f"`mobee stop --endpoint {endpoint}`" in second.news
+    assert f"a system runs already at {endpoint}, since " in second.news
+    assert f"launcher {first.process.pid}): toys: 1 of 1 ready, {first.folder}/runs/" in second.news
+    assert f"End it with `mobee stop --endpoint {endpoint}`, or start this one beside it with --endpoint tcp/127.0.0.1:" in second.news
     assert not (second.folder / "runs").exists()
+
+
+def test_an_endpoint_of_another_program_is_refused_in_one_line(launch: Launch, endpoint: str) -> None:
+    with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
+        launched = launch(toys(one="healthy"))
+        assert launched.end() == (3, {})
+    assert len(launched.news.splitlines()) == 1
+    assert f"cannot listen at {endpoint}" in launched.news
 
 
 def test_a_unix_socket_is_gone_after_the_run(launch: Launch, tmp_path: Path) -> None:
