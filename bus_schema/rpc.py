@@ -194,9 +194,16 @@ class Stat(Reply, frozen=True, kw_only=True):
     uptime: float  # s
     ready: bool
     text: Text  # one line for the status screen
-    numbers: dict[str, float]
+    numbers: dict[str, int | float | None]  # None: not measured
     rejected: dict[str, int]  # number of refused messages and calls, by reason
     words: dict[str, Text] = {}  # values that are not numbers, such as a hash
+
+
+class Pulse(Reply, frozen=True, kw_only=True):
+    """The course of a service's inbox; answered also while a handler runs."""
+
+    handled: int  # messages, calls and timers since the start
+    waiting: int  # messages and calls in the inbox
 
 
 class Config(Reply, frozen=True, kw_only=True):
@@ -226,6 +233,7 @@ class Call:
 
 CALLS = (
     Call("{service}/rpc/{verb}", ("stat",), Empty, Stat, "every service"),
+    Call("{service}/rpc/{verb}", ("pulse",), Empty, Pulse, "every service"),
     Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, "every service"),
     Call("{service}/rpc/{verb}", ("config",), Empty, Config, "every service"),
     Call("{part}/meta", (), Empty, PartMeta, "robot_sim"),

@@ -19,6 +19,7 @@ from services.common.observe import Heard, alive, listen, stats
 _LISTEN = 0.3  # s: longer than the pause between two states of a part
 _RESTARTS = "restarts_"
 _AGENT = "agent_"
+NO_COMMAND = -1  # age of the command in force, in a State
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +75,8 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
 def _part(heard: Heard) -> dict[str, Any]:
     try:
         state = heard.content()
-        return {name: state[name] for name in ("gate", "mode", "epoch", "cmd_age", "faults")}
+        part = {name: state[name] for name in ("gate", "mode", "epoch", "cmd_age", "faults")}
+        return part | {"cmd_age": None if part["cmd_age"] == NO_COMMAND else part["cmd_age"]}
     except (ValueError, KeyError, TypeError):
         return {"gate": "unreadable"}
 
@@ -96,23 +98,17 @@ def _as_text(status: dict[str, Any]) -> str:
         for part, state in sorted(status["parts"].items()):
             lines.append(
                 f"{part:<16}{state['gate']:<9}{_say(state.get('mode')):<10}{_say(state.get('epoch')):>14}"
-                f"{_say(_age(state)):>13}{_say(state.get('faults')):>8}"
+                f"{_say(state.get('cmd_age')):>13}{_say(state.get('faults')):>8}"
             )
     if status["agents"]:
         lines += ["", f"{'agent':<16}{'transitions':>12}{'timeouts':>10}{'interrupted':>13}{'mean action s':>15}"]
         for agent, numbers in status["agents"].items():
-            mean = numbers.get("action_time_mean", -1.0)
+            mean = numbers.get("action_time_mean")
             lines.append(
                 f"{agent:<16}{_say(numbers.get('transitions')):>12}{_say(numbers.get('timeouts')):>10}"
-                f"{_say(numbers.get('interrupted')):>13}{'-' if mean < 0 else f'{mean:.2f}':>15}"
+                f"{_say(numbers.get('interrupted')):>13}{'-' if mean is None else f'{mean:.2f}':>15}"
             )
     return "\n".join(lines)
-
-
-def _age(state: dict[str, Any]) -> Any:
-    """Return the age of the command in force in ticks; None without a command."""
-    age = state.get("cmd_age")
-    return None if age == -1 else age
 
 
 def _say(value: Any) -> str:

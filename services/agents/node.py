@@ -20,6 +20,7 @@ from services.agents.config import Config
 from services.agents.streams import LearnedStream, ReachStream, publish_transition
 from services.common.bus_plant import BusPlant
 from services.common.hands import hand_of
+from services.common.rate import NOT_MEASURED
 from services.common.service import Service
 
 
@@ -91,7 +92,7 @@ class AgentNode:
             "transitions_ever": self._agent.transitions,
             "timeouts": self._timeouts,
             "interrupted": self._work.interrupted,
-            "action_time_mean": self._seconds / self._made if self._made else -1.0,
+            "action_time_mean": self._seconds / self._made if self._made else NOT_MEASURED,
         }
         return f"{self._agent.transitions} transitions, {self._made} now", numbers
 
@@ -154,7 +155,7 @@ class ReachNode:
             "reaches": self._reached,
             "failures": self._failures,
             "interrupted": self._work.interrupted,
-            "reward_mean": self._rewards / self._made if self._made else -1.0,
-            "missing_mean": self._missing / self._reached if self._reached else -1.0,
+            "reward_mean": self._rewards / self._made if self._made else NOT_MEASURED,
+            "missing_mean": self._missing / self._reached if self._reached else NOT_MEASURED,
         }
         return f"{self._agent.tries} problem-tries, {self._made} now", numbers

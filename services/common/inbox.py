@@ -64,6 +64,7 @@ class Inbox:
         self._serves = False
         self._calls: SimpleQueue[None] = SimpleQueue()  # wakes the main thread while it serves
         self.dropped = 0  # number of messages and calls dropped because too many were waiting
+        self.handled = 0  # number of messages, calls and timers whose handler has run
 
     def put(self, handler: Handler) -> None:
         """Let the main thread run the handler; any thread may call this."""
@@ -88,6 +89,10 @@ class Inbox:
             self.put(partial(_raise, error))
         finally:
             self._turn.release()
+
+    def waiting(self) -> int:
+        """Return the number of handlers that wait; any thread may call this."""
+        return self._queue.qsize() + len(self._later)
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
         """Queue the handler as `put` does; while `crowd` handlers are waiting, drop and count it, and return False.
@@ -143,6 +148,7 @@ class Inbox:
             if self._timers and (self._timers[0][0] <= now or self._timers[0][2].handle is None):
                 if handle := heapq.heappop(self._timers)[2].handle:
                     handle()
+                    self.handled += 1
                 continue
             wake = min(until, self._timers[0][0]) if self._timers else until
             try:
@@ -174,6 +180,7 @@ class Inbox:
         while self._later:
             self._later.popleft()()
         handler()
+        self.handled += 1
 
 
 def _raise(error: BaseException) -> NoReturn:

@@ -8,6 +8,8 @@ from collections import deque
 
 import numpy as np
 
+NOT_MEASURED = -1.0  # value of a number in the status of a service; on the bus it is None
+
 
 class Rate:
     """Deadlines `period` seconds apart on the monotonic clock."""
@@ -44,5 +46,5 @@ class Percentiles:
         self._values.clear()
 
     def at(self, percent: float) -> float:
-        """The percentile; -1 if there is no value yet."""
-        return float(np.percentile(self._values, percent)) if self._values else -1.0
+        """The percentile; NOT_MEASURED if there is no value yet."""
+        return float(np.percentile(self._values, percent)) if self._values else NOT_MEASURED

@@ -5,20 +5,22 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import math
 import os
 import secrets
 import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from numbers import Integral
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
 
 import msgspec
 import zenoh
 
-from bus_schema import VERSION, keys
-from bus_schema.rpc import Config, Done, Empty, Reply, Request, Stat
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.rpc import Config, Done, Empty, Pulse, Reply, Request, Stat
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common import rpc
@@ -28,6 +30,7 @@ from services.common.entry import explained, robot_of, set_up_log, wait_until_re
 from services.common.exit_codes import ENVIRONMENT, OK
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
+from services.common.rate import NOT_MEASURED
 from services.common.rpc import Answering
 from services.common.rpc import CallRefused as CallRefused
 from services.common.session import LEASE, LOCAL_ENDPOINT, open_client, spare_threads
@@ -100,6 +103,7 @@ class Service(Listener):
         self._router, self._router_seen = "", time.monotonic()
         self._watch_liveliness()
         self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
+        self._kept.append(session.declare_queryable(keys.service_rpc(self.who, "pulse"), self._answer_pulse))
         self.on_request(keys.service_rpc(self.who, "mark"), Empty, self._mark)
         self.on_request(keys.service_rpc(self.who, "config"), Empty, self._config)
         self.on_request(keys.service_rpc(self.who, "shutdown"), Empty, self._shutdown)
@@ -216,10 +220,16 @@ class Service(Listener):
             uptime=time.monotonic() - self.started,
             ready=self._is_ready,
             text=text,
-            numbers={name: float(value) for name, value in numbers.items()},
+            numbers={name: _measured(value) for name, value in numbers.items()},
             words=dict(self.words()),
             rejected={**self.bus.rejected, **({"flood": self.inbox.dropped} if self.inbox.dropped else {})},
         )
+
+    def _answer_pulse(self, query: zenoh.Query) -> None:
+        """Answer on a thread of Zenoh, so that the launcher sees whether the inbox advances while calls wait in it."""
+        pulse = Pulse(v=VERSION, handled=self.inbox.handled, waiting=self.inbox.waiting())
+        with query:
+            query.reply(query.key_expr, encode(pulse), encoding=encoding_of(Pulse))
 
     def _mark(self, request: Empty, key: str) -> Done:
         self.bus.rejected.clear()
@@ -234,6 +244,13 @@ class Service(Listener):
         self.log.info("%s requested the end", request.who)
         self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply is out
         return Done(v=VERSION)
+
+
+def _measured(value: float) -> int | float | None:
+    """Return a number of `describe` for the bus: a count stays a whole number, and what was not measured is None."""
+    if value == NOT_MEASURED or not math.isfinite(value):
+        return None
+    return int(value) if isinstance(value, Integral) else float(value)
 
 
 def _return_free_memory() -> None:

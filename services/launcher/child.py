@@ -15,6 +15,7 @@ from typing import Literal
 
 from bus_schema.rpc import Stat
 from services.common.entry import HELD
+from services.launcher.starvation import Starvation
 
 Phase = Literal["waiting", "starting", "ready", "failed", "fault", "ended"]
 
@@ -55,6 +56,9 @@ class Child:
     asking: bool = False
     unanswered: int = 0  # stat calls in a row
     stat: Stat | None = None  # last answer of the present process
+    handled: int | None = None  # by its inbox, at the last pulse of the present silence
+    advanced_at: float = 0.0  # monotonic time at which the inbox was last seen to advance
+    starvation: Starvation | None = None  # of it and the launcher, in the present silence
     reason: str = ""  # of the last failure
 
     @property
@@ -90,7 +94,27 @@ class Child:
             os.setpriority(os.PRIO_PROCESS, self.process.pid, self.program.nice)
             if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes, it preempts no other process
                 os.sched_setscheduler(self.process.pid, os.SCHED_BATCH, os.sched_param(0))
-        self.has_token, self.asking, self.unanswered, self.asked_at, self.answered_at, self.stat = False, False, 0, 0.0, 0.0, None
+        self.has_token, self.asking, self.asked_at, self.stat = False, False, 0.0, None
+        self.note_answer(0.0)
+
+    def note_answer(self, when: float) -> None:
+        """Note that it answered, which ends its silence."""
+        self.answered_at, self.unanswered, self.handled, self.advanced_at, self.starvation = when, 0, None, 0.0, None
+
+    def note_silence(self, now: float) -> None:
+        """Measure from now on how long it or the launcher has no processor, until it answers."""
+        self.starvation = Starvation((self.pid, os.getpid()), now)
+
+    def note_pulse(self, handled: int, when: float) -> None:
+        """Note how many messages it has handled: more than at the last pulse of this silence means that it is alive."""
+        if self.handled is not None and handled > self.handled:
+            self.advanced_at = when
+            self.note_silence(when)
+        self.handled = handled
+
+    def silence(self, now: float) -> float:
+        """Return the time [s] since it last answered or its inbox advanced, without the time that it or the launcher had no processor."""
+        return now - max(self.answered_at, self.advanced_at) - (0.0 if self.starvation is None else self.starvation.total)
 
     def release(self) -> None:
         """Let the service join the system."""

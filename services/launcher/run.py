@@ -214,10 +214,10 @@ class _Run:
         self._screen.draw(self._children, self._directory)
         self._service.inbox.at(time.monotonic() + _REDRAW, self._draw)
 
-    def _describe(self) -> tuple[str, dict[str, float]]:
+    def _describe(self) -> tuple[str, dict[str, int]]:
         ready = sum(child.phase == "ready" for child in self._children)
         fault = f", FAULT: {'; '.join(self._supervisor.faults)}" if self._supervisor.faults else ""
-        numbers = {f"restarts_{child.who}": float(child.restarts) for child in self._children}
+        numbers = {f"restarts_{child.who}": child.restarts for child in self._children}
         return f"{self._scenario.name}: {ready} of {len(self._children)} ready{fault}, {self._directory}"[:2000], numbers
 
     def _report(self, ready: float | None, duration: float) -> int:

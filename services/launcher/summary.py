@@ -10,8 +10,6 @@ from bus_schema.rpc import Stat
 from services.launcher.catalogue import AGENT
 from services.launcher.child import Child
 
-_NOT_MEASURED = -1.0  # value of a number that a service did not measure
-
 
 def summarise(children: Iterable[Child]) -> dict[str, Any]:
     """The numbers of a run; None where nothing was measured.
@@ -29,7 +27,7 @@ def summarise(children: Iterable[Child]) -> dict[str, Any]:
         "solid_contact_ticks": sim.count("solid_ticks"),
         "pairs_watched": sim.count("pairs_watched"),
         "rejected_commands": {} if "robot_sim" not in stats else dict(sorted(stats["robot_sim"].rejected.items())),
-        "command_age_ticks": {name: sim.number(f"age_{name}") for name in ("p50", "p99", "max")},
+        "command_age_ticks": {name: sim.count(f"age_{name}") for name in ("p50", "p99", "max")},
         "ticks": sim.count("ticks"),
         "hold_ticks": sim.count("hold_ticks"),
         "missed_ticks": sim.count("missed_ticks"),
@@ -46,8 +44,7 @@ class _Numbers:
         self._numbers = {} if stat is None else stat.numbers
 
     def number(self, name: str) -> float | None:
-        value = self._numbers.get(name, _NOT_MEASURED)
-        return None if value == _NOT_MEASURED else value
+        return self._numbers.get(name)
 
     def count(self, name: str) -> int | None:
         value = self.number(name)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from bus_schema import keys
 from bus_schema.messages import EStop
-from bus_schema.rpc import Stat
+from bus_schema.rpc import Pulse, Stat
 from services.common.exit_codes import BAD_INPUT
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -18,6 +18,7 @@ from services.launcher.child import Child, Program
 CHECK_PERIOD = 0.05  # s between two checks of the processes
 STAT_PERIOD = 0.5  # s between two stat calls to a service
 STAT_TIMEOUT = 1.0  # s within which a service answers
+LATE_ANSWER = 0.2  # s after which an answer is late: from then on the time is measured that the processes wait for a processor
 MAX_UNANSWERED = 2  # stat calls in a row; then a service can count as frozen
 FROZEN_TIME, FROZEN_TIME_NICE = 2.0, 10.0  # s without an answer; the latter for a service that yields to all others
 NICE_SERVICE = 10  # niceness from which that is so
@@ -53,7 +54,7 @@ class Supervisor:
     def has_arrived(self) -> bool:
         """Whether robot_sim has reached its last tick."""
         sim = self.children.get("robot_sim")
-        return sim is not None and sim.stat is not None and sim.stat.numbers.get("arrived", 0.0) > 0.0
+        return sim is not None and sim.stat is not None and (sim.stat.numbers.get("arrived") or 0) > 0
 
     def stop(self) -> None:
         """End all services, the last started first."""
@@ -98,20 +99,28 @@ class Supervisor:
             self._check_process(child, now)
 
     def _check_process(self, child: Child, now: float) -> None:
+        if child.starvation is not None:
+            child.starvation.update(now)
         code = child.exit_code()
         if code is not None:
             self._note_end(child, code)
         elif child.phase == "starting" and now - child.since > READY_TIMEOUT:
             self._fail(child, f"was not ready within {READY_TIMEOUT:g} s")
         elif child.phase == "ready" and self._is_frozen(child, now):
-            self._fail(child, f"is frozen: no answer for {now - child.answered_at:.1f} s")
+            self._fail(child, f"is frozen: no answer for {now - child.answered_at:.1f} s, although it had a processor")
+        elif child.asking and child.starvation is None and now >= child.asked_at + LATE_ANSWER:
+            child.note_silence(now)
+            self._ask_pulse(child)
         elif not child.asking and now >= child.asked_at + STAT_PERIOD and (child.has_token or child.phase == "ready"):
             self.ask(child)
 
     def _is_frozen(self, child: Child, now: float) -> bool:
-        """Test calls and time: a call on a dropped connection fails at once, and the launcher itself may have been stopped for a while."""
+        """Test calls and time: a call on a dropped connection fails at once, and the launcher itself may have been stopped for a while.
+
+        A service that waits for a processor, or whose inbox advances, is slow but not frozen.
+        """
         limit = max(FROZEN_TIME_NICE if child.program.nice >= NICE_SERVICE else FROZEN_TIME, child.program.patience)
-        return child.unanswered >= MAX_UNANSWERED and now - child.answered_at >= limit
+        return child.unanswered >= MAX_UNANSWERED and now - child.answered_at >= limit and child.silence(now) >= limit
 
     def ask(self, child: Child) -> None:
         """Ask a service for its status."""
@@ -123,12 +132,25 @@ class Supervisor:
                 self._note_answer(child, answer)
 
         self._service.ask(keys.service_rpc(child.who, "stat"), Stat, note, timeout=STAT_TIMEOUT)
+        if child.unanswered:
+            self._ask_pulse(child)
+
+    def _ask_pulse(self, child: Child) -> None:
+        """Ask a silent service whether its inbox advances."""
+        pid = child.pid
+
+        def note(answer: Pulse | CallFailed) -> None:
+            if child.pid == pid and child.starvation is not None and isinstance(answer, Pulse):
+                child.note_pulse(answer.handled, time.monotonic())
+
+        self._service.ask(keys.service_rpc(child.who, "pulse"), Pulse, note, timeout=STAT_TIMEOUT)
 
     def _note_answer(self, child: Child, answer: Stat | CallFailed) -> None:
         if isinstance(answer, CallFailed) or answer.pid != child.pid:
             child.unanswered += 1
             return
-        child.unanswered, child.answered_at, child.stat = 0, time.monotonic(), answer
+        child.note_answer(time.monotonic())
+        child.stat = answer
         if child.phase == "starting" and answer.ready:
             says = f": {answer.text}" if answer.text else ""
             self._announce(f"{child.who} is ready after {time.monotonic() - child.since:.1f} s (pid {child.pid}){says}")

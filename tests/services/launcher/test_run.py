@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import os
 import re
 import signal
 import socket
@@ -124,6 +125,19 @@ def test_a_frozen_service_is_killed_and_restarted(launch: Launch) -> None:
     code, summary = launched.end()
     assert code == 0
     assert summary["restarts"] == {"one": 1, "two": 0}
+
+
+def test_a_service_whose_handler_hangs_is_frozen(launch: Launch) -> None:
+    launched = launch(toys(one="hang"))
+    launched.wait_for("one is frozen")
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="only Linux reports how long a process waits for a processor")
+def test_a_slow_service_is_not_frozen(launch: Launch) -> None:
+    launched = launch(toys(backlog="backlog", starve="starve"), "--duration", "6.5")
+    code, summary = launched.end()
+    assert code == 0
+    assert summary["restarts"] == {"backlog": 0, "starve": 0}, launched.news
 
 
 def test_a_service_that_is_killed_is_back_within_seconds(launch: Launch) -> None:

@@ -28,7 +28,7 @@ ROBOT = {
     "solid_depth_max": 0.0042,
     "solid_ticks": 9.0,
     "pairs_watched": 211.0,
-    "gap_min": -1.0,
+    "gap_min": None,
 }
 RUN = {"scenario": "default", "run": "runs/x", "duration_s": 120.0, "seconds_to_ready": 3.2, "faults": []}
 

@@ -22,6 +22,23 @@ class Silent:
     def on_alive(self, handler: object) -> None: ...
 
 
+def test_waiting_for_a_processor_or_an_inbox_that_advances_is_no_silence() -> None:
+    child = Child(Program("model", (), Path("model.log")), phase="ready")
+    child.note_answer(100.0)
+    child.note_silence(100.5)
+    assert child.starvation is not None
+    child.starvation.total = 1.5
+    assert child.silence(102.0) == pytest.approx(0.5)
+    child.note_pulse(7, 101.0)
+    assert child.silence(102.0) == pytest.approx(0.5)
+    child.note_pulse(7, 102.0)
+    assert child.silence(103.0) == pytest.approx(1.5)
+    child.note_pulse(8, 103.0)  # a new measurement begins
+    assert child.silence(103.5) == pytest.approx(0.5)
+    child.note_answer(104.0)
+    assert (child.silence(105.0), child.handled) == (pytest.approx(1.0), None)
+
+
 @pytest.mark.parametrize(("nice", "limit"), [(0, FROZEN_TIME), (10, FROZEN_TIME_NICE)])
 def test_what_yields_to_others_may_be_silent_for_longer(nice: int, limit: float) -> None:
     supervisor = Supervisor(cast("Service", Silent()), [], lambda text: None)

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 
@@ -41,7 +42,34 @@ def told(service: Service, config: Config, marks: list[int]) -> tuple[str, dict[
     """What it is; one that freezes does so some time after it was first asked, as before that it is not ready to anybody."""
     if config.behaviour == "freeze":
         service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))
-    return f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7}
+    if not marks and config.behaviour in SLOW:
+        marks.append(0)
+        service.inbox.at(time.monotonic() + config.delay, lambda: SLOW[config.behaviour](service))
+    return f"a toy, {config.behaviour}", {"marks": len(marks), "transitions": 7, "action_time_mean": -1.0}
+
+
+def hang(service: Service) -> None:
+    time.sleep(60.0)
+
+
+def backlog(service: Service) -> None:
+    """Four seconds of work arrive at once, in small pieces."""
+    for _ in range(800):
+        service.inbox.put(lambda: time.sleep(0.005))
+
+
+def starve(service: Service) -> None:
+    """Other programs take the processor for five seconds; the toy gets what they leave."""
+    cpu = min(os.sched_getaffinity(0))
+    for thread in map(int, os.listdir("/proc/self/task")):
+        os.sched_setaffinity(thread, {cpu})
+        os.sched_setscheduler(thread, os.SCHED_IDLE, os.sched_param(0))
+    spin = f"import os, time; os.sched_setaffinity(0, {{{cpu}}}); end = time.monotonic() + 5\nwhile time.monotonic() < end: pass"
+    for _ in range(6):
+        subprocess.Popen([sys.executable, "-c", spin], preexec_fn=lambda: os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0)))
+
+
+SLOW = {"hang": hang, "backlog": backlog, "starve": starve}
 
 
 def say(service: Service) -> None:

@@ -11,7 +11,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     name: str = "toy"
     """Its name on the bus."""
-    behaviour: Literal["healthy", "talk", "crash_at_start", "crash_once_ready", "bad_settings", "freeze", "deaf", "finish"] = "healthy"
+    behaviour: Literal[
+        "healthy", "talk", "crash_at_start", "crash_once_ready", "bad_settings", "freeze", "hang", "backlog", "starve", "deaf", "finish"
+    ] = "healthy"
     """What goes wrong."""
     delay: float = 0.3
     """Seconds from ready to what goes wrong."""

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How long processes are ready to run but have no processor, so that a busy machine is not taken for a frozen service."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PERIOD = 0.2  # s between two looks at the threads
+
+
+@dataclass(frozen=True, slots=True)
+class _Thread:
+    """A thread at one time."""
+
+    ran: int  # ns on a processor since its start
+    waited: float  # s ready to run without one, up to the last time that it ran
+    since: float | None  # monotonic time since when it has been waiting; None if it is not waiting
+
+    def waited_until(self, now: float) -> float:
+        return self.waited + (0.0 if self.since is None else now - self.since)
+
+
+class Starvation:
+    """Measures how long one of several processes has been without a processor, by the scheduler's numbers of their threads.
+
+    `total`: s since the start; of threads that wait at the same time, the longest wait counts.  0 where Linux does not report it.
+    """
+
+    def __init__(self, pids: tuple[int, ...], now: float) -> None:
+        self._pids, self._at, self.total = pids, now, 0.0
+        self._threads = {thread: _Thread(ran, waited, None) for thread, ran, waited, _ in _threads(pids)}
+
+    def update(self, now: float) -> None:
+        """Continue the measurement, at most once in PERIOD."""
+        if now < self._at + PERIOD:
+            return
+        found: dict[int, _Thread] = {}
+        longest = 0.0
+        for thread, ran, waited, is_ready in _threads(self._pids):
+            before = self._threads.get(thread, _Thread(-1, waited, None))
+            begun = (self._at if before.since is None else before.since) if is_ready and ran == before.ran else None
+            found[thread] = _Thread(ran, waited, begun)
+            longest = max(longest, found[thread].waited_until(now) - before.waited_until(self._at))
+        self._threads, self._at, self.total = found, now, self.total + longest
+
+
+def _threads(pids: tuple[int, ...]) -> Iterator[tuple[int, int, float, bool]]:
+    """Yield id, ns on a processor, s of waiting, and whether it runs or is ready to, for each thread of the processes that still run."""
+    for pid in pids:
+        try:
+            ids = os.listdir(f"/proc/{pid}/task")
+        except OSError:  # the process has ended, or this is not Linux
+            continue
+        for thread in ids:
+            folder = Path(f"/proc/{pid}/task/{thread}")
+            try:
+                ran, waited, _ = (folder / "schedstat").read_text().split()
+                state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+            except (OSError, ValueError):  # the thread has ended, or the kernel keeps no such numbers
+                continue
+            yield int(thread), int(ran), 1e-9 * int(waited), state == "R"
