@@ -373,13 +373,13 @@ class Event(Message, frozen=True, kw_only=True):
 
 
 class EStop(Message, frozen=True, kw_only=True):
-    """Emergency stop: latched by robot_sim until it is reset."""
+    """Emergency stop: latched by robot_sim until the call `estop/rpc/reset`; a message whose `set` is false releases nothing."""
 
     stream: ClassVar[Stream] = Stream(
         "estop",
         "STOP",
-        writer="any client; robot_sim repeats it while it is latched (LATEST)",
-        readers="robot_sim, controller, port_filter",
+        writer="any client; robot_sim repeats it while it is latched (LATEST), launcher and controller until then",
+        readers="robot_sim, controller, port_filter, launcher",
     )
 
     set: bool

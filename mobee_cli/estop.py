@@ -15,7 +15,7 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.observe import Heard, listen
+from services.common.observe import Heard, alive, listen
 
 _REPEAT, _PATIENCE = 0.1, 2.0  # s
 
@@ -60,4 +60,5 @@ def _stop(session: Any, reason: str) -> list[str]:
             return sorted(seen)
     moving = [part for part, gate in gates.items() if gate != "estop"]
     result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot is heard"
-    raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {result}: use the robot's own emergency button")
+    kept = ". The launcher keeps the stop: robot_sim comes up stopped" if "launcher" in alive(session) else ""
+    raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {result}: use the robot's own emergency button{kept}")

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from mobee_cli.errors import UserError
 from services.common.config import ServiceConfig
+from services.common.emergency_stop import StopRecord
 from services.common.exit_codes import ENVIRONMENT
 from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
@@ -16,12 +18,19 @@ from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_route
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the address."""
     parser.add_argument("--listen", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="address to listen at (default: %(default)s)")
+    parser.add_argument(
+        "--stop-record", type=Path, metavar="FILE", help="record of emergency stops that robot_sim reads: created if absent"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Route until SIGTERM, Ctrl-C or `mobee stop`."""
     try:
+        if arguments.stop_record is not None:
+            StopRecord(arguments.stop_record).create()
         session = open_router(arguments.listen)
+    except OSError as error:
+        raise UserError(f"{arguments.stop_record} cannot be written: {error.strerror}", ENVIRONMENT) from None
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     if not any(host in arguments.listen for host in ("127.0.0.1", "localhost", "[::1]", "unixsock")):

@@ -35,6 +35,12 @@ def nothing_left_running() -> Iterator[None]:
         each.kill()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def states_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Records of emergency stops are kept in a folder of the tests, not in the user's."""
+    os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("states"))
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """The only source of chance in a test: the global state of numpy is never used."""

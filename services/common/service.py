@@ -77,11 +77,20 @@ class Service(Listener):
         lease = config.patience if config.mode == "lock" else LEASE
         if session is None:
             wait_until_released()
-        session = session or open_client(os.environ.get(LOCAL_ENDPOINT) or config.endpoint, namespace=config.namespace, lease=lease)
+        self._lease = lease
+        session = session or self._open_session()
         with ExitStack() as failed:
             failed.enter_context(session)  # closes it: an open callback would keep the interpreter from exiting
             self._begin(session, robot, inbox or Inbox(), prompt)
-            failed.pop_all()
+            self._sessions = failed.pop_all()
+
+    def _open_session(self) -> zenoh.Session:
+        config = self.config
+        return open_client(os.environ.get(LOCAL_ENDPOINT) or config.endpoint, namespace=config.namespace, lease=self._lease)
+
+    def second_session(self) -> zenoh.Session:
+        """Open another session with the router, for a stream that must not wait behind the others; it is closed with the service."""
+        return self._sessions.enter_context(self._open_session())
 
     def _begin(self, session: zenoh.Session, robot: Robot | None, inbox: Inbox, prompt: bool) -> None:
         locked = self.config.mode == "lock"
@@ -112,7 +121,7 @@ class Service(Listener):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        with self.bus.session:  # closes it even if a signal comes in between: an open callback would keep the interpreter from exiting
+        with self._sessions:  # closes them even if a signal comes in between: an open callback would keep the interpreter from exiting
             _ignore_signals()
             if error is not None and not isinstance(error, SystemExit) and not self._is_explained(error):
                 self.log.error("ended by %s", error, exc_info=error)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from bus_schema import keys
 from bus_schema.messages import EStop, PartStatus
@@ -14,6 +14,7 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 
 RETRY_PERIOD = 0.2  # s between attempts to arm a part
+STOP_PERIOD = 0.1  # s between two repetitions of an emergency stop that robot_sim has not latched
 CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was armed
 
 
@@ -29,7 +30,10 @@ class Drives:
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         self._next_try = dict.fromkeys(robot.parts, 0.0)
         self._confirm_by = dict.fromkeys(robot.parts, 0.0)
-        self._stopped = False  # an emergency stop outlives a robot_sim that dies
+        self._stop: EStop | None = None  # an emergency stop outlives a robot_sim that dies
+        self._stop_is_latched = False  # robot_sim has shown in this run that it obeys the stop
+        self._repeat_at = 0.0  # monotonic clock
+        self._stops = service.bus.publisher(EStop)
         self._attempts: dict[str, object] = {}  # part -> identity of the attempt in progress
         self._on_attempt_end: list[Callable[[], None]] = []
 
@@ -59,14 +63,29 @@ class Drives:
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()
+        self._stop_is_latched = False
 
     def note_stop(self, message: EStop) -> None:
-        """Note an emergency stop or its reset; between them nothing is armed."""
-        self._stopped = message.set
+        """Note an emergency stop: nothing is armed until the gates show its reset.  A message that says `set = false` has no effect."""
+        if message.set:
+            self._stop = message
+            self._stop_is_latched |= message.src == "robot_sim" and message.run == self._service.bus.run
+
+    def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
+        """Compare the noted stop with the gates; repeat it until robot_sim has latched it, and forget it when robot_sim was reset."""
+        if self._stop is None:
+            return
+        if any(state.gate == "estop" for state in parts.values()):
+            self._stop_is_latched = True
+        elif self._stop_is_latched:
+            self._stop, self._stop_is_latched = None, False
+        elif (now := time.monotonic()) >= self._repeat_at:
+            self._repeat_at = now + STOP_PERIOD
+            self._stops.put(set=True, source=self._stop.source, reason=self._stop.reason)
 
     def can_arm(self, state: PartStatus) -> bool:
         """Whether a part in this state may be taken and armed."""
-        return not self._stopped and state.gate in ("idle", "hold", "armed")
+        return self._stop is None and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:
         """Begin to take and arm a part that is idle or in hold; `is_armed` becomes true when the part is armed."""

@@ -121,6 +121,7 @@ class ControllerNode:
 
     def _supervise(self, tick: Tick, fresh: bool) -> None:
         """Arm the parts that can be armed; a part that is not under control has no action and rests where it is."""
+        self._drives.watch_stop(tick.parts)
         for part, action in self._actions.items():
             state = tick.parts[part]
             lacking = "no fresh forces" if not fresh else "no fresh state" if tick.t - state.t > MAX_STATE_AGE else ""

@@ -18,6 +18,7 @@ from bus_schema import keys
 from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
 from services.common.config import ConfigError, ServiceConfig
+from services.common.emergency_stop import StopRecord
 from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.rpc import CallFailed
@@ -39,6 +40,7 @@ from services.launcher.child import Program
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
+from services.launcher.stops import EmergencyStops
 from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
 
@@ -94,14 +96,18 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         return _refuse("interrupted before any service was started", INTERRUPTED)
     try:
         directory = make_run_directory(options.runs, scenario, endpoint)
+        record = StopRecord.of_endpoint(endpoint)
+        record.create()
         service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
         service.log = service.bus.log = set_up_log("launcher", directory / "logs" / "launcher.log")
     except OSError as error:
         return _refuse(
-            f"cannot write the run's folder {error.filename or options.runs}: {error.strerror}; choose another with --runs", ENVIRONMENT
+            f"cannot write {error.filename or options.runs}: {error.strerror}; choose another folder of runs with --runs, "
+            "or of the record of emergency stops with the variable XDG_STATE_HOME",
+            ENVIRONMENT,
         )
     with service:
-        return _Run(service, scenario, directory, options, local).execute(started)
+        return _Run(service, scenario, directory, options, local, record).execute(started)
 
 
 def _refuse(text: str, code: int) -> int:
@@ -112,11 +118,13 @@ def _refuse(text: str, code: int) -> int:
 class _Run:
     """The state of one run, in the launcher's main thread."""
 
-    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, local: str) -> None:
-        """`local`: the address at which the services connect to the router, if not its endpoint."""
+    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, local: str, record: StopRecord) -> None:
+        """`local`: the address at which the services connect to the router, if not its endpoint; `record`: of emergency stops."""
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
-        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._announce)
+        self._record = record
+        self._stops = EmergencyStops(service, record, self._announce)
+        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._stops, self._announce)
         self._children = self._supervisor.children.values()
         self._stop_requested, self._starting = False, True
 
@@ -127,6 +135,8 @@ class _Run:
             self._service.describe = self._describe
             self._service.ready()
             ready, duration = self._live(started)
+        with contextlib.suppress(OSError):  # one that is left does no harm
+            self._record.remove()
         return self._report(ready, duration)
 
     def _live(self, started: float) -> tuple[float | None, float]:
@@ -134,6 +144,7 @@ class _Run:
         ready = begun = None
         try:
             self._draw()
+            self._announce_stop()
             self._supervisor.begin()
             self._spin(_NO_LIMIT, self._supervisor.settled)
             if not self._over():
@@ -210,6 +221,14 @@ class _Run:
         if not self._over() and sim is not None and sim.stat is not None and sim.stat.numbers.get("tick") == 0.0:
             self._announce(f"robot_sim is still at tick 0: {sim.stat.text}")
 
+    def _announce_stop(self) -> None:
+        """Report the stop of an earlier run, or release it if an earlier launcher, which has ended, said it."""
+        stop = self._record.read()
+        if stop is not None and stop.source == "launcher":
+            self._record.release()
+        elif stop is not None:
+            self._announce(f"the robot is stopped, `mobee estop --reset` releases it: {stop}")
+
     def _draw(self) -> None:
         self._screen.draw(self._children, self._directory)
         self._service.inbox.at(time.monotonic() + _REDRAW, self._draw)
@@ -218,7 +237,8 @@ class _Run:
         ready = sum(child.phase == "ready" for child in self._children)
         fault = f", FAULT: {'; '.join(self._supervisor.faults)}" if self._supervisor.faults else ""
         numbers = {f"restarts_{child.who}": child.restarts for child in self._children}
-        return f"{self._scenario.name}: {ready} of {len(self._children)} ready{fault}, {self._directory}"[:2000], numbers
+        stop = f", {self._stops.waiting}, not confirmed by robot_sim" if self._stops.waiting else ""
+        return f"{self._scenario.name}: {ready} of {len(self._children)} ready{stop}{fault}, {self._directory}"[:2000], numbers
 
     def _report(self, ready: float | None, duration: float) -> int:
         summary = {

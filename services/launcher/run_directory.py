@@ -14,6 +14,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from services.common.config import ServiceConfig
+from services.common.emergency_stop import StopRecord
 from services.common.worlds import is_path
 from services.launcher.scenario import Scenario
 
@@ -52,6 +53,8 @@ def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, direc
     config = structs.replace(config, endpoint=endpoint, **files)
     if "run_dir" in config.__struct_fields__ and "run_dir" not in given:
         config = structs.replace(config, run_dir=str(directory))
+    if "stop_record" in config.__struct_fields__ and "stop_record" not in given:
+        config = structs.replace(config, stop_record=str(StopRecord.of_endpoint(endpoint).path))
     return config
 
 

@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable, Sequence
 
 from bus_schema import keys
-from bus_schema.messages import EStop
 from bus_schema.rpc import Pulse, Stat
 from services.common.exit_codes import BAD_INPUT
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.launcher.child import Child, Program
+from services.launcher.stops import EmergencyStops
 
 CHECK_PERIOD = 0.05  # s between two checks of the processes
 STAT_PERIOD = 0.5  # s between two stat calls to a service
@@ -31,14 +31,14 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 class Supervisor:
     """The children of the launcher; everything happens in the inbox of its service."""
 
-    def __init__(self, service: Service, programs: Sequence[Program], announce: Callable[[str], None]) -> None:
-        """`announce` is called with each line that a user should see."""
+    def __init__(self, service: Service, programs: Sequence[Program], stops: EmergencyStops, announce: Callable[[str], None]) -> None:
+        """`stops` stops the robot when a vital service is given up; `announce` is called with each line that a user should see."""
         self.children = {program.who: Child(program) for program in programs}
         self.faults: list[str] = []  # one line for each service that was given up
         self.stopped_robot = False  # a vital service was given up
         self.bad_settings = False  # a service was given up because it cannot use its settings
         self._service, self._announce, self._stopping = service, announce, False
-        self._estop = service.bus.publisher(EStop)
+        self._stops = stops
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
@@ -155,8 +155,6 @@ class Supervisor:
             says = f": {answer.text}" if answer.text else ""
             self._announce(f"{child.who} is ready after {time.monotonic() - child.since:.1f} s (pid {child.pid}){says}")
             child.enter("ready")
-            if child.who == "robot_sim" and self.stopped_robot:
-                self._stop_robot("a vital service was given up before")  # the new process does not know of the stop
 
     def _note_token(self, who: str, instance: str, up: bool) -> None:
         child = self.children.get(who)
@@ -205,5 +203,5 @@ class Supervisor:
 
     def _stop_robot(self, reason: str) -> None:
         self.stopped_robot = True
-        self._estop.put(set=True, source="launcher", reason=reason[:2000])
+        self._stops.stop(reason)
         self._announce("the whole robot is stopped; `mobee estop --reset` releases it")

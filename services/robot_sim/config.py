@@ -49,6 +49,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Lockstep: who must be there before tick 1; the launcher names every service that computes what the robot does."""
     ticks: Annotated[int, Meta(ge=0)] = 0
     """Lockstep: stop after so many ticks; 0: go on indefinitely."""
+    stop_record: str = ""
+    """File that holds the emergency stop, so that it outlives this process; one that is missing counts as a stop.  Empty: not kept."""
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 

@@ -11,7 +11,7 @@ from bus_schema.messages import Answer, Command, Commands, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
-from services.common.inbox import CROWDED_WITH_STOPS
+from services.common.emergency_stop import Stop, StopLine, StopRecord
 from services.common.service import CallRefused, Service
 from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, refused_as_call
 from services.robot_sim.kinematic import Backend
@@ -21,12 +21,13 @@ ESTOP_PERIOD = 0.1  # s between two repetitions of an emergency stop
 
 
 class Guard:
-    """One gate a part."""
+    """One gate a part, and the emergency stop of all."""
 
-    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float) -> None:
-        self._service, self._robot, self._backend, self._dt = service, robot, backend, dt
+    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None) -> None:
+        """Begin with the emergency stop that the record holds; `record`: None if stops are not kept beyond this process."""
+        self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
         self._where = {name: part.slice for name, part in robot.parts.items()}
-        self._estop_reason = ""
+        self._stop: Stop | None = None if record is None else record.read()
         self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
         self._on_answer: Callable[[str, int, Answer], None] = lambda who, re_k, answer: None
         if not service.locked:
@@ -34,7 +35,15 @@ class Guard:
         self._estop = service.bus.publisher(EStop, delivery="LATEST")
         # Epochs grow over restarts too: what a controller holds from before never fits again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
+        self._line = StopLine(service.second_session(), lambda: service.inbox.put(self._check_stop), self._is_own)
         self._declare()
+        if self._stop is not None:
+            self._stop_all(self._stop)
+
+    @property
+    def stop_reason(self) -> str:
+        """The emergency stop in force; empty if there is none."""
+        return "" if self._stop is None else str(self._stop)
 
     def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
         """Lockstep: call handler(service, tick, answer) for the answer in a message of commands."""
@@ -44,11 +53,12 @@ class Guard:
         """A new run: all gates are idle and without owner; a latched emergency stop stays."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
-        if self._estop_reason:
-            self._stop_all()
+        if self._stop is not None:
+            self._stop_gates(self._stop)
 
     def tick(self, k: int) -> None:
         """Give the commands that are in force in tick k to the motors."""
+        self._check_stop()  # before commands, and past an inbox that a flood has filled
         now = time.monotonic_ns()
         motors = self._backend.motors
         q, velocities = motors.q, motors.motor_velocities
@@ -96,8 +106,7 @@ class Guard:
         service.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
         for verb in ("arm", "release", "hold"):
             service.on_request(keys.drive("*", verb), WithEpoch, self._drive, part_of_key=True)
-        service.on_each(EStop, self._on_estop, any_run=True, crowd=CROWDED_WITH_STOPS)
-        service.on_request(keys.ESTOP_RESET, Empty, self._reset_estop)
+        service.on_request(keys.ESTOP_RESET, Empty, self._reset_stop)
         service.on_alive(self._on_alive)
 
     def _listen(self, part: str) -> None:
@@ -167,29 +176,48 @@ class Guard:
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is gone")
 
-    def _on_estop(self, message: EStop) -> None:
-        own = message.src == self._service.who and message.run == self._service.bus.run
-        if message.set and not own and not self._estop_reason:
-            self._estop_reason = f"emergency stop by {message.source}: {message.reason}"
-            self._stop_all()
-            self._repeat_estop()
+    def _is_own(self, message: EStop) -> bool:
+        return message.src == self._service.who and message.run == self._service.bus.run
 
-    def _stop_all(self) -> None:
+    def _check_stop(self) -> None:
+        message = self._line.take()
+        if message is None or self._stop is not None:
+            return
+        stop = Stop(message.source, message.reason, time.time())
+        self._stop_all(stop)
+        if self._record is not None:
+            try:
+                self._record.latch(stop)
+            except OSError as error:
+                self._service.bus.event("error", "estop_record", f"the stop holds, but {self._record.path} was not written: {error}")
+
+    def _stop_all(self, stop: Stop) -> None:
+        """Stop the gates, and publish the stop until it is reset."""
+        self._stop = stop
+        self._stop_gates(stop)
+        self._repeat_stop()
+
+    def _stop_gates(self, stop: Stop) -> None:
         for gate in self.gates.values():
-            gate.stop(self._estop_reason)
+            gate.stop(str(stop))
 
-    def _repeat_estop(self) -> None:
-        """Publish the stop again and again until it is reset, for services that join late."""
-        if self._estop_reason:
-            self._estop.put(set=True, source=self._service.who, reason=self._estop_reason[:2000])
-            self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_estop)
+    def _repeat_stop(self) -> None:
+        if self._stop is not None:
+            self._estop.put(set=True, source=self._stop.source, reason=self._stop.reason[:2000])
+            self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_stop)
 
-    def _reset_estop(self, request: Empty, key: str) -> Done:
-        if self._estop_reason:
-            self._estop_reason = ""
+    def _reset_stop(self, request: Empty, key: str) -> Done:
+        """Release the robot; if the release cannot be recorded, the stop stays."""
+        self._check_stop()
+        if self._stop is not None:
+            if self._record is not None:
+                try:
+                    self._record.release()
+                except OSError as error:
+                    raise CallRefused("estop_record", f"the stop stays: {self._record.path} was not written: {error}") from None
+            self._stop = None
             for gate in self.gates.values():
                 gate.reset_stop()
             self._service.bus.event("warning", "estop_reset", f"emergency stop reset by {request.who}")
-        # Published in any case: services may remember a stop of an earlier run.
-        self._estop.put(set=False, source=request.who, reason="reset")
+            self._estop.put(set=False, source=request.who, reason="reset")  # for people who watch; no service relies on it
         return Done(v=VERSION)

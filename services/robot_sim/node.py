@@ -6,6 +6,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal, NoReturn
 
 from bus_schema import VERSION, keys
@@ -13,6 +14,7 @@ from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty, PartMeta, Place
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
+from services.common.emergency_stop import StopRecord
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
 from services.robot_sim.choice import choose
@@ -39,7 +41,7 @@ class Node:
         self._period = self._dt / config.speed  # s of real time a tick
         self._bus.run, self._bus.dt = _new_run(), self._dt_ns
         self._paused = False
-        self._guard = Guard(service, robot, backend, self._dt)
+        self._guard = Guard(service, robot, backend, self._dt, StopRecord(Path(config.stop_record)) if config.stop_record else None)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
         self._clock = self._bus.publisher(Clock)
@@ -145,6 +147,8 @@ class Node:
     def _describe(self) -> tuple[str, Mapping[str, float]]:
         states = [gate.state for gate in self._guard.gates.values()]
         text = f"{self._backend.name} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
+        if self._guard.stop_reason:
+            text = f"{self._guard.stop_reason}; {text}"
         numbers = self._watch.counters.numbers(self._rate.missed, self._backend.pairs_watched)
         if self._lockstep is None:
             return text, numbers

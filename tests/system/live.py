@@ -63,9 +63,15 @@ class Launch:
 
 
 def launch(
-    folder: Path, scenario: str, *settings: str, headless: bool = True, duration: float | None = None, ticks: int | None = None
+    folder: Path,
+    scenario: str,
+    *settings: str,
+    headless: bool = True,
+    duration: float | None = None,
+    ticks: int | None = None,
+    endpoint: str | None = None,
 ) -> Launch:
-    endpoint, runs, errors = free_endpoint(), folder / "runs", folder / "launcher.err"
+    endpoint, runs, errors = endpoint or free_endpoint(), folder / "runs", folder / "launcher.err"
     argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", endpoint, "--runs", str(runs), "--json"]
     argv += ["--headless"] if headless else []
     argv += ["--duration", str(duration)] if duration else []

@@ -17,8 +17,6 @@ from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, Supervis
 class Silent:
     """Stands in for the bus: nothing is published, nobody is heard."""
 
-    bus = cast("Any", type("Bus", (), {"publisher": lambda *args: None})())
-
     def on_alive(self, handler: object) -> None: ...
 
 
@@ -41,7 +39,7 @@ def test_waiting_for_a_processor_or_an_inbox_that_advances_is_no_silence() -> No
 
 @pytest.mark.parametrize(("nice", "limit"), [(0, FROZEN_TIME), (10, FROZEN_TIME_NICE)])
 def test_what_yields_to_others_may_be_silent_for_longer(nice: int, limit: float) -> None:
-    supervisor = Supervisor(cast("Service", Silent()), [], lambda text: None)
+    supervisor = Supervisor(cast("Service", Silent()), [], cast("Any", None), lambda text: None)
     child = Child(Program("monitor", (), Path("monitor.log"), nice=nice), phase="ready", unanswered=5, answered_at=time.monotonic())
     assert not supervisor._is_frozen(child, child.answered_at + limit - 0.1)
     assert supervisor._is_frozen(child, child.answered_at + limit)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps an emergency stop that robot_sim has not confirmed: on disk, and repeated on the bus."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from bus_schema.messages import EStop
+from services.common.emergency_stop import Stop, StopRecord
+from services.common.inbox import CROWDED_WITH_STOPS
+from services.common.service import Service
+
+PERIOD = 0.1  # s between two repetitions
+
+
+class EmergencyStops:
+    """The launcher's part in an emergency stop: robot_sim may be dead, frozen or starting when one comes.
+
+    It writes the record that a new robot_sim reads at its start, and repeats the stop until robot_sim publishes it itself.  It never
+    releases a stop.
+    """
+
+    def __init__(self, service: Service, record: StopRecord, announce: Callable[[str], None]) -> None:
+        """`announce` is called with each line that a user should see."""
+        self._service, self._record, self._announce = service, record, announce
+        self._publisher = service.bus.publisher(EStop)
+        self._waiting: Stop | None = None  # for robot_sim's confirmation
+        self._repeats = False
+        service.on_each(EStop, self._note, any_run=True, crowd=CROWDED_WITH_STOPS)
+
+    @property
+    def waiting(self) -> str:
+        """The stop that robot_sim has not confirmed; empty if there is none."""
+        return "" if self._waiting is None else str(self._waiting)
+
+    def stop(self, reason: str) -> None:
+        """Stop the robot."""
+        self._keep(Stop("launcher", reason[:2000], time.time()))
+
+    def _note(self, message: EStop) -> None:
+        if not message.set:
+            return
+        if message.src == "robot_sim":
+            self._waiting = None
+        elif message.src != self._service.who and self._waiting is None and message.tw > self._record.released_at():
+            self._keep(Stop(message.source, message.reason, time.time()))
+
+    def _keep(self, stop: Stop) -> None:
+        self._waiting = stop
+        if self._record.read() is None:
+            try:
+                self._record.latch(stop)
+            except OSError as error:
+                self._announce(f"the emergency stop is repeated, but {self._record.path} was not written: {error.strerror}")
+        if not self._repeats:
+            self._repeat()
+
+    def _repeat(self) -> None:
+        self._repeats = self._waiting is not None
+        if self._waiting is not None:
+            self._publisher.put(set=True, source=self._waiting.source, reason=self._waiting.reason)
+            self._service.inbox.at(time.monotonic() + PERIOD, self._repeat)
