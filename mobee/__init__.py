@@ -154,7 +154,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the module of a public name when the name is first used: a process loads only what it needs."""
+    """Import the module of a public name at the first use of the name, so that a process loads only the modules that it uses."""
     if name == "__version__":
         from importlib import metadata
 

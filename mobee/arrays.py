@@ -17,9 +17,10 @@ MAX_THREADS = 1024
 
 
 def real_array(what: str, given: ArrayLike) -> Array:
-    """Return a copy as float64, C-contiguous; raises InvalidValue, with the name `what`, for anything but real numbers.
+    """Return a C-contiguous float64 copy of the given numbers; raises InvalidValue unless all are real numbers.
 
-    Text and complex numbers are refused too: NumPy would read the text and drop the imaginary parts.
+    `what`: name of the array in the error message. Text and complex numbers are refused too: NumPy would convert the text to numbers
+    and drop the imaginary parts.
     """
     try:
         value = np.array(given, order="C")

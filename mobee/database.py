@@ -33,7 +33,7 @@ REMEDIES = {
 
 
 def opened(path: Path, read_only: bool) -> sqlite3.Connection:
-    """The file, with the tables made if it is new; a file of another program or schema is refused and left as it is.
+    """Open the file, and create its tables if it is new; a file of another program or schema is refused and not changed.
 
     `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too.
     Every error is a MobeeError of one line.
@@ -56,7 +56,7 @@ def opened(path: Path, read_only: bool) -> sqlite3.Connection:
 
 @contextmanager
 def transaction(database: sqlite3.Connection) -> Iterator[None]:
-    """A transaction that excludes other writers."""
+    """Run the body of a `with` statement as one transaction, which excludes other writers."""
     database.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -78,7 +78,7 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def _address(path: Path) -> str:
-    """To read from: a file without a log beside it as it is, for SQLite would make a log, and an archive may not be written."""
+    """Return the URI to read from; without a log beside it the file is opened as immutable, since SQLite would create a log."""
     log = path.with_name(path.name + "-wal")
     mode = "mode=ro" if log.exists() and log.stat().st_size else "mode=ro&immutable=1"
     return f"{path.absolute().as_uri()}?{mode}"

@@ -16,7 +16,7 @@ class RobotFileError(MobeeError):
 
 
 class OlderVersion(UserWarning):
-    """A warning for a file of an older version: an element was read as in that version, not as in the present one."""
+    """Warns that an element of a file was read by the rules of an older version of the format."""
 
 
 class InvalidValue(MobeeError, ValueError):
@@ -41,7 +41,7 @@ class NotInstalled(MobeeError):
 
 
 class ActionInterrupted(MobeeError):
-    """An action that ended without an outcome (hold, fault, or a new run): it is not an observation."""
+    """Raised if an action ends without an outcome (hold, fault, or a new run of the robot); agents do not learn from it."""
 
 
 class BatchInterrupted(ActionInterrupted):

@@ -14,8 +14,8 @@ from mobee.robot.robot import Robot
 class Outcome:
     """How an action ended.
 
-    `q`: (n_part,) rad by the encoders.  `settled`: False means timeout, which is still an observation.
-    `duration`: s of plant time.  `touched`: names of world objects in contact (fields included) at the end.
+    `q`: (n_part,) rad, as the encoders measure it.  `settled`: False if the action timed out; agents learn from that outcome too.
+    `duration`: s, by the plant's clock.  `touched`: names of world objects in contact (fields included) at the end.
     """
 
     q: Array
@@ -31,11 +31,11 @@ class Plant(Protocol):
 
     @property
     def q(self) -> Array:
-        """Positions of all motors by the encoders now, shape (n,), in [rad], in the order of `robot.motors`."""
+        """The present encoder values of all motors, shape (n,), in [rad], in the order of `robot.motors`."""
         ...
 
     def measure(self, part: str) -> Array:
-        """Return the positions of the part's motors by the encoders now, shape (n_part,), in [rad]."""
+        """Return the present encoder values of the part's motors, shape (n_part,), in [rad]."""
         ...
 
     def act(self, part: str, target: Array) -> Outcome:

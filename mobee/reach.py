@@ -22,10 +22,10 @@ MAX_DISTANCE = 1e3  # m, of a target; larger squares could overflow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachTarget:
-    """A position to put a marker at: a sphere, which repels all links but the reaching hand.
+    """A sphere as a target for a marker; it repels all links except the reaching hand.
 
-    `position`: (3,) m, root frame, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker is put at its "centre" (thesis 8.2) or
-    on its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.
+    `position`: (3,) m, root frame, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker is to come to its "centre" (thesis 8.2) or
+    to its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.
     """
 
     position: Array
@@ -51,18 +51,18 @@ class ReachTarget:
             object.__setattr__(self, "normal", normal / length)
 
     def missing(self, marker: Array) -> float:
-        """Return the remaining error of a marker at (3,) m, in [m]: |x - x*| of thesis eq. 8.4."""
+        """Return the distance [m] that remains from a marker's position (3,) m to the centre or surface: |x - x*| of thesis eq. 8.4."""
         distance = float(np.linalg.norm(self.position - marker))
         return max(distance - self.radius, 0.0) if self.aim == "surface" else distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachOutcome:
-    """How a reach ended: at the end of its force, and after the attractor had drawn the part back.
+    """The outcome of a reach in two phases: a force draws the marker to the target, then the attractor draws the part back.
 
-    `marker`: (3,) m, position of the marker at the end of the force, by the model from the encoders `q` (n_part,) rad.
-    `missing`: m, remaining error.  `settled`: False means that the reach itself timed out.  `duration`: s of plant time, of
-    both phases.  `touched`: world objects in contact (fields included) at the end of the force.
+    `q`: (n_part,) rad, encoder values at the end of the force.  `marker`: (3,) m, root frame, position of the marker that the model
+    computes from `q`.  `missing`: m, remaining error.  `settled`: False if the first phase timed out.  `duration`: s of both phases,
+    by the plant's clock.  `touched`: world objects in contact (fields included) at the end of the force.
     `after`: outcome of the second phase.
     """
 
@@ -93,7 +93,7 @@ class ReachPlant(Plant, Protocol):
 
 
 def reward_of(missing: float, scale: float = 0.01) -> float:
-    """Return 1 / (1 + |x - x*|) (thesis eq. 8.4), with the distance [m] in units of `scale` [m]; the thesis leaves the unit open."""
+    """Return the reward 1 / (1 + missing / scale) of a reach (thesis eq. 8.4); `scale` [m]: the unit, which the thesis does not give."""
     return 1.0 / (1.0 + missing / scale)
 
 

@@ -16,14 +16,14 @@ from mobee.errors import MobeeError
 
 
 class AgentFile:
-    """What an agent keeps in the file of a run, which the processes of several agents may share.
+    """The data of one agent in the file of a run; the processes of several agents may share the file.
 
     Write-ahead log with full synchronisation: what was written survives a kill and a power cut.
 
     Args:
         path: the SQLite file; made if missing, its folder must exist.
         agent: the name under which this agent's share is kept.
-        read_only: to look at what is on record, also where nothing may be written; nothing is made or changed then.
+        read_only: open the file for reading only, also in a write-protected folder; nothing is created or changed.
 
     Raises:
         MobeeError: from every method, in one line with the file and what to do.
@@ -34,7 +34,7 @@ class AgentFile:
         self._db: sqlite3.Connection = opened(self.path, read_only)
 
     def bind(self, settings: dict[str, Any]) -> None:
-        """Record the agent's settings (plain JSON values); raises if others are recorded."""
+        """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
         given = {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
         with explained(self.path), transaction(self._db):
             known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
@@ -75,7 +75,7 @@ class AgentFile:
 
 
 def _differing(then: Any, now: Any) -> tuple[Any, Any]:
-    """What differs of two values: of two mappings that have the same keys only the entries that are not equal."""
+    """Return the parts of two values that differ: for two mappings with the same keys, only the entries that are not equal."""
     if not (isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys()):
         return then, now
     pairs = {key: _differing(then[key], now[key]) for key in sorted(then) if then[key] != now[key]}
@@ -87,9 +87,10 @@ STORE = "transitions.sqlite"  # of a run, in its folder
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One observed (s, a, s'), with what it was worth and how the action ended.
+    """One observed transition (s, a, s'), with its reward and the end of its action.
 
-    `n`: 1, 2, ... of this agent.  `reward`: nats.  `duration`: s of plant time.  `q`: rad, all motors of the part.
+    `n`: its number, 1, 2, ... for each agent.  `reward`: nats.  `settled`, `touched`: see `Outcome`.  `duration`: s, by the plant's
+    clock.  `q`: rad at the end, all motors of the part.
     """
 
     n: int
@@ -104,10 +105,10 @@ class Transition:
 
 
 class TransitionStore(AgentFile):
-    """The transitions of one agent in the file of a run; what `append` has returned from survives a kill and a power cut.
+    """The transitions of one agent in the file of a run; each survives a kill and a power cut as soon as `append` has returned.
 
     Args:
-        path, agent, read_only: of the AgentFile, which says too what is raised.
+        path, agent, read_only: see `AgentFile`, also for the errors.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
@@ -150,7 +151,7 @@ class TransitionStore(AgentFile):
         ]
 
     def times(self, agent: str | None = None) -> list[float]:
-        """When each transition of this agent, or of another one in the file, was committed: s since 1970, in order."""
+        """Return the time at which each transition of this agent, or of another one in the file, was committed: s since 1970, in order."""
         with explained(self.path):
             rows = self._db.execute("SELECT t FROM transitions WHERE agent = ? ORDER BY n", (self._named(agent),)).fetchall()
         return [t for (t,) in rows]

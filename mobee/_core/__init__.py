@@ -33,12 +33,12 @@ from mobee.errors import NotInstalled, UnknownName
 
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
-"""An array that is only read, as its `tobytes()`: for a few numbers this costs less than an address."""
+"""The type of an argument that is an array's `tobytes()`, for reading only: for a few numbers faster than passing an address."""
 
 _NOTHING: Any = ctypes.c_char * 0
 
 ABI = 2
-"""What `mobee_abi` of a library must say that these declarations belong to; see core/interface.hpp."""
+"""The version of the interface that is declared here; `mobee_abi` of a library must return the same. See core/interface.hpp."""
 
 FORCED = "MOBEE_CORE"
 """The environment variable that names the build to use."""
@@ -55,7 +55,7 @@ def library() -> ctypes.CDLL:
 
 
 def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
-    """Return the build to load: the `forced` one, else the widest in a folder that a processor with these flags runs."""
+    """Return the name of the build to load: `forced`, or if empty the highest one in the folder that runs with these processor flags."""
     flags = frozenset(flags)
     known, possible = machine_levels(), possible_levels(flags)
     if forced:
@@ -74,7 +74,7 @@ def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
 
 
 def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
-    """A build, after a look whether it is of the sources beside it and of these declarations; raises CoreUnavailable."""
+    """Load a build; raises CoreUnavailable unless it was made from the sources beside it and has the interface declared here."""
     file = library_file(level, folder)
     if not file.exists():
         raise CoreUnavailable(f"there is no {file}: {_remedy(level)}")
@@ -91,20 +91,20 @@ def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
 
 
 def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., Any]:
-    """A function of the core, by its name without the prefix; ctypes releases the GIL while it runs."""
+    """Return a function of the core by its name without the prefix `mobee_`; ctypes releases the GIL while it runs."""
     found = library()[f"mobee_{name}"]
     found.argtypes, found.restype = arguments, result
     return found
 
 
 def address(array: NDArray[Any]) -> int:
-    """Where the numbers of a C-contiguous array stand; the caller keeps the array alive."""
+    """Return the address of the first number of a C-contiguous array; the caller keeps the array alive."""
     flags = array.flags
-    if flags.carray:  # may be written to: then this is the same, in a quarter of the time
+    if flags.carray:  # writable: this gives the same address as `array.ctypes.data`, in a quarter of the time
         return ctypes.addressof(_NOTHING.from_buffer(array))
     whole = array.base
     if isinstance(whole, np.ndarray) and whole.nbytes == array.nbytes and whole.flags.carray and flags.c_contiguous:
-        return ctypes.addressof(_NOTHING.from_buffer(whole))  # of which the array is a view that may not be written to
+        return ctypes.addressof(_NOTHING.from_buffer(whole))  # the array is a read-only view of the whole of it
     if not (flags.c_contiguous and flags.aligned):
         raise ValueError("the core needs arrays that are contiguous, row by row, and aligned")
     return array.ctypes.data

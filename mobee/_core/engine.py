@@ -173,14 +173,17 @@ class Room:
         self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
-        """Return the rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and their projection to the motors (B, n)."""
+        """Return the rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and their projection to the motors (B, n).
+
+        `hands`: the links that are reaching; targets do not repel them. `cut`: a contact acts only on the motors of its own part.
+        """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
         count = _evaluate(self._at, ctypes.addressof(request))
         return *_rows(_room_rows, self._at, count), torque
 
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        """Set the scene, the reaching hands and `cut` for the next calls of `evaluate_one`; the caller keeps the scene alive."""
+        """Set the arguments of the next calls of `evaluate_one`, see `evaluate`; the caller keeps the scene alive."""
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
     def make_space(self, most: int) -> None:
@@ -193,6 +196,7 @@ class Following:
     """A neighbour list of a robot in a scene, which is reused from pose to pose; for one thread at a time.
 
     `at` is the address of the list in the core, which a plant of the core uses. It is valid after `enter`, while this object exists.
+    `skin`: distance [m] that volumes may move before the list is made again. `cut`: see `Room.evaluate`.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -213,7 +217,7 @@ class Following:
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return the state of the list (0 nothing, 1 a pose, 2 a list, 3 a pose to renew), its number of pairs and of poses served."""
+        """Return what is stored (0 nothing, 1 pose, 2 list, 3 pose with an outdated list), the pairs in the list, the poses served."""
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()
@@ -228,7 +232,7 @@ def sines_cosines(angles: Array) -> tuple[Array, Array]:
 
 
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
-    """Return bounds of the motion of each shape between joint angles (J,), relative to each link, (S, L) m."""
+    """Return bounds (S, L) m of how far each shape moves relative to each link, from the joint angles `then` (J,) to `now` (J,)."""
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
     return out
@@ -247,12 +251,12 @@ class Grid(NamedTuple):
     large: int
     cells: tuple[int, ...]  # along x, y and z
     starts: Ints  # (cells + 1,)
-    objects: Ints  # (objects, 2): which of the world's objects each is, and whether it is a target
+    objects: Ints  # (objects, 2): index of each object in the world, and whether it is a target
     centers: Array  # (objects, 3) m
 
 
 def grid_of(scene: Handle) -> Grid:
-    """The grid of a scene."""
+    """Return the grid of a scene."""
     counts = np.empty(5, dtype=np.int64)
     _scene_counts(scene.at, address(counts))
     objects, large, *cells = counts.tolist()
@@ -262,7 +266,10 @@ def grid_of(scene: Handle) -> Grid:
 
 
 def span(offset: float, along: float, per_metre: float, cells: int) -> tuple[int, int]:
-    """The first cell of a row of a grid, and the one past the last, that an object reaches."""
+    """Return the first cell that an object overlaps in a row of `cells` grid cells, and the cell after the last one.
+
+    `offset`: of the object's centre from the start of the row [m]; `along`: half its size [m]; `per_metre`: cells in 1 m.
+    """
     out = np.empty(2, dtype=np.int64)
     _span(offset, along, per_metre, cells, address(out))
     first, end = out.tolist()

@@ -19,7 +19,7 @@ BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of swee
 
 
 class Table(ctypes.Structure):
-    """`TransitionTable` of core/transitions.hpp.  Who makes one keeps the arrays alive."""
+    """`TransitionTable` of core/transitions.hpp; the caller keeps the arrays alive."""
 
     _fields_ = (
         *((name, ADDRESS) for name in ("probability", "outcome", "used")),
@@ -30,7 +30,7 @@ class Table(ctypes.Structure):
 class TransitionTable:
     """A `Table` that keeps its arrays alive: probabilities and outcomes (S, A, B), C-contiguous.
 
-    `used` (S, A): how many bins of each state-action may have a probability, the first ones; None: all may.
+    `used` (S, A): number of bins in use of each state-action; the bins after them have probability 0. None: all are in use.
     """
 
     def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
@@ -44,15 +44,16 @@ class TransitionTable:
 solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
     "value_iteration", ADDRESS, ADDRESS, ADDRESS, ADDRESS, REAL, REAL, INTEGER, INTEGER, result=INTEGER
 )
-"""Sweep until no value changes by the tolerance; returns the number of sweeps over all actions, or what is wrong.
+"""Sweep until no value changes by the tolerance; returns the number of sweeps over all actions, or one of the error codes above.
 
-Of the addresses of a table, a reward (S, A), values (S,), which change in place, and action values (S, A), which are filled; the
-discount and the tolerance; whether this is in units of the largest reward, and whether it is modified policy iteration.
+Arguments: the addresses of a `Table`, of the rewards (S, A), of the values (S,), which change in place, and of the action values (S, A),
+which are filled; the discount; the tolerance; whether the tolerance is in units of the largest reward; whether to run modified policy
+iteration.
 """
 
 
 class DebiasedCounts(ctypes.Structure):
-    """`DebiasedCounts` of core/observations.cpp; keeps the arrays alive that it points to."""
+    """`DebiasedCounts` of core/observations.cpp; it keeps the arrays to which it points alive."""
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
 
@@ -63,7 +64,7 @@ class DebiasedCounts(ctypes.Structure):
 
 
 class OutcomeCounts(ctypes.Structure):
-    """`OutcomeCounts` of core/observations.cpp; keeps the arrays alive that it points to, which observations write into.
+    """`OutcomeCounts` of core/observations.cpp; it keeps the arrays to which it points alive. Observations write into these arrays.
 
     States, actions and outcomes are not checked here.
     """
@@ -94,24 +95,25 @@ gain: Observation = function("gain", ADDRESS, INTEGER, INTEGER, INTEGER, result=
 observe: Observation = function("observe", ADDRESS, INTEGER, INTEGER, INTEGER, result=REAL)
 """Observe an outcome and return its reward; below 0 if it was not counted because the table needs one more bin."""
 believe: Callable[[int, int, int, int], None] = function("believe", ADDRESS, ADDRESS, INTEGER, INTEGER)
-"""Let beliefs follow counts, both by their addresses, of a state and an action."""
+"""Compute debiased probabilities anew from counts; arguments: addresses of `OutcomeCounts` and `DebiasedCounts`, state, action."""
 _expected_gains = function("expected_gains", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 _deplete = function("deplete", ADDRESS, ADDRESS, ADDRESS, INTEGER, INTEGER, ADDRESS)
 
 
 def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: Ints, gains: Array) -> None:
-    """Replace the `gains` (S, A) of all that was tried by the information gain to expect next, in nats.
+    """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try, in nats.
 
-    `counts` (S, A, B), above 0 where the probability is, and their `totals` (S, A).
+    `counts` (S, A, B): above 0 where the probability is above 0. `totals` (S, A): sums of `counts` over the bins. `tries` (S, A).
     """
     following = _NextCounts(address(counts), address(totals))
     _expected_gains(table.at, ctypes.addressof(following), address(tries), address(gains))
 
 
 def deplete(table: TransitionTable, counts: Array, totals: Array, action_values: Array, state: int, steps: int, gains: Array) -> None:
-    """Follow the best actions from a state through their most likely outcomes, and let the `gains` (S, A) met fall as they would.
+    """Simulate `steps` best actions from a state, each with its most likely outcome, and reduce the `gains` (S, A) of these actions.
 
-    `action_values` (S, A), -inf where there is no action; the others as of `expected_gains`.
+    Each gain is reduced as an observation of that outcome would reduce it. `action_values` (S, A): -inf where there is no action. For
+    the other arguments see `expected_gains`.
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))
@@ -134,11 +136,11 @@ _gaussian_sums = function("gaussian_sums", ADDRESS, INTEGER, INTEGER, ADDRESS, I
 def weighted_sums(
     targets: Array, keys: Ints, sums: Array, sizes: tuple[int, int], weighing: tuple[float, float], target: Array, out: Array
 ) -> None:
-    """Add to `out` (2, actions) what each action brought on targets near this one (3,) m, and how much that counts.
+    """Add to `out` (2, actions) the weighted sum of each action's values on targets near `target` (3,) m, and the sum of the weights.
 
-    `targets` (..., 3) m, `keys` (..., 2): action and number of the target of each entry, `sums` (..., 2): sum and number of its values;
-    `sizes`: how many targets and entries there are.  `weighing`: a scale and a distance [m]: the weight of a target at a distance d is
-    1 / (1 + d / scale), none beyond that distance.
+    `targets` (..., 3) m; `keys` (..., 2): action and index of the target of each entry; `sums` (..., 2): sum and number of its values;
+    `sizes`: number of targets and of entries.  `weighing`: a scale and a largest distance [m]: the weight of a target at a distance d is
+    1 / (1 + d / scale), and 0 beyond the largest distance.
     """
     history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
     totals = address(out)
@@ -146,8 +148,8 @@ def weighted_sums(
 
 
 def gaussian_sums(asked: Array, events: Array, sums: Array) -> None:
-    """Add to `sums` (2, n), at each point asked about (n, d), the weights times values of events, and the weights.
+    """Add to `sums` (2, n), for each of the points `asked` (n, d), the weighted sum of the events' values, and the sum of the weights.
 
-    Events are rows of a point and a value, (..., d + 1).  The weight at a distance r is exp(-r^2 / 2).
+    `events` (..., d + 1): rows of a point and a value.  The weight of an event at a distance r is exp(-r^2 / 2).
     """
     _gaussian_sums(address(asked), *asked.shape, address(events), len(events), address(sums))

@@ -30,10 +30,10 @@ _descend = function("descend", ADDRESS, result=INTEGER)
 def descend(
     robot: Handle, aims: Ints, goals: Array, free: Ints, limits: tuple[Array, Array], steps: int, q: Array, threads: int
 ) -> tuple[int, Array]:
-    """Move the free motors (d,) of every start q (B, n), in place, towards the aims; return the number of poses and residuals (B, K).
+    """Move the free motors (d,) of every start q (B, n), in place, towards the aims; return the poses evaluated and residuals (B, K).
 
     `aims` (K, 4): `Aim` of core/aims.hpp. `goals`: `Goal`s of all aims, in one row for all starts, or one row for each. `limits`: the
-    lowest and the highest positions (d,) rad. `steps`: the most for one start.
+    lowest and the highest positions (d,) rad. `steps`: maximum number for one start.
     """
     residuals = np.empty((len(q), len(aims)))
     low, high = limits

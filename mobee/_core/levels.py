@@ -27,7 +27,7 @@ NEEDS = {
 
 
 def machine_levels() -> tuple[str, ...]:
-    """The builds for machines of this kind, the narrowest first."""
+    """Return the names of the builds for this kind of machine, the lowest level first."""
     if sys.platform == "linux" and platform.machine() == "x86_64":
         return tuple(NEEDS)
     return (GENERIC,)
@@ -42,7 +42,7 @@ def missing(level: str, flags: Iterable[str]) -> list[str]:
 
 
 def possible_levels(flags: Iterable[str]) -> list[str]:
-    """The builds that a processor with these flags runs, the narrowest first."""
+    """Return the names of the builds that a processor with these flags runs, the lowest level first."""
     flags = frozenset(flags)
     return [level for level in machine_levels() if not missing(level, flags)]
 
@@ -61,17 +61,17 @@ def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
 
 
 def library_file(level: str, folder: Path = FOLDER) -> Path:
-    """The file of a build."""
+    """Return the path of a build's file."""
     return folder / f"core-{level}.{'dylib' if sys.platform == 'darwin' else 'so'}"
 
 
 def source_files() -> list[Path]:
-    """All that a build depends on, in the order of its names."""
+    """Return all files from which a build is made, sorted by name."""
     return sorted([*SOURCES.rglob("*.hpp"), *SOURCES.rglob("*.cpp"), SOURCES / "build.py"])
 
 
 def fingerprint() -> str:
-    """The hash of the sources and of how they are built; a library holds that of the sources it was built from."""
+    """Return a hash of the sources and of the build script; each library contains the hash of the sources from which it was built."""
     digest = hashlib.sha256()
     for source in source_files():
         digest.update(source.relative_to(SOURCES).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")

@@ -44,7 +44,7 @@ _cut = function("cut", ADDRESS, INTEGER, ADDRESS, ADDRESS, INTEGER, result=INTEG
 
 
 class Volumes:
-    """Volumes placed in the root frame, which the core reads where they are; hulls keep their corners alive here."""
+    """An array of volumes placed in the root frame, which the core reads in place; it keeps the corners of hulls alive."""
 
     def __init__(self, count: int) -> None:
         self.table = np.zeros(count, dtype=VOLUME)
@@ -88,7 +88,7 @@ class Volumes:
 
 
 def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
-    """The depths (p,) and touches (p,) TOUCH, NaN where they do not touch, of each of the first with the same of the second."""
+    """Return depths (p,) m and touches (p,) `TOUCH` of p pairs of volumes, first[i] with second[i]; NaN where a pair does not touch."""
     depth, touch = np.empty(len(first)), np.zeros(len(first), dtype=TOUCH)
     touch["normal"] = touch["point"] = np.nan
     _overlap(*_pairs(first, second), address(depth), address(touch))
@@ -96,7 +96,7 @@ def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
 
 
 def distances(first: Volumes, second: Volumes) -> Reals:
-    """Return the distance of each of the first from the same of the second, (p,) m."""
+    """Return the distances (p,) m of p pairs of volumes, first[i] from second[i]."""
     apart = np.empty(len(first))
     _distance(*_pairs(first, second), address(apart))
     return apart

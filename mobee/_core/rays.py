@@ -47,7 +47,7 @@ class Rays:
     """The rays of a picture: through column i and row j, at x = left + i step and y = top + j step of the plane 1 m ahead of `origin`.
 
     `axes` (3, 3): rows are right, down and ahead, in the root frame.  In a parallel picture all rays run along ahead, and x and y are
-    metres.  What is entered nearer than `nearest` m is not seen.
+    metres.  A surface nearer than `nearest` m is not drawn.
     """
 
     axes: Array
@@ -66,9 +66,9 @@ _convex_size = function("convex_size", result=INTEGER)
 
 
 def cast(volumes: NDArray[np.void], rays: Rays) -> tuple[Floats, NDArray[np.int32], Floats]:
-    """Return what rays meet first among volumes (N,) CONVEX.
+    """Return the first volume that each ray hits, among volumes (N,) `CONVEX`.
 
-    Depths (H, W) m along the axis ahead, infinite where there is nothing; the numbers of the volumes (H, W), -1 where there is nothing;
+    Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of the volumes (H, W), -1 where there is nothing;
     and outward normals (H, W, 3), root frame.
     """
     if volumes.dtype != CONVEX or CONVEX.itemsize != _convex_size():

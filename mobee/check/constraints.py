@@ -134,10 +134,10 @@ MARGIN = 1e-6  # rad
 
 
 def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
-    """Return indices of a smallest set of clauses that no pose was found to satisfy together; () if all can be.
+    """Return indices of a smallest set of clauses that no pose was found to satisfy together; () if a pose satisfies all.
 
-    `limits` (n, 2) rad, `poses` (k, n) rad within them to start from. A pose that is found proves that clauses agree. That none is
-    found proves nothing, but then the set is small enough for a person to judge.
+    `limits` (n, 2) rad; `poses` (k, n) rad within the limits: where the search starts. The search may fail although such a pose exists,
+    but the returned set is small enough for a person to judge.
     """
     for group in _connected(clauses):
         if _satisfiable([clauses[k] for k in group], limits, poses):

@@ -85,8 +85,8 @@ def check_file(
 ) -> Checked:
     """Check a shipped robot or world, or a file of one; return its content and all findings, errors first.
 
-    `world`: a world in which the robot is also checked, at home; the other options: for a URDF, as of `load_robot`.
-    Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read, or not with these options.
+    `world`: a world in which the robot is also checked, at home. The other options are for a URDF, see `load_robot`.
+    Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read, or if an option does not apply to it.
     """
     _require_known(name_or_path)
     path = world_file(name_or_path)

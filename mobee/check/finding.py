@@ -49,7 +49,7 @@ def position(robot: Robot, motor: Motor, value: float) -> str:
 
 
 def _in_metres(robot: Robot, motor: Motor) -> bool:
-    """Return whether a motor counts in m: it slides, with a joint of scale 1."""
+    """Return whether the unit of a motor is m: it drives a sliding joint with scale 1."""
     return slides(robot, motor) and any(scale == 1.0 for _, scale, _ in motor.joints)
 
 

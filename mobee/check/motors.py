@@ -162,7 +162,7 @@ ROUNDING = 1e-4  # of the motor's range: tolerance for the digits of a file
 
 
 def home_zones(subject: Subject) -> Iterator[Finding]:
-    """Find motors whose home lies in a limit zone of the default gains: those that are pushed away, and those whose zone ends there."""
+    """Find motors whose home lies inside a limit zone of the default gains, so that they are pushed away, or at the end of a zone."""
     units = motor_units(subject.robot)
     better = {
         motor.name: outside_zones(motor.home, motor.limits, float(unit))
@@ -184,7 +184,7 @@ def home_zones(subject: Subject) -> Iterator[Finding]:
 
 
 def _drift(subject: Subject, motors: Sequence[Motor], better: dict[str, float]) -> str:
-    """Describe how far from home the motor that is pushed farthest comes to rest: where the spring is as strong as the limit."""
+    """Describe how far from home the motor comes to rest that is pushed farthest: there the spring balances the limit force."""
     gains = Gains.default()
     slope = gains.max_limit / gains.limit_width
     share = slope / (slope + gains.stiffness)

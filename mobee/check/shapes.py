@@ -213,7 +213,7 @@ def excess(corners: Array, vertices: Array) -> float:
 
 
 def _distance(point: Array, vertices: Array) -> float:
-    """Return the distance of a point (3,) from the hull, as that from the nearest mean of the vertices with non-negative shares."""
+    """Return the distance [m] of a point (3,) from the hull: from the nearest weighted mean of the vertices, with weights of at least 0."""
     from scipy.optimize import nnls
 
     around = vertices - point

@@ -99,7 +99,7 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """Fields, solids of other parts that they reach into at home without touching a field of the solid's link, and depths [m]."""
+        """(field, solid, depth [m]): fields that overlap a solid of another part at home, but touch no field of that solid's link."""
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
         near = [

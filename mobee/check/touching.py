@@ -240,7 +240,7 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Find fields that reach, at home, into solids of another part whose own fields do not touch them: the deepest for each two parts."""
+    """Find fields that overlap, at home, a solid of another part but no field of its link; report the deepest for each pair of parts."""
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
         parts = field.part, solid.part
@@ -269,7 +269,7 @@ def _left_out(subject: Subject, one: int, other: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """The result of `leave_out_touching`: what was written where, and what still touches at home."""
+    """The result of `leave_out_touching`: the file, the pairs that were written, and the contacts that remain at home."""
 
     path: Path
     merged: bool  # whether the file existed before, or the text of another SRDF was copied

@@ -70,7 +70,7 @@ def radians(subject: Subject) -> Iterator[Finding]:
 
 
 def _things(subject: Subject) -> Iterator[tuple[str, str, Array]]:
-    """Yield everything that has a position: its kind, its name, and points (k, 3) m that enclose it in the zero pose."""
+    """Yield the kind, the name, and enclosing points (k, 3) m in the zero pose, of every element that has a position."""
     for joint in subject.robot.joints:
         yield "joint", joint.name, joint.point[None]
     for marker in subject.robot.markers.values():

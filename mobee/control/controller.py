@@ -32,7 +32,7 @@ class Controller:
     """Integrates thesis eq. 5.7 over all motors of a robot and returns a command in every tick.
 
     The velocity in the law is the controller's own state; only q comes from the encoders. Velocity commands are the original modality;
-    position commands integrate the controller's own reference; torque commands also carry the robot's weight where its file names
+    position commands integrate the controller's own reference; torque commands also compensate gravity if the robot's file has
     masses. Commands keep the motors' limits of velocity (times `speed_scale`, 0 to 1) and acceleration, so that the safety gate
     refuses none.
 
@@ -59,11 +59,11 @@ class Controller:
         """Start at rest, with the attractor at the robot's home; raises InvalidValue and UnknownName.
 
         Args:
-            model: evaluates contacts where `step` is given neither forces nor a pose.
+            model: evaluates contacts when `step` is given neither forces nor a pose.
             gains: of the law; None: the default ones.
             modality: of the commands.
             propagate: how far down the body a contact acts, "tree" or "part".
-            speed_scale: share of the motors' speed that is used, above 0 to 1.
+            speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
             contact_forces: False leaves f_coll at zero.
             alive: (n,) the motors on which forces act; the others are never moved. None: all.
             terms: user-defined forces, added to those of the law; `max_dt` does not include them.
@@ -119,7 +119,7 @@ class Controller:
 
     @property
     def state(self) -> Table:
-        """The state of the law, a row for each motor (see `mobee._core.law.STATE`); always the same array, which a plant advances."""
+        """The state of the law, a row for each motor (see `mobee._core.law.STATE`); always the same array, which plants change in place."""
         return self._state
 
     @property
@@ -195,7 +195,7 @@ class Controller:
         self._reaches.end(part)
 
     def is_approaching(self, part: str | None) -> bool:
-        """Return whether the part's reach still brings its marker nearer: then it is not over, although the part has settled."""
+        """Return whether the part's reach still moves its marker nearer to the target; it is over only when this is False."""
         return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
@@ -215,7 +215,7 @@ class Controller:
         self._state["velocity"][where] = self._state["acceleration"][where] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
-        """Reset one part to rest at its measured q (n_part,) rad, as `reset` does for all; for a part that something else keeps still.
+        """Reset one part to rest at its measured q (n_part,) rad, as `reset` does for all; for a part whose motors do not follow commands.
 
         Unlike after `hold`, the commanded velocity starts from 0 and the position reference from q.
         """

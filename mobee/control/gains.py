@@ -180,7 +180,7 @@ class Gains:
         return sets[name]()
 
     def with_motors(self, pattern: str, **gains: float) -> Gains:
-        """Return gains in which the motors that match a pattern have their own, as `gains.with_motors("*_elbow", stiffness=50.0)`.
+        """Return gains with other values for the motors that match a pattern, for example `gains.with_motors("*_elbow", stiffness=50.0)`.
 
         The last setting has priority. Values are in the unit of the motor: for one that slides, limit_width in m and each `max_` in
         m/s^2; its other gains still follow its range. Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
@@ -189,7 +189,7 @@ class Gains:
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """Return a gain of each motor, as for motors that turn, (n,); raises UnknownName for a pattern of `motors` without a match."""
+        """Return the gain `name` of each motor, (n,), all in units of rad; raises UnknownName for a pattern of `motors` without a match."""
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
                 raise UnknownName("motor pattern", pattern, motors)
@@ -197,7 +197,7 @@ class Gains:
         return _first_match(self._changed(name), motors, common)
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return a gain of each motor of a robot, in the unit of the motor, (n,); raises UnknownName as `of_motors`."""
+        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or m for a motor that slides; raises UnknownName."""
         values = self.of_motors(name, robot.motors)
         if name not in _ANGLES:
             return values

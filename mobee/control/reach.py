@@ -44,7 +44,7 @@ def reach_path(
 
     `position` (3,) m and `normal` (3,) in the root frame, `start` (n,) rad, `tolerance` m, and rad for the normal. The thesis leaves
     alpha open: here it is one over the largest eigenvalue of J J^T plus a bound on the curvature of the path, so that no step
-    overshoots. Every step ends within the motors' limits. It ends "stuck" where a step moves the marker no more: the target is out of
+    overshoots. Every step ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of
     reach, limits are in the way, or the pose is singular. Raises InvalidValue and UnknownName.
     """
     model.robot.marker(marker)
@@ -109,7 +109,7 @@ def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> Ma
 def bend_bound(jacobian: Array, error: Array) -> float:
     """Return a bound on the stiffness [m^2] that the curvature of the marker's path adds to a pull by the error.
 
-    For joints i before j the path's second derivative is the axis of i times the motion of j.
+    For a joint i nearer to the base than a joint j, the path's second derivative is the cross product of i's axis and j's column.
     """
     levers, axes = np.linalg.norm(jacobian[:3]), np.linalg.norm(jacobian[3:])
     return float(np.linalg.norm(error[:3]) * levers * axes + ARM * np.linalg.norm(error[3:]) * axes * axes)
@@ -124,7 +124,7 @@ ReachStatus = Literal["reaching", "reached", "stuck"]
 class Reacher:
     """Draws a marker of a controlled robot to a target, from its creation on; call `update` once per tick, and `stop` at the end.
 
-    All motors that move the marker take part, the torso's too. Obstacles are left to the controller's forces. With the published gains
+    All motors that move the marker take part, the torso's too. The controller's forces keep away from obstacles. With the published gains
     the springs of the attractor pull back meanwhile, so that the marker ends short of the target. A controller has one reach of the
     whole body at a time: a new `Reacher` replaces it. For two hands at once use `Controller.reach_toward` with their parts.
     """
@@ -150,7 +150,7 @@ class Reacher:
         """Return the status at the measured q (n,) rad, dt [s] after the last update.
 
         "stuck" while the marker comes no nearer: the target is out of reach, or limits, clauses, contacts or springs are in the way.
-        The pull goes on all the same.
+        The force on the marker continues.
         """
         found = marker_error(self._controller.model, self._marker, self.target, real_array("q", q))
         self.angle = found.angle

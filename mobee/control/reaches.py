@@ -67,7 +67,7 @@ class Reaches:
         return self._under_way[part]
 
     def begin(self, part: str | None, marker: str) -> None:
-        """Begin a reach of a part with a marker, None: of the whole body, instead of the one before; it has no target yet.
+        """Begin a reach of a part (None: of the whole body) with a marker, in place of its previous reach; it has no target yet.
 
         Raises InvalidValue if none of the motors that may be moved moves the marker, and UnknownName.
         """
@@ -93,7 +93,7 @@ class Reaches:
         self._core.add_reaches(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
 
     def is_approaching(self, part: str | None) -> bool:
-        """Return whether a part's reach still brings its marker nearer, although the part has settled; False under the published law."""
+        """Return whether a part's reach still moves its marker nearer to the target; always False under the published law."""
         return bool(self._core.reach_is_approaching(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:

@@ -51,7 +51,7 @@ class ReflexSettings:
 
     @classmethod
     def naive(cls) -> ReflexSettings:
-        """Return the settings of thesis 4.1: the first violation counts, and control returns where a waypoint is reached.
+        """Return the settings of thesis 4.1: a violation counts at once, and control returns to the client at the first waypoint.
 
         Thesis 4.4 reports the result: oscillation between the two controllers, and recoveries that fail.
         """

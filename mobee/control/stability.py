@@ -79,7 +79,7 @@ def _stiffness(robot: Robot, gains: Gains) -> Array:
     slope = gains.max_constraint / gains.constraint_width
     if gains.law == "published_2014":
         steep = slope * rows.norms
-    else:  # all rows of a clause push by the lack of one: at most the root of their number stronger than each alone
+    else:  # one row sets the size of the push along all rows of a clause: at most sqrt(number of rows) times as stiff as that row
         steep = slope * np.sqrt(np.bincount(rows.clause))[rows.clause] if len(rows.b) else rows.norms
     found: Array = np.diag(single) + (rows.normals.T * steep) @ rows.normals
     return found

@@ -27,7 +27,7 @@ class CuriousAgent(CuriousLearner):
         space: states and actions of one part.
         plant: the robot it acts on; must have the motors of the space's robot.
         explorer: see `CuriousSettings`; None: as in `settings`.
-        seed: likewise.
+        seed: of the draws among equally good actions; None: as in `settings`.
         settings: None: the defaults.
         store: where transitions are written, and read from at the start; None: they are not kept.
         **changes: fields of `CuriousSettings` by keyword, in place of those in `settings`.
@@ -63,12 +63,12 @@ class CuriousAgent(CuriousLearner):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The record of its settings and its space, and of the plant's settings if it has any, as plain JSON values."""
+        """The settings of the agent, of its space and, if it has any, of its plant, as plain JSON values."""
         return super().settings | ({"plant": self.plant.settings} if isinstance(self.plant, Described) else {})
 
     @property
     def state(self) -> int:
-        """The state of the part: measured at first and after an interruption, else from the last outcome."""
+        """The present state of the part: measured at first and after an interruption, else taken from the last outcome."""
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
@@ -80,7 +80,7 @@ class CuriousAgent(CuriousLearner):
         return action
 
     def target(self, action: int) -> Array:
-        """Return the pose of the part at which the action just decided aims, shape (n_part,), in [rad]."""
+        """Return the goal pose of the action just decided, shape (n_part,), in [rad]."""
         state, _ = self._decided()
         return self.space.target(self.space.goal(state, action))
 
@@ -151,7 +151,7 @@ class ConcurrentPlant(Plant, Protocol):
         """Start an action of a part; target (n_part,) rad."""
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until at least one action has ended; returns part and outcome of all that have."""
+        """Run until at least one action has ended; returns the part and the outcome of each action that has ended."""
 
 
 def run(agents: Sequence[CuriousAgent], transitions: int) -> None:

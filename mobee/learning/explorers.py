@@ -39,9 +39,10 @@ class Explorable(Protocol):
 Explorer = Callable[[Explorable, int, np.random.Generator], Array]
 
 
-"""Returns the score of each action of a state, shape (actions,).  The highest is chosen, ties at random.
+"""A function of agent, state and random generator that returns the score of each action of the state, shape (actions,).
 
-The scores must follow from the agent's settings and its transitions alone; each transition has its own generator.
+The action with the highest score is chosen, at random among equals.  The generator is seeded anew for each transition; everything else in
+the scores must depend only on the agent's settings and transitions.
 """
 
 
@@ -56,7 +57,7 @@ class SampledBeliefs:
 def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     """Score actions by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
 
-    Its random numbers stay the same for an episode of 1 / (1 - discount) transitions, while the counts grow.
+    The random numbers stay the same for an episode of 1 / (1 - discount) transitions; only the counts change the drawn model meanwhile.
     """
     model = agent.model
     episode = agent.transitions // round(1.0 / (1.0 - agent.discount))
@@ -66,7 +67,7 @@ def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) 
 
 
 def dirichlet(counts: Array, normal: Array) -> Array:
-    """Draw probabilities (..., B) from the Dirichlet distribution of counts (..., B) by standard normal numbers of the same shape.
+    """Return a draw (..., B) from the Dirichlet distribution of `counts` (..., B); `normal`: standard normal numbers of the same shape.
 
     Gamma variates by Wilson and Hilferty's cube root (1931), accurate enough for counts from 1: with the same numbers, small changes of
     the counts change the probabilities little.  Where the count is 0 the probability is 0.
@@ -92,7 +93,7 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted gain expected next; among equals, by the gain that remains after the plan.
+    """Score actions by the discounted sum of expected information gains; among equals, by the gain that remains after the plan.
 
     The reward of 'curious' is the last gain of a state-action.  Here it is the expected gain of the next observation under debiased
     counts, which falls sooner once an action is certain; an action that was never tried has its imagined gain.

@@ -61,7 +61,7 @@ class _Made(NamedTuple):
 
 
 class Plans:
-    """Caches plans by key within one transition; the values of the last transition's plan are where the next plan starts.
+    """Caches the plans made since the last transition, by key; a new plan starts from the values of the previous plan of its key.
 
     `relative`: the tolerance is in units of the largest reward, and plans start from earlier values; else Algorithm 7 as published,
     with an absolute tolerance and all values zero at the start.
@@ -73,7 +73,7 @@ class Plans:
         self._made: dict[str, _Made] = {}
 
     def made(self, key: str, reward: Array | None, beliefs: OutcomeModel | None) -> tuple[Array, Array] | None:
-        """Return the plan of a key if it was made since the last transition, for the same reward and beliefs objects."""
+        """Return the plan of a key if it was made since the last transition, for the same reward and beliefs objects; else None."""
         made = self._made.get(key)
         return made.plan if made is not None and made.reward is reward and made.beliefs is beliefs else None
 
@@ -93,13 +93,13 @@ class Plans:
         return plan
 
     def keep(self) -> None:
-        """After a transition was observed: start the next plans from the values of these."""
+        """End a transition: the next plans start from the values of the present ones."""
         for key, made in self._made.items():
             self._starts[key] = made.plan[0]
         self._made.clear()
 
     def undo(self) -> None:
-        """After an interrupted action: discard the plans made for it."""
+        """Discard the plans that were made for an action that was interrupted."""
         self._made.clear()
 
 
@@ -133,7 +133,7 @@ class CuriousLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The record of its settings and its space, as plain JSON values; a store continues only under an equal record."""
+        """The settings of the learner and its space, as plain JSON values; a store can be continued only with equal settings."""
         record = vars(self._settings) | {
             "space": self.space.settings,
             "explorer": self.explorer,
@@ -145,9 +145,9 @@ class CuriousLearner:
         return record
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """Compute state and action values, shapes (S,) and (S, A), once a transition (Algorithm 7).
+        """Return state values (S,) and action values (S, A) of a plan (Algorithm 7); computed only once between two transitions.
 
-        `reward`: (S, A); None: the agent's reward, intrinsic, or of its goal.  `beliefs`: None: the agent's.
+        `reward`: (S, A); None: the information gain, or the reward of the agent's goal.  `beliefs`: outcome model; None: the agent's.
         `key`: each plan starts from the values of the previous plan of the same key.
         """
         plan = self._plans.made(key, reward, beliefs)
@@ -176,7 +176,7 @@ class CuriousLearner:
         self._go_on(transition)
 
     def _go_on(self, transition: Transition) -> None:
-        """Note a transition that the model has observed already."""
+        """Update the learner for a transition that the model has already observed."""
         self.transitions, self.last = transition.n, transition
         self._plans.keep()
 

@@ -53,7 +53,7 @@ def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
 
 
 def _candidates(points: Array, count: int) -> Iterator[Ints]:
-    """Yield for each point, ascending, at least the points that are no farther than its nearest `count` others."""
+    """Yield candidates for each point, ascending: all points that are as near as its `count` nearest others, and perhaps more."""
     if len(points) <= MAX_COMPARED:
         for _ in points:
             yield np.arange(len(points))

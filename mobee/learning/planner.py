@@ -36,7 +36,7 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return, for each state with actions into it and out of it, the product of the probabilities of its best ones.
+    """Return, for each state that a path can pass, the highest probability of an action into it times that of an action out of it.
 
     `actions`: probability of success of each action, by start and goal state.
     """

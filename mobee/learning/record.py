@@ -41,7 +41,7 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     if space.settings["digest"] != settings["digest"]:
         raise MobeeError(
             f"the space made from the record ({kind} of {space.part}) has other samples or neighbours than the one recorded "
-            f"(digest {space.settings['digest']}, on record {settings['digest']}): use the robot file and the version of then."
+            f"(digest {space.settings['digest']}, on record {settings['digest']}): use the robot file and version that recorded it."
         )
     return space
 

@@ -20,7 +20,7 @@ SHORTCUT_SPAN = 4  # transitions on a path between the two states of a shortcut,
 
 
 def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTEMPTS) -> tuple[Space, Ints]:
-    """Return the space without the states that were aimed at `seen` times and never reached, and each state's new number, -1 if removed.
+    """Return the space without the states that were the goal `seen` times and never reached, and each state's new number, -1 if removed.
 
     Raises InvalidValue if fewer than two states would remain.
     """

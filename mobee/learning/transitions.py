@@ -38,9 +38,9 @@ def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
 
 
 def information_gain(count: float, total: float) -> float:
-    """Return KL(P || T) in nats when one bin of T grows by one, from its count before, above 0, and the total of all bins.
+    """Return KL(P || T) in nats for an observation that adds 1 to one bin: `count`, above 0, of that bin and `total` of all, both before.
 
-    The closed form of eq. 6.5 for this case: the other bins only share the factor total / (total + 1).
+    It is the closed form of eq. 6.5 for this case: all other probabilities change by the factor total / (total + 1).
     """
     gain = (count + 1.0) / (total + 1.0) * log1p(1.0 / count) - log1p(1.0 / total)
     return max(0.0, gain)  # rounding
@@ -97,7 +97,7 @@ class DebiasedCounts(Tabled):
         return read_only(self._probabilities)
 
     def update(self, counts: OutcomeCounts, state: int, action: int) -> None:
-        """Take over the real counts of a state-action."""
+        """Update the probabilities of a state-action from its real counts."""
         believed = self._believed or self._believe()
         _core().believe(counts.at, believed.at, state, action)
 
@@ -129,7 +129,7 @@ INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # imagined counts of stayi
 NEW_BIN = 1.0  # imagined count of the bins beyond these two: Algorithm 6
 
 Divergence = Callable[[Array, Array], float]
-"""Reward of an observation in nats, from the distributions after it and before it over the same bins, each (bins,), above 0, of sum 1."""
+"""A function of the distributions after and before an observation, each (bins,), above 0, of sum 1, that returns its reward in nats."""
 
 DIVERGENCES: dict[str, Divergence] = {"kail": kl_divergence, "kl": kl_divergence}
 """KL divergence over the bins of the state-action, and over all states; the core computes both in closed form."""

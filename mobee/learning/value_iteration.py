@@ -23,7 +23,7 @@ BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to exc
 
 
 class OutcomeModel(Protocol):
-    """The outcomes of actions and their probabilities: all that a plan needs of a transition model."""
+    """The interface of a transition model for planning: the outcomes of actions and their probabilities."""
 
     @property
     def outcomes(self) -> Ints:

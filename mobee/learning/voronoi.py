@@ -19,7 +19,7 @@ from mobee.robot.robot import Robot
 class Voronoi(Space):
     """States are the Voronoi cells of samples drawn at random, or given; actions go to the nearest samples.
 
-    Distances are in fractions of the joint ranges.  Thousands of states take seconds, and memory in proportion.
+    Distances are in fractions of the joint ranges.  Making thousands of states takes seconds; memory grows in proportion to their number.
 
     Args:
         robot: the robot; samples are drawn within its motor limits.

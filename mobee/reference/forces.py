@@ -91,8 +91,8 @@ def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Arra
 def limit_force(s: State) -> Array:
     """Return f_lim (eqs. 5.12, 5.13): zero inside [q_min + zone, q_max - zone], beyond it a ramp inward of slope f_max / delta.
 
-    The ramp goes on beyond the limit. The thesis prints the ranges of the cases wrong; here continuity and direction decide. A zone is
-    delta = `limit_width` wide, and narrower where a range is narrow or where the zone ends at home (`limit_zones`).
+    The ramp continues beyond the limit. The thesis misprints the ranges of the cases; here the force is continuous and points inward.
+    A zone is delta = `limit_width` wide, and narrower where a range is narrow or where the zone ends at home (`limit_zones`).
     """
     width = s.gains.of_robot("limit_width", s.robot)
     (low, high), (below, above) = s.robot.limits.T, limit_zones(s.robot, width).T
@@ -117,27 +117,27 @@ def clauses_default(s: State) -> Array:
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
         lengths = np.linalg.norm(clause.a * unit, axis=1)
-        lack = 1.0 - (clause.a @ s.q + clause.b) / (lengths * s.gains.constraint_width)  # 0 where the zone begins, 1 at the boundary
-        size = s.gains.max_constraint * max(float(lack.min()), 0.0)
+        deficit = 1.0 - (clause.a @ s.q + clause.b) / (lengths * s.gains.constraint_width)  # 0 where the zone begins, 1 at the boundary
+        size = s.gains.max_constraint * max(float(deficit.min()), 0.0)
         total += size * (clause.a * unit / lengths[:, None]).sum(axis=0)
     return total * unit
 
 
 def clauses_2014(s: State) -> Array:
-    """Return f_cst of the 2014 program: the zone is in units of a.q + b, every row pushes by its own lack, the sum is clipped to +-1."""
+    """Return f_cst of the 2014 program: the zone is in units of a.q + b, every row pushes by its own deficit, the sum is clipped to +-1."""
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
-        lack = 1.0 - (clause.a @ s.q + clause.b) / s.gains.constraint_width
-        if lack.min() >= 0.0:
-            total += lack @ (clause.a * unit / np.linalg.norm(clause.a * unit, axis=1)[:, None])
+        deficit = 1.0 - (clause.a @ s.q + clause.b) / s.gains.constraint_width
+        if deficit.min() >= 0.0:
+            total += deficit @ (clause.a * unit / np.linalg.norm(clause.a * unit, axis=1)[:, None])
     return s.gains.max_constraint * np.clip(total, -1.0, 1.0) * unit
 
 
 def contact_force(s: State) -> Array:
     """Return the collision force f_coll = L(sum over contact points g of J(g)^T f_g) (eq. 5.11).
 
-    f_g = +-depth * normal, in m: each contact of fields pushes the two volumes that overlap apart, as strongly as it is deep.
-    The sum is `projected`, L is `bounded_contact`.
+    f_g = +-depth * normal, in m: each contact of fields pushes the two volumes apart, in proportion to its depth.
+    `projected` computes the sum, `bounded_contact` is L.
     """
     return bounded_contact(s.robot, s.gains, projected(s.robot, s.q, s.contacts, s.propagate))
 

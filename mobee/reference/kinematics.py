@@ -35,7 +35,7 @@ def rotation(axis: Array, angle: float) -> Array:
 
 
 def joint_motion(joint: Joint, position: float) -> Array:
-    """Return the motion of one joint, (4, 4): a turn about its line, x -> R (x - p) + p, or a shift along it."""
+    """Return the transform of one joint, (4, 4): a rotation about its axis, x -> R (x - p) + p, or a translation along it."""
     motion = np.eye(4)
     if joint.kind == "revolute":
         motion[:3, :3] = rotation(joint.axis, position)
@@ -46,7 +46,7 @@ def joint_motion(joint: Joint, position: float) -> Array:
 
 
 def link_frames(robot: Robot, q: Array) -> Array:
-    """Return the motion of every link from its place at zero pose, (L, 4, 4): the product of the motions of the joints that carry it."""
+    """Return the transform of every link from its zero pose, (L, 4, 4): the product of the transforms of the joints that carry it."""
     frames = [np.eye(4)]  # link 0 is the base
     for joint, position in zip(robot.joints, joint_positions(robot, q), strict=True):
         frames.append(frames[joint.parent] @ joint_motion(joint, position))  # joint j moves link j + 1
@@ -54,7 +54,7 @@ def link_frames(robot: Robot, q: Array) -> Array:
 
 
 def moved(frame: Array, point: Array) -> Array:
-    """Return where a frame (4, 4) takes a point (3,)."""
+    """Return a point (3,) transformed by a frame (4, 4)."""
     found: Array = frame[:3, :3] @ point + frame[:3, 3]
     return found
 

@@ -5,9 +5,9 @@ Published law: J^T f, with f proportional to the distance of the marker, bounded
 
 Default law: J^T control oscillates with late commands, because its stiffness depends on the pose: it is J J^T plus, for a far target,
 the curvature of the marker's path. And it stops in singular poses (thesis 5.1). Therefore the marker is drawn at the same RATE in
-every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. From a singular pose the
-negative curvature of the error leads out. Limits, clauses and contacts count as walls, along which the motion continues. The
-attractor's spring is removed while the reach lasts.
+every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. The force leads out of a
+singular pose along a direction in which the error has negative curvature. Limits, clauses and contacts count as walls, along which the
+motion continues. The attractor's spring is removed while the reach lasts.
 """
 
 from __future__ import annotations
@@ -54,15 +54,15 @@ class Reach:
     target: ReachTarget
     motors: Ints  # (m,) the motors that are pulled
     seen: Array = field(default_factory=lambda: np.zeros(6))  # m, the error, averaged over the encoders' noise
-    left: float = 0.0  # m, its size
+    remaining: float = 0.0  # m, its size
     best: float = math.inf  # m, the smallest size so far
     since: float = 0.0  # s, the time since then
-    way: Array | None = None  # (m,) rad, the last direction out of a singular pose
+    escape: Array | None = None  # (m,) rad, the last direction out of a singular pose
 
     @property
-    def nears(self) -> bool:
-        """Whether the marker has not arrived and still comes nearer: then the reach is not over, however slow the motors are."""
-        return self.left > 0.75 * TOLERANCE and self.since < WAIT
+    def is_approaching(self) -> bool:
+        """Whether the marker has not arrived and still comes nearer; if so, the reach is not over, however slow the motors are."""
+        return self.remaining > 0.75 * TOLERANCE and self.since < WAIT
 
 
 def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
@@ -118,7 +118,7 @@ def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
 
 
 def bounded(r: Reach, force: Array) -> Array:
-    """Bound a force on the pulled motors (m,), as a client's force."""
+    """Saturate a force on the pulled motors (m,), with the bounds of a client's force."""
     maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
     unit = motor_units(r.robot)[r.motors]
     if r.gains.client_squash == "each":
@@ -138,17 +138,17 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
     slope = jacobian.T @ error  # the decrease of half the squared error along each motor
-    ease = eased(r, s.q, slope)
-    give = (jacobian * ease) @ jacobian.T
-    size = max(float(np.linalg.norm(give)), NOTHING)
-    weak = float(slope @ (ease * slope)) < WEAK**2 * size * float(error @ error)
+    mobility = motor_mobility(r, s.q, slope)
+    marker_mobility = (jacobian * mobility) @ jacobian.T
+    size = max(float(np.linalg.norm(marker_mobility)), NOTHING)
+    weak = float(slope @ (mobility * slope)) < WEAK**2 * size * float(error @ error)
     nudge = np.zeros(len(r.motors))
-    if weak and r.left > TOLERANCE and r.since <= PATIENCE:
-        nudge = NUDGE * way_out(r, s.q, ease, size)
-    fading = r.left / (r.left + 0.5 * TOLERANCE)  # so that at the target the encoders' noise has no effect
+    if weak and r.remaining > TOLERANCE and r.since <= PATIENCE:
+        nudge = NUDGE * escape_direction(r, s.q, mobility, size)
+    fading = r.remaining / (r.remaining + 0.5 * TOLERANCE)  # so that at the target the encoders' noise has no effect
     pull = RATE * fading / (1.0 + float(np.linalg.norm(error)) / LONGEST) * error / size
-    force = jacobian.T @ pushed(r, v, give / size, pull, ease)
-    return along_walls(r, v, s, against, force, ease, size, pull), nudge
+    force = jacobian.T @ pushed(r, v, marker_mobility / size, pull, mobility)
+    return along_walls(r, v, s, against, force, mobility, size, pull), nudge
 
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
@@ -162,36 +162,36 @@ def note_error(r: Reach, error: Array, dt: float) -> None:
     """Average the error over SMOOTH, and count the time since it last decreased."""
     seen = r.seen[: len(error)]
     seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
-    r.left = float(np.linalg.norm(seen))
-    if r.left < r.best - BETTER:
-        r.best, r.since = r.left, 0.0
+    r.remaining = float(np.linalg.norm(seen))
+    if r.remaining < r.best - BETTER:
+        r.best, r.since = r.remaining, 0.0
     r.since += dt
 
 
-def eased(r: Reach, q: Array, slope: Array) -> Array:
+def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
     """Return E: the velocity of each motor for a torque of 1, slope of the squash over damping; 0 for a motor at its limit."""
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
     kept = ((q < low)[r.motors] & (slope < 0.0)) | ((q > high)[r.motors] & (slope > 0.0))
-    ease = r.gains.of_robot("client_slope", r.robot) / r.gains.of_robot("damping", r.robot)
-    return np.where(kept, 0.0, ease[r.motors])
+    mobility = r.gains.of_robot("client_slope", r.robot) / r.gains.of_robot("damping", r.robot)
+    return np.where(kept, 0.0, mobility[r.motors])
 
 
-def pushed(r: Reach, v: View, give: Array, pull: Array, ease: Array) -> Array:
+def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Array) -> Array:
     """Return the force on the marker (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable pull."""
     soft = SOFT
     while True:
-        push: Array = np.asarray(np.linalg.solve(give + soft * np.eye(len(give)), pull), dtype=np.float64)
-        bend = bend_of_path(v, push, ease)
-        if largest_eigenvalue(bend, ease, turns=12)[0] < RATE:
+        push: Array = np.asarray(np.linalg.solve(marker_mobility + soft * np.eye(len(marker_mobility)), pull), dtype=np.float64)
+        bend = bend_of_path(v, push, mobility)
+        if largest_eigenvalue(bend, mobility, turns=12)[0] < RATE:
             return push
         soft *= 2.0
 
 
-def bend_of_path(v: View, push: Array, ease: Array) -> Array:
-    """Return the stiffness by the curvature of the marker's path: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
+def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
+    """Return the stiffness that comes from the curvature of the marker's path: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
 
-    For joints a and b, a nearer to the base, the second derivative of the path is the axis of a times (x) the motion of b.
+    For joints a and b, with a nearer to the base, the second derivative of the path is the cross product of a's axis and b's motion.
     """
     count = len(v.columns)
     along = np.zeros((count, count))
@@ -202,60 +202,60 @@ def bend_of_path(v: View, push: Array, ease: Array) -> Array:
             if len(push) == 6 and a != b:
                 along[a, b] += 0.5 * ARM * push[3:] @ np.cross(axis, turning)
             along[b, a] = along[a, b]
-    found: Array = -(v.drives.T @ along @ v.drives) * np.sqrt(np.outer(ease, ease))
+    found: Array = -(v.drives.T @ along @ v.drives) * np.sqrt(np.outer(mobility, mobility))
     return found
 
 
-def largest_eigenvalue(matrix: Array, ease: Array, turns: int) -> tuple[float, Array]:
-    """Return the largest eigenvalue of a symmetric matrix and its vector, by power iteration; entries without ease are 0."""
+def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[float, Array]:
+    """Return the largest eigenvalue of a symmetric matrix and its vector, by power iteration; entries of motors with mobility 0 are 0."""
     shift = float(np.linalg.norm(matrix))  # makes it the largest in absolute value too
     vector: Array = 1.0 + 0.1 * np.arange(len(matrix), dtype=np.float64)
     length = 0.0
     for _ in range(turns):
         vector = shift * vector + matrix @ vector
         length = float(np.linalg.norm(vector))
-        vector = np.where(ease > 0.0, vector / length, 0.0) if length > 0.0 else np.zeros(len(matrix))
+        vector = np.where(mobility > 0.0, vector / length, 0.0) if length > 0.0 else np.zeros(len(matrix))
     return length - shift, vector
 
 
-def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, ease: Array, size: float, pull: Array) -> Array:
-    """Return the force (m,) where limits or other forces hold the motors back: along these as along a wall, not into it."""
+def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobility: Array, size: float, pull: Array) -> Array:
+    """Return the force (m,) without its component against limits and other forces: the motors slide along these as along a wall."""
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]
     limited = np.where(limit * force < 0.0, np.abs(limit) / unit, 0.0)  # of each motor alone
     held = (against[r.motors] - limit) / unit  # by all other forces: a direction of the motors
-    into = float(held @ (ease * force)) < 0.0
+    into = float(held @ (mobility * force)) < 0.0
     if not (limited.any() or into):
         return force
-    share, ease = WALL / (WALL + limited), ease * WALL / (WALL + limited)
-    give, across = (jacobian * ease) @ jacobian.T, float(held @ (ease * held))
+    share, mobility = WALL / (WALL + limited), mobility * WALL / (WALL + limited)
+    marker_mobility, across = (jacobian * mobility) @ jacobian.T, float(held @ (mobility * held))
     wall = 0.0
     if into and across > 0.0:
         strength = float(np.linalg.norm(held))
         wall = strength / (strength + WALL) / across
-        away = jacobian @ (ease * held)
-        give = give - wall * np.outer(away, away)  # in that direction the motors do not move; less so for a weak force
-    force = jacobian.T @ pushed(r, v, give / size, pull, ease)
-    return (force - wall * float(held @ (ease * force)) * held) * share
+        away = jacobian @ (mobility * held)
+        marker_mobility = marker_mobility - wall * np.outer(away, away)  # no motion in that direction, or little
+    force = jacobian.T @ pushed(r, v, marker_mobility / size, pull, mobility)
+    return (force - wall * float(held @ (mobility * force)) * held) * share
 
 
-def way_out(r: Reach, q: Array, ease: Array, size: float) -> Array:
-    """Return the direction (m,) out of a singular pose, along which the error falls on both sides; zeros where there is none."""
+def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
+    """Return a direction (m,) out of a singular pose: the error decreases along it and against it; zeros if there is none."""
     curve = np.empty((len(r.motors), len(r.motors)))
     for k, motor in enumerate(r.motors):
         probe = np.zeros(len(q))
         probe[motor] = PROBE * motor_units(r.robot)[motor]
         curve[k] = (slope_at(r, q + probe) - slope_at(r, q - probe)) / (2.0 * PROBE)
-    curve = 0.5 * (curve + curve.T) * np.sqrt(np.outer(ease, ease))
-    falls, way = largest_eigenvalue(curve, ease, turns=60)
-    before = np.zeros(len(way)) if r.way is None else r.way
+    curve = 0.5 * (curve + curve.T) * np.sqrt(np.outer(mobility, mobility))
+    falls, direction = largest_eigenvalue(curve, mobility, turns=60)
+    before = np.zeros(len(direction)) if r.escape is None else r.escape
     if falls < CURVED * size:
-        r.way = None
-        return np.zeros(len(way))
+        r.escape = None
+        return np.zeros(len(direction))
     middle = (r.robot.limits.mean(axis=1) - q)[r.motors]
-    side = float(way @ before) or float(way @ middle)  # as before; at first towards the middle of the motors' ranges
-    r.way = -way if side < 0.0 else way
-    return r.way
+    side = float(direction @ before) or float(direction @ middle)  # as before; at first towards the middle of the motors' ranges
+    r.escape = -direction if side < 0.0 else direction
+    return r.escape
 
 
 def slope_at(r: Reach, q: Array) -> Array:

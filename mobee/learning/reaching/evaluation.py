@@ -101,7 +101,7 @@ class _Trial:
             _, self.state = move(agent.plant, agent.space, self.state, action)
 
     def reach_for(self, target: ReachTarget, found: Evaluation, at: tuple[int, int]) -> None:
-        """Make one problem-try with the expected rewards of now."""
+        """Make one problem-try with the present expected rewards."""
         agent, position = self.agent, target.position
         agent.plant.present(target)
         expected = np.maximum(agent.predictor.mean(position), 0.0)

@@ -21,7 +21,7 @@ def grown(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
 
 
 def forget(found: dict[bytes, Any], most: int) -> None:
-    """Delete the oldest entries until there are fewer than `most`; a caller that inserts a used entry again keeps the newest."""
+    """Delete the entries inserted first until there are fewer than `most`; callers insert an entry again at each use, to keep it longer."""
     while len(found) >= most:
         del found[next(iter(found))]
 

@@ -100,7 +100,7 @@ class ReachLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The record of its settings, without its space and its beliefs, as plain JSON values."""
+        """The learner's settings, without its space and its beliefs, as plain JSON values."""
         return {
             "predictor": self.predictor.settings,
             "strategy": self._strategy_name,
@@ -118,7 +118,7 @@ class ReachLearner:
         return self._problem
 
     def begin(self, target: ReachTarget) -> None:
-        """Start a problem-try, or continue the one under way if it has this position; one at another position ends as it is."""
+        """Start a problem-try, or continue the one under way if its target has this position; one at another position ends now."""
         problem = self.problems.index(target)
         if problem != self._problem:
             self._end()
@@ -185,7 +185,7 @@ class ReachLearner:
         return self.problems.targets[self._problem].position
 
     def _observe_transition(self, step: Step) -> None:
-        """Learn from a transition; with a model, a failure that touches nothing is the model's, not the target's (thesis 9.4.1)."""
+        """Learn from a transition; with a model, a failure without contact is attributed to the model, not to the target (thesis 9.4.1)."""
         if self.model is None or step.touched or not step.failed:
             self.failures.add(step.s, step.a, self._target, step.reward)
         if self.model is not None and not step.touched:
@@ -203,7 +203,7 @@ class ReachLearner:
 
 
 def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches) -> RewardPredictor:
-    """Make the predictor of a name, a class or a function; one that is made already is returned as it is."""
+    """Return the predictor made by a class, a function or the class of this name; a predictor object is returned unchanged."""
     if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
         make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]  # `named` returns any callable
         return make(reaches)

@@ -66,8 +66,8 @@ class ReachPlan:
     """A path to a state and the reach from there.
 
     `path`: states from start to the pre-reach state.  `actions`: the action in each but the last.  `probabilities`: that each action ends
-    in the next state of the path; `success`: that all of them do.  `state`: from which to reach.  `expected`: the reward of that reach
-    (thesis eq. 8.4).  `avoided`: transitions, as (state, goal), that the path would contain but for failures remembered.
+    in the next state of the path; `success`: that all of them do.  `state`: where the reach starts.  `expected`: reward of that reach
+    (thesis eq. 8.4).  `avoided`: transitions, as (state, goal), that the path would contain if no failure were remembered.
     """
 
     path: tuple[int, ...]
@@ -82,7 +82,7 @@ class ReachPlan:
 def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
     """Plan the path and the reach of highest value from a state.
 
-    `expected`: (S,) rewards of the reaches, at least 0, or the plan would put off a reach of negative reward.  `failures`: (S, A) rewards
+    `expected`: (S,) rewards of the reaches, at least 0: the best plan never makes a reach of negative reward.  `failures`: (S, A) rewards
     of the transitions.  Raises InvalidValue if the space has no such state.
     """
     space.actions(start)

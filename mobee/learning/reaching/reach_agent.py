@@ -27,20 +27,21 @@ from mobee.settings import accepts
 class ReachAgent(ReachLearner):
     """Learns to put a marker of one part on targets: each position is a problem, and every problem-try informs about all others.
 
-    All it knows follows from its settings and its steps, so an agent that is restarted with its store continues as if it had never
+    Its decisions depend only on its settings and its steps, so an agent that is restarted with its store continues as if it had never
     stopped.  There may be any number of targets: new ones are new problems.
 
     Args:
         space: states and transitions of the part.
         plant: the robot it acts on; must have the motors of the space's robot.
-        beliefs: outcomes of transitions, e.g. `load_learned(file).model.debiased()`.  None: those of `model`, else mostly the goal.
+        beliefs: outcomes of transitions, e.g. `load_learned(file).model.debiased()`.  None: those of `model`; without a model, actions
+            mostly reach their goals.
         marker: the marker to be put on the targets.
         settings: None: the defaults.
         store: where steps are written, and read from at the start; None: they are not kept.
         model: transition model to be learned at the same time (thesis 9.4.1): transitions without contact with the world are
             observed with it.
-        hands: (S, 3) m, root frame, position of the marker in each state; None: by the robot's kinematics, other parts at home.
-        jacobians: (S, 3, d) m/rad, of that position by the joints of the space, if `hands` are given and these are known.
+        hands: (S, 3) m, root frame, position of the marker in each state; None: computed by kinematics, with the other parts at home.
+        jacobians: (S, 3, d) m/rad, derivatives of `hands` by the joints of the space; None: computed, or unknown if `hands` are given.
         **changes: fields of `ReachSettings` by keyword, in place of those in `settings`.
 
     Raises:
@@ -79,7 +80,7 @@ class ReachAgent(ReachLearner):
 
     @property
     def state(self) -> int:
-        """The state of the part: measured at first and after a step that did not end, else from the last outcome."""
+        """The present state of the part: measured at first and after a step that did not end, else taken from the last outcome."""
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state

@@ -71,7 +71,7 @@ def _part_of(file: str | Path, part: str | None) -> str:
     if part is None and len(parts) == 1:
         return parts[0]
     if not parts:
-        raise MobeeError(f"{file}: nobody has learned to reach in this run yet; a ReachAgent with a ReachStore on it does.")
+        raise MobeeError(f"{file}: no agent has learned to reach in this run yet; run a ReachAgent with a ReachStore on this file.")
     if part is None:
         raise MobeeError(f"{file} holds the reaches of several parts: name one of {', '.join(parts)}.")
     if part not in parts:

@@ -37,8 +37,8 @@ class ReachStore(AgentFile):
     """The problems and steps of the reach learner of one part, in the file of a run.
 
     Args:
-        path, read_only: of the AgentFile.
-        part: of the learner; its reaches are stored under its name and "reaching", beside the part's transitions.
+        path, read_only: see `AgentFile`.
+        part: of the learner; its reaches are stored under the name "<part> reaching", beside the part's transitions.
     """
 
     def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
@@ -47,7 +47,7 @@ class ReachStore(AgentFile):
             if read_only:
                 if not _has_reaches(self._db):
                     raise MobeeError(
-                        f"{self.path}: nobody has learned to reach in this run yet; a ReachAgent with a ReachStore on it does."
+                        f"{self.path}: no agent has learned to reach in this run yet; run a ReachAgent with a ReachStore on this file."
                     )
             else:
                 with transaction(self._db):

@@ -19,7 +19,7 @@ RANDOM_SHARE = 0.2  # of the problem-tries, which reach from a random state
 
 
 class Progress:
-    """The change of a state's rewards over its last eight reaches; 1 where there are fewer than two."""
+    """The reward of a reach is the change of its state's rewards over the last eight reaches; 1 where there are fewer than two."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._lately: list[deque[float]] = [deque(maxlen=WINDOW) for _ in range(len(reaches))]
@@ -52,7 +52,7 @@ class Strategy(Protocol):
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach, as the predictor does."""
+        """Learn from a reach; the arguments are those of `RewardPredictor.add`."""
         ...
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
@@ -61,7 +61,7 @@ class Strategy(Protocol):
 
 
 class Random:
-    """Reward 1 for one state drawn for the problem-try, 0 for all others (thesis 8.3.2)."""
+    """The reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._states = len(reaches)
@@ -77,13 +77,13 @@ class Random:
 
 
 class Greedy:
-    """The expected reward: optimistic if the predictor is (thesis eq. 8.5)."""
+    """The reward of a reach is the predictor's expected reward, which may be optimistic (thesis eq. 8.5)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._predictor = predictor
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn nothing: the predictor does."""
+        """Learn nothing; the predictor learns from the reach."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the expected rewards, shape (S,)."""
@@ -91,7 +91,7 @@ class Greedy:
 
 
 class Intrinsic:
-    """The expected prediction error, from the errors that the predictor made (thesis eqs. 8.6 and 8.7); with any predictor."""
+    """The reward of a reach is the prediction error to expect from the predictor's past errors (thesis eqs. 8.6 and 8.7)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._errors = Histories(len(reaches), reaches.scale)
@@ -106,7 +106,7 @@ class Intrinsic:
 
 
 class UpperBound(Greedy):
-    """The expected reward plus two standard deviations; needs a predictor that has a deviation."""
+    """The reward of a reach is the expected reward plus two standard deviations; needs a predictor that has a deviation."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the upper confidence bounds, shape (S,)."""
@@ -114,7 +114,7 @@ class UpperBound(Greedy):
 
 
 class Thompson(Greedy):
-    """Thompson sampling: one sample of the reward function for each problem-try; needs a predictor that can be sampled."""
+    """The reward of a reach is that of one sample of the reward function for each problem-try; needs a predictor with samples."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the drawn rewards, shape (S,)."""
@@ -122,7 +122,7 @@ class Thompson(Greedy):
 
 
 StrategyOf = Callable[[Reaches, RewardPredictor], Strategy]
-"""Makes the strategy of a learner from its reaches and its predictor: a class, or a function."""
+"""A class or function that makes the strategy of a learner from its reaches and its predictor."""
 
 STRATEGIES: dict[str, StrategyOf] = {
     "random": Random,

@@ -53,10 +53,11 @@ def place(target: ReachTarget) -> bytes:
 class Step:
     """One action of a problem-try.
 
-    `n`: 1, 2, ... of this learner.  `number`: 1, 2, ... of the problem-try, `problem`: 0, 1, ... of its target.
-    `a`: a transition's action, or REACH.  `failed`: the value did not rise.  `reward`: of a transition 0 or the penalty; of a
-    reach that of thesis eq. 8.4; `expected` is then the reward predicted just before, and `missing` the remaining error, m.
-    `q`: rad, all motors of the part, of a reach at the end of its force.  `touched`: world objects.  `duration`: s of plant time.
+    `n`: number of the step, 1, 2, ...  `number`: of its problem-try, 1, 2, ...  `problem`: of the target, 0, 1, ...  `s`, `s_next`: states
+    before and after.  `a`: the action of a transition, or REACH.  `failed`: the transition did not lead to a state of higher value.
+    `reward`: of a transition 0 or the penalty, of a reach that of thesis eq. 8.4.  `expected`, `missing`: of a reach, the reward predicted
+    just before, and the remaining error [m].  `settled`: False after a timeout.  `duration`: s, by the plant's clock.  `q`: rad, all
+    motors of the part at the end; of a reach, when its force ended.  `touched`: world objects in contact.
     """
 
     n: int
@@ -79,9 +80,10 @@ class Step:
 class Try:
     """A problem-try that has ended.
 
-    `path`: its transitions, as (s, a, s', failed).  `reach_state`: from which it reached; None: no reach within the limit, and the next
-    four are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected minus actual reward (thesis eq. 8.6).
-    `missing`: m, remaining error.  `timeouts`: actions that did not settle.  `duration`: s of plant time.
+    `number`: 1, 2, ...  `problem`: number of its target.  `path`: its transitions, as (s, a, s', failed).  `reach_state`: where the reach
+    started; None: no reach within the limit of actions, and the next four are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected
+    minus actual reward (thesis eq. 8.6).  `missing`: m, remaining error.  `timeouts`: number of actions that did not settle.
+    `duration`: s, by the plant's clock.
     """
 
     number: int
@@ -102,7 +104,7 @@ class Try:
 
 
 def made_of(steps: Sequence[Step]) -> Try:
-    """Return the problem-try of these steps, at least one."""
+    """Return the problem-try that consists of these steps, at least one."""
     moves, last = [step for step in steps if step.a != REACH], steps[-1]
     reached = last.a == REACH
     return Try(

@@ -65,7 +65,7 @@ def agree(robot: Robot, gains: Gains, part: str | None, marker: str, rng: Rng, t
         motion = step(robot, gains, motion, q, wanted, 0.01)
         assert apart(controller.step(q, 0.01, held).velocity, motion.velocity) < ROUNDING
         if gains.law == "default":
-            assert controller.is_approaching(part) == mine.nears
+            assert controller.is_approaching(part) == mine.is_approaching
         q = q + 0.01 * motion.velocity + 1e-4 * rng.normal(size=n)
 
 

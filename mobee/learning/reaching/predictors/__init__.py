@@ -16,7 +16,7 @@ from mobee.learning.reaching.reaches import Reaches
 __all__ = ["PREDICTORS", "PredictorOf", "Reaches", "RewardPredictor"]
 
 PredictorOf = Callable[[Reaches], RewardPredictor]
-"""Makes the predictor of a learner from its reaches: a class, or a function."""
+"""A class or function that makes the predictor of a learner from its reaches."""
 
 PREDICTORS: dict[str, PredictorOf] = {
     "weighted": Weighted,
@@ -27,4 +27,4 @@ PREDICTORS: dict[str, PredictorOf] = {
     "networks": Networks,
     "gp": GaussianProcess,
 }
-"""Makes a predictor that has learned nothing yet, by name."""
+"""By name: the class or function that makes a predictor without any observed reach."""

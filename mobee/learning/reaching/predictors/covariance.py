@@ -102,7 +102,7 @@ class Covariance:
         return total
 
     def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
-        """Return the covariance of average rewards of `count` (n,) tries each, shape (n, n), and a function of its derivatives."""
+        """Return the covariance (n, n) of average rewards over `count` (n,) tries each, and a function that sums its derivatives."""
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
         approach_far = _squared(a.vector, a.vector) / value[_APPROACH_L] ** 2

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaussian process regression of the rewards over poses and targets: the best predictor here.
 
-A lower triangular factor grows by a row for each reach.  For every queried target, the rows of its states are cached and continued at
-the next query, in whole blocks: so predictions depend on the reaches alone, not on earlier queries.
+The triangular factor of the covariance grows by a row for each reach.  For every queried target, the rows of its states are cached and
+continued at the next query, in whole blocks, so that predictions depend on the reaches alone and not on earlier queries.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ JITTER = 1e-9  # of the prior variance, added to the diagonal against rounding e
 
 
 class GaussianProcess:
-    """Exact for about 2500 pairs of a state and a target; beyond that, targets of a state that are near each other are merged.
+    """Gaussian process regression, exact up to about 2500 pairs of a state and a target; beyond, near targets of a state are merged.
 
     For spaces of some hundred states: time and memory grow with their square.
     A repeated query of a target takes less than a millisecond, the first query up to 30 ms after many reaches.

@@ -21,11 +21,11 @@ MAX_LEFT_OUT = 400  # pairs that are predicted from all others
 
 
 class Kernel(Independent):
-    """Gaussian weights over poses and targets, shrunk towards the average, or towards a prior by distance, where there are few reaches.
+    """Averages rewards with Gaussian weights over poses and targets; where there are few reaches, shrinks towards the average or a prior.
 
     Args:
         reaches: the reach actions.
-        prior: whether the prior is the reward expected from the distance of hand and target.
+        prior: True: shrink towards the reward expected from the distance of hand and target; False: towards the average of all rewards.
     """
 
     def __init__(self, reaches: Reaches, prior: bool = False) -> None:

@@ -15,16 +15,16 @@ from mobee.learning.reaching.reaches import Reaches
 
 COMPLIANCES = (0.0, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)  # rad/m^2, candidates of the fit
 DEFAULT_COMPLIANCE = 20.0  # rad/m^2, before the first fit
-PRIOR_WEIGHT = 1.0  # of slope 1 in the fit of the line, in reaches
+PRIOR_WEIGHT = 1.0  # of slope 1 in the fit of the linear function, in reaches
 
 
 class LinearArm:
-    """An arm of given compliance, and a line from its rewards to the expected ones.
+    """An arm of given compliance, and a linear function from the arm's rewards to the expected rewards.
 
     Args:
         reaches: the reach actions; without Jacobians the arm does not move, and the whole distance remains.
         compliance: g, in rad/m^2.
-        offset, slope: of the line.
+        offset, slope: of the linear function.
     """
 
     def __init__(self, reaches: Reaches, compliance: float = DEFAULT_COMPLIANCE, offset: float = 0.0, slope: float = 1.0) -> None:
@@ -45,7 +45,7 @@ class LinearArm:
         return expected
 
     def fitted(self, known: Reached) -> LinearArm:
-        """Return the arm whose compliance and line have the least squared error of the observed rewards."""
+        """Return the arm whose compliance and linear function fit the observed rewards with the least squared error."""
         target = known.places[known.target]
         return min((self._with(compliance, known, target) for compliance in COMPLIANCES), key=lambda found: found[0])[1]
 
@@ -61,6 +61,6 @@ class LinearArm:
         return float(((known.mean - arm.offset - arm.slope * own) ** 2).sum()), arm
 
     def _own(self, state: Ints, target: Array) -> Array:
-        """Return the rewards of the linear arm without the line (thesis eq. 8.4)."""
+        """Return the rewards of the arm, before the linear function (thesis eq. 8.4)."""
         rewards: Array = 1.0 / (1.0 + self.remaining(state, target - self.reaches.hands[state]) / self.reaches.scale)
         return rewards

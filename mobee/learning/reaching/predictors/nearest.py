@@ -24,7 +24,7 @@ MAX_CACHED = 256  # targets whose neighbours are in memory
 
 
 class Nearest(Independent):
-    """Averages of the five nearest reaches, repeats merged, weighted by their inverse squared distance, shrunk towards the average of all.
+    """Averages the five nearest reaches, weighted by inverse squared distance and shrunk towards the average of all; repeats are merged.
 
     Args:
         reaches: the reach actions.

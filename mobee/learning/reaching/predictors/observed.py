@@ -89,7 +89,7 @@ class Reached:
 
 
 def around(known: Reached) -> tuple[float, float]:
-    """Return average and variance of the mean rewards and a few imagined ones, so that they exist from the start."""
+    """Return average and variance of the mean rewards; a few imagined rewards are included, so that both exist from the start."""
     rewards, pairs = known.mean, len(known) + IMAGINED
     middle = (rewards.sum() + IMAGINED * EXPECTED) / pairs
     return float(middle), float((((rewards - middle) ** 2).sum() + IMAGINED * SPREAD**2) / pairs)

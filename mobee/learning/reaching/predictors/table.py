@@ -15,9 +15,10 @@ NOISE = 0.05  # standard deviation of a reward around its mean, before there are
 
 
 class Table(Independent):
-    """Averages, shrunk towards the average of all rewards where there are few.
+    """Averages the rewards of each pair of state and target; where there are few, shrinks towards the average of all rewards.
 
-    Mean rewards are taken as normal around the average of all, with their spread, and rewards as normal around them.
+    The model: mean rewards are normally distributed around the average of all, and the rewards of a pair around their mean.
+
 
     Args:
         reaches: the reach actions.

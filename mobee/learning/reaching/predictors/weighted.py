@@ -18,7 +18,7 @@ _NO_DEVIATION = (
 
 
 class Weighted:
-    """Optimistic weighted averages: 1 for a state that was never tried, and nearly 1 for targets far from those tried.
+    """Predicts optimistic weighted averages: 1 for a state that was never tried, and nearly 1 for targets far from those tried.
 
     Args:
         reaches: the reach actions.

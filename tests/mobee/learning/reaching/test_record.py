@@ -68,14 +68,14 @@ def test_absent_files_and_parts_are_reported(tmp_path):
         load_reaches(tmp_path / "none.sqlite", plant())
     with TransitionStore(tmp_path / "run.sqlite", PART) as store:
         CuriousAgent(SPACE, plant(), store=store).run(1)
-    with pytest.raises(MobeeError, match="nobody has learned to reach in this run yet"):
+    with pytest.raises(MobeeError, match="no agent has learned to reach in this run yet"):
         load_reaches(tmp_path / "run.sqlite", plant())
 
 
 def test_a_learner_that_has_done_nothing_yet_has_nothing_to_load(tmp_path):
     with ReachStore(tmp_path / "run.sqlite", PART) as store:
         agent(store=store)
-    with pytest.raises(MobeeError, match="nobody has learned to reach"):
+    with pytest.raises(MobeeError, match="no agent has learned to reach"):
         load_reaches(tmp_path / "run.sqlite", plant(), hands=HANDS)
 
 

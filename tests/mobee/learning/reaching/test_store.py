@@ -149,7 +149,7 @@ def test_another_learner_continues_the_record(tmp_path):
 def test_a_file_without_reaches_is_refused_for_reading(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", PART) as transitions:
         transitions.append(Transition(1, 0, 0, 1, 0.1, True, 1.0, (0.0,)))
-    with pytest.raises(MobeeError, match="nobody has learned to reach"):
+    with pytest.raises(MobeeError, match="no agent has learned to reach"):
         ReachStore(tmp_path / "run.sqlite", PART, read_only=True)
 
 
