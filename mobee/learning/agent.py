@@ -182,7 +182,7 @@ def _common_plant(agents: Sequence[CuriousAgent]) -> ConcurrentPlant:
         raise InvalidValue("the agents act on different plants: give them one plant, or run each with agent.run.")
     shared = [part for part, count in Counter(agent.part for agent in agents).items() if count > 1]
     if shared:
-        raise InvalidValue(f"several agents move {shared[0]}: valid is one agent a part.")
+        raise InvalidValue(f"several agents move {shared[0]}: valid is one agent per part.")
     if not (hasattr(plant, "begin") and hasattr(plant, "advance")):
         raise InvalidValue(f"{type(plant).__name__} has no begin and advance: run each agent with agent.run in a process of its own.")
     return cast(ConcurrentPlant, plant)

@@ -98,7 +98,7 @@ class Planner:
         space: states and actions.
         beliefs: outcomes of the actions, e.g. `model.debiased()`: the imagined outcomes would make reliable actions seem unreliable.
         targets: one or more states.
-        discount: factor a step, in [0, 1); the smaller it is, the more a short path is preferred over a reliable one.
+        discount: factor per step, in [0, 1); the smaller it is, the more a short path is preferred over a reliable one.
 
     Raises:
         InvalidValue: no such state.

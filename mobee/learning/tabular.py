@@ -146,10 +146,10 @@ def half_space(
 
     Args:
         space: a lattice.
-        normal: of the plane, towards the forbidden side, one component a joint, in fractions of the ranges.
+        normal: of the plane, towards the forbidden side, one component per joint, in fractions of the ranges.
         depth: where the plane lies: 0 at the extreme states' samples, 1 at the next ones'.
         memory: share of the distance from the goal to the start by which the outcome is shifted.
-        noise: standard deviation a joint, in fractions of the range, of actions with a free goal and of the others.
+        noise: standard deviation per joint, in fractions of the range, of actions with a free goal and of the others.
     """
     if len(normal) != len(space.joints) or not any(normal):
         raise InvalidValue(f"normal={normal!r}: give one component for each of {', '.join(space.joints)}, not all 0.")

@@ -24,7 +24,7 @@ Column = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """Two volumes that overlap: of the robot's shapes, or a shape of the robot (`first`) and a world object (`second`).
+    """An overlap of two shapes of the robot, or of a shape of the robot (`first`) and a world object (`second`).
 
     Moving `first` by depth * normal separates them.  Root frame.  A link of -1 stands for a free world object; an attached
     one has the link that carries it.
@@ -85,22 +85,22 @@ class ContactTable:
 
     @property
     def pose(self) -> Column:
-        """Indices into the flattened batch, (c,)."""
+        """The pose of each contact, (c,): index in the flattened batch."""
         return self.numbers[:, 0]
 
     @property
     def kind(self) -> Column:
-        """Indices into KINDS, (c,)."""
+        """The kind of each contact, (c,): index in KINDS."""
         return self.numbers[:, 1]
 
     @property
     def first(self) -> Column:
-        """Indices for `name`, (c,)."""
+        """The first volume of each contact, (c,): an index, see `name`."""
         return self.numbers[:, 2]
 
     @property
     def second(self) -> Column:
-        """Indices for `name`, (c,)."""
+        """The second volume of each contact, (c,): an index, see `name`."""
         return self.numbers[:, 3]
 
     @property
@@ -170,7 +170,7 @@ def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def links_moved(robot: Robot) -> dict[str, frozenset[int]]:
-    """Return for every part the links that its motors move: those that they drive and all that are mounted on these."""
+    """Return for every part the links that its motors move: the driven links and all links that these carry."""
     matrix, _ = robot.coupling
     found: dict[str, frozenset[int]] = {}
     for name, part in robot.parts.items():

@@ -32,7 +32,7 @@ _COLLISION = fcl.CollisionRequest(enable_contact=True)
 
 
 class FclEngine:
-    """Evaluates poses of one robot, with the results of the compiled engine within fcl's tolerance."""
+    """Evaluates poses of one robot; the results equal those of the compiled engine within fcl's tolerance."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -51,7 +51,7 @@ class FclEngine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) [rad], and the projection of the contacts of fields to the motors, (B, n).
 
-        `reaching`, `cut`: as for the compiled engine; `threads` is ignored.
+        `reaching`, `cut`: see `mobee.model.engine.Engine.contacts`; `threads` is ignored.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)

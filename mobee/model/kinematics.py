@@ -100,7 +100,7 @@ _IDENTITY = np.eye(4)
 
 
 def link_transforms(robot: Robot, q: Array) -> Array:
-    """Return the transform of every link: it maps a point of the root frame at zero pose to where it is at q.
+    """Return the transform of every link, which maps the position of a point at zero pose to its position at q, both in the root frame.
 
     `q`: (..., n) motor positions in rad.  Returns (..., L, 4, 4) with L = len(robot.links); link 0 is the base.
     """

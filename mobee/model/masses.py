@@ -30,7 +30,7 @@ class Masses:
 
 @per_robot
 def masses(robot: Robot) -> Masses:
-    """Return the masses of a robot; B is 0 where its file names none."""
+    """Return the masses of a robot; B is 0 if its file has none."""
     links = np.array([body.link for body in robot.bodies], dtype=np.intp)
     weights = np.array([body.mass for body in robot.bodies])
     centres = np.array([[*body.centre, 1.0] for body in robot.bodies]).reshape(len(links), 4)
@@ -89,7 +89,7 @@ def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
 
 
 def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
-    """Return the potential energy [J] of the robot's masses, (...,), zero at the root frame's origin; arguments as of `gravity_torque`."""
+    """Return the potential energy [J] of the robot's masses, (...,), zero at the root frame's origin; arguments: see `gravity_torque`."""
     q = _checked(robot, q)
     if not robot.bodies:
         return np.zeros(q.shape[:-1])

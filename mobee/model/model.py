@@ -58,9 +58,9 @@ class Model:
         return known
 
     def hand(self, marker: str) -> Hand:
-        """Return the links whose contacts with targets are ignored while that marker reaches: its own and all that this carries.
+        """Return the links whose contacts with targets are ignored while a marker reaches: the marker's link and all that it carries.
 
-        Ignored as well are the fields of the links before it in the same part, from the first one whose field the marker is in at home.
+        The fields of links before it in the same part are ignored too, from the first link whose field contains the marker at home.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -90,11 +90,11 @@ class Model:
         return None
 
     def evaluate(self, q: ArrayLike, threads: int = 1, reaching: Reaching = None) -> Pose:
-        """Return the pose at q, (n,) or (..., n) rad in the order of robot.motors, in the world of now; changes nothing.
+        """Return the pose at q, (n,) or (..., n) rad in the order of robot.motors, in the present world, which it does not change.
 
         Args:
             q: motor positions.
-            threads: how many share the poses of a batch, one block each; the results are the same to the last bit for any number.
+            threads: their number; each evaluates a block of a batch, and the results are bit-equal for any number.
             reaching: a marker, or up to two, that reach for the targets: contacts of their hands with targets are ignored (see `hand`).
 
         Raises:
@@ -126,9 +126,9 @@ class Model:
         return found.reshape(*value.shape[:-1], 6, self._motors)
 
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
-        """Attach a world object to a link: from now on it moves with it, from the place that it has in the pose q (n,) rad.
+        """Attach a world object to a link, with which it then moves; its place relative to the link is that in the pose q (n,) rad.
 
-        The world follows that pose, see `World.follow`. Raises UnknownName and InvalidValue.
+        That pose becomes the world's present pose, see `World.follow`. Raises UnknownName and InvalidValue.
         """
         pose = self.evaluate(q)
         carrier = link_pose(pose, link)

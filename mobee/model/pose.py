@@ -73,7 +73,7 @@ class Pose:
 
     @property
     def transforms(self) -> Array:
-        """The transform of every link, (..., L, 4, 4): from the root frame at zero pose to now."""
+        """The transform of every link, (..., L, 4, 4), from its place at zero pose to its place at q, root frame."""
         if self._transforms is None:
             found = self._engine.transforms(self._flat)
             self._transforms = found.reshape(*self.q.shape[:-1], *found.shape[1:])
@@ -111,7 +111,7 @@ class Pose:
     def projection(self) -> Array:
         """The contacts of fields projected to the motors: sum of J^T (depth * normal), (..., n) in [m^2/rad] (the sum in thesis eq. 5.11).
 
-        The two sides of a self contact get opposite vectors. A contact acts on all motors from its link down to the base.
+        The two links of a self-contact get opposite vectors. A contact acts on all motors from its link down to the base.
         """
         evaluated = self._evaluated
         if evaluated is None:
@@ -120,9 +120,9 @@ class Pose:
 
     @property
     def projection_of_part(self) -> Array:
-        """The projection, where a contact acts on the motors of its own part only: an arm's contact does not reach the torso.
+        """The same as `projection`, but each contact acts only on the motors of its own part: an arm's contact not on the torso.
 
-        So it was in the original program.
+        The original program of 2014 projected contacts like this.
         """
         return self._computed(True)[1]
 

@@ -182,7 +182,7 @@ def _tested(robot: Robot, carried: Sequence[Carried]) -> Flags:
 
 
 def meets(robot: Robot, link: int, other: int) -> bool:
-    """Return whether an object on one link is tested against another link: not against its own, nor where the links themselves are not."""
+    """Return whether an object on `link` is tested against the link `other`: if they are two links, and tested against each other."""
     pair: LinkPair = frozenset((link, other))
     return link != other and pair not in robot.untested
 

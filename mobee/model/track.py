@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Neighbours:
     """Computes the contacts of one robot pose after pose, with a list of the pairs nearer than `skin` [m]; for one thread at a time.
 
-    `cut`: as of `Engine.contacts`.
+    `cut`: see `Engine.contacts`.
     """
 
     def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
@@ -48,8 +48,8 @@ class Neighbours:
 class Track:
     """Evaluates poses of one model that follow each other closely: the same results as `Model.evaluate`, faster.
 
-    Pairs that cannot touch before something has moved by half the skin are not checked again. A track is cheap to make and serves
-    one thread at a time. Where the steps are large it is as fast as `Model.evaluate`.
+    Pairs of volumes that cannot touch until one of them has moved by half the skin are not checked until then. A track is cheap to make
+    and serves one thread at a time. Where the steps are large it is as fast as `Model.evaluate`.
     """
 
     def __init__(self, model: Model, engine: object, skin: float) -> None:
@@ -58,7 +58,7 @@ class Track:
         self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
 
     def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
-        """Return the pose at q (n,), or the poses along a path (..., n) rad in this order; arguments and errors as of `Model.evaluate`.
+        """Return the pose at q (n,), or the poses along a path (..., n) rad in this order; arguments and errors: see `Model.evaluate`.
 
         The contacts are computed at once, not when they are read.
         """

@@ -133,7 +133,7 @@ class World:
             self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
 
     def detach(self, name: str) -> None:
-        """Leave an attached object where it is in the pose of the last `follow`; raises UnknownName and InvalidValue."""
+        """Detach an object, which stays at its place in the pose of the last `follow`; raises UnknownName and InvalidValue."""
         with self._lock:
             old = self._get(name)
             if old.link is None:

@@ -87,13 +87,13 @@ class WorldObject:
 
 
 def placed(thing: WorldObject, link_pose: Array) -> WorldObject:
-    """Return an attached object as a free one, where its link at (4, 4) has carried it."""
+    """Return an attached object as a free one, at its place while its link has the pose `link_pose` (4, 4)."""
     turn, shift = link_pose[:3, :3], link_pose[:3, 3]
     return replace(thing, position=turn @ thing.position + shift, rotation=turn @ thing.rotation, link=None)
 
 
 def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
-    """Return position (3,) and rotation (3, 3) of a free object in the frame of a link at (4, 4)."""
+    """Return position (3,) and rotation (3, 3) of a free object in the frame of a link, whose pose is `link_pose` (4, 4)."""
     back = link_pose[:3, :3].T
     return back @ (thing.position - link_pose[:3, 3]), back @ thing.rotation
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras: parallel ones, in whose pictures lengths are the same near and far, and perspective ones, as an eye is."""
+"""Cameras: parallel, with the same scale at every distance, or perspective, as an eye."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NEAREST = 0.03  # m: a perspective camera does not see what is nearer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A picture of width x height pixels, of `scale` pixels a metre.
+    """A picture of width x height pixels, of `scale` pixels per metre.
 
     `axes` (3, 3): rows are right, up and ahead of the camera, in the root frame.  `corner`: right and up [m] of the picture's upper left
     corner.  `eye` (3,) m, root frame: where the rays of a perspective picture begin; scale and corner are then those of the plane
@@ -51,7 +51,7 @@ class Camera:
         return replace(self, scale=self.scale * times, width=self.width * times, height=self.height * times)
 
     def pixels(self, points: Array) -> Array:
-        """Return where points (..., 3) m are in the picture of a parallel camera: column and row from its corner, (..., 2)."""
+        """Return column and row (..., 2), from the upper left corner, of points (..., 3) m in the picture of a parallel camera."""
         flat = points @ self.axes[:2].T - self.corner
         found: Array = self.scale * flat * np.array([1.0, -1.0])
         return found
@@ -84,7 +84,7 @@ def camera_axes(view: str | tuple[float, float]) -> Array:
 
 
 def framing(axes: Array, solids: Sequence[Solid], points: Array, height: int, margin: float = MARGIN) -> Camera:
-    """Return the parallel camera whose picture, that many pixels high, holds solids and points (P, 3) m with a margin [m] around them."""
+    """Return the parallel camera whose picture, `height` pixels high, holds solids and points (P, 3) m with a margin [m] around them."""
     seen = [points @ axes[:2].T] if len(points) else []
     for sign in (1.0, -1.0):
         if solids:
@@ -112,12 +112,12 @@ class Raster:
         self.color: Floats = colors[self.which]
 
     def points(self) -> Floats:
-        """Return the places that are seen, (N, 3) m in the root frame, pixel by pixel where there is something; of parallel rays."""
+        """Return the visible surface points (N, 3) m, root frame, one for each pixel that is not empty; for a parallel camera."""
         return places(self.camera, self.depth, np.isfinite(self.depth))
 
 
 def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
-    """Return the points (N, 3) m, root frame, at a depth (H, W) m in those of a parallel camera's pixels."""
+    """Return the points (N, 3) m, root frame, at the depths (H, W) m of a parallel camera's pixels, for the pixels `which` (H, W)."""
     right, up = pixel_middles(camera)
     rows, columns = np.nonzero(which)
     found: Floats = np.stack([right[columns], up[rows], depth[which]], axis=1) @ camera.axes.astype(np.float32)
@@ -125,7 +125,7 @@ def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
 
 
 def pixel_middles(camera: Camera) -> tuple[Floats, Floats]:
-    """Return how far right the middle of each column of pixels is, (W,) m, and how far up that of each row, (H,) m."""
+    """Return the middles of the pixels: of each column to the right (W,) m, and of each row upwards (H,) m, in the camera's axes."""
     right = camera.corner[0] + (np.arange(camera.width) + 0.5) / camera.scale
     up = camera.corner[1] - (np.arange(camera.height) + 0.5) / camera.scale
     return right.astype(np.float32), up.astype(np.float32)

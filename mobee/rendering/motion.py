@@ -97,7 +97,7 @@ class Recording:
 
 @contextmanager
 def recorded(plant: OfflinePlant, step: float = 0.05) -> Iterator[Recording]:
-    """Record a plant inside the `with` block, a pose every `step` s; this replaces a function that was set by `plant.every`."""
+    """Record a plant inside the `with` block, a pose every `step` s; this replaces the callback of `plant.every`."""
     recording = Recording(plant)
     plant.every(max(1, round(step / plant.dt)), recording.add)
     try:

@@ -31,14 +31,14 @@ SHOWN_PARTS = 3  # of a robot with other parts: so many columns of plots fit on 
 
 
 def colors_of(parts: Collection[str]) -> dict[str, Color]:
-    """The parts that plots and learning are shown of, with their colours: torso and arms of the iCub, of another robot the first parts."""
+    """Return the parts that plots and learning curves show, with their colours: the iCub's torso and arms, or a robot's first parts."""
     if PARTS.keys() <= set(parts):
         return PARTS
     return dict(zip(list(parts)[:SHOWN_PARTS], PARTS.values(), strict=False))
 
 
 def faded(color: Color, share: float) -> Color:
-    """The colour, dimmed towards the dark background."""
+    """Return the colour, mixed with the dark background; `share`: of the colour, 0 to 1."""
     red, green, blue = (round(share * channel) for channel in color)
     return red, green, blue
 

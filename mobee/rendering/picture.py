@@ -19,7 +19,7 @@ RAYS = 3  # a pixel, in each direction
 SKY_LIGHT, GROUND_LIGHT, LAMP_LIGHT = 0.62, 0.34, 0.50  # from above, from below, from the lamp
 SHADOW = 0.75  # share of the lamp's light that is missing in its shadow
 LAMP_SCALE = 2.5  # times the height of the camera's picture is that of the lamp's own
-SHADOW_BIAS = 0.004  # m: a surface casts no shadow on what is nearer to it; points are tested that far above their surface
+SHADOW_BIAS = 0.004  # m: points are tested for shadow this far above their surface, so that the surface casts none on itself
 SHADOW_SAMPLES = ((-1.0, -0.5), (0.5, -1.0), (1.0, 0.5), (-0.5, 1.0))  # pixels of the lamp's picture, for smooth edges
 FLOOR_SHADOW, FLOOR_BLUR = 0.20, 0.006  # how dark shadows on the floor are, and how wide their edges [m]
 DEPTH_STEP, FOLD_COSINE = 0.012, 0.65  # an outline: where neighbours' depths differ more [m]; a fold: where their normals' cosine is less
@@ -28,7 +28,7 @@ HOLLOW, HOLLOW_WIDTH, HOLLOW_DEPTH = 0.35, 0.02, 0.06  # how dark it is behind s
 
 
 def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, rays: int = RAYS) -> Picture:
-    """Draw solids as a parallel camera sees them, with `rays` x `rays` rays a pixel; `floor`: height [m] where shadows fall, or None."""
+    """Draw solids as a parallel camera sees them, with `rays` x `rays` rays per pixel; `floor`: height [m] where shadows fall, or None."""
     lamp = _Lamp(camera, [solid for solid in solids if solid.opacity >= 1.0 and not solid.veiled])
     seen = Raster(camera.finer(rays), [solid for solid in solids if solid.opacity >= 1.0])
     picture = _fine(_floor(camera, lamp, floor), rays)
@@ -52,14 +52,14 @@ class _Lamp:
         self._seen = Raster(framing(self._axes, solids, np.empty((0, 3)), height), solids) if solids else None
 
     def light(self, points: Floats, normals: Floats) -> Floats:
-        """Return how bright surfaces are, (N,), at points (N, 3) m with normals (N, 3)."""
+        """Return the brightness (N,) of surfaces at points (N, 3) m with normals (N, 3)."""
         facing = np.maximum(-normals @ self._axes[2].astype(np.float32), 0.0)
         sky, lamp = 0.5 + 0.5 * normals[:, 2], facing * (1.0 - SHADOW * self.shade(points + SHADOW_BIAS * normals))
         found: Floats = GROUND_LIGHT + (SKY_LIGHT - GROUND_LIGHT) * sky + LAMP_LIGHT * lamp
         return found
 
     def shade(self, points: Floats) -> Floats:
-        """Return which share of the lamp is hidden from points (N, 3) m, (N,)."""
+        """Return the share (N,) of the lamp's light that does not arrive at points (N, 3) m."""
         shade = np.zeros(len(points), np.float32)
         if self._seen is None:
             return shade
@@ -74,7 +74,7 @@ class _Lamp:
 
 
 def _lamp_axes(camera: Camera) -> Array:
-    """The lamp's right, up and ahead, (3, 3)."""
+    """Return the lamp's axes (3, 3): rows are right, up and ahead."""
     ahead = 0.55 * camera.axes[0] - 0.25 * camera.axes[1] + 0.75 * camera.axes[2] - np.array([0.0, 0.0, 1.1])
     ahead /= np.linalg.norm(ahead)
     right = np.cross(ahead, camera.axes[1])
@@ -93,7 +93,7 @@ def _coarse(values: Floats, times: int) -> Floats:
 
 
 def _floor(camera: Camera, lamp: _Lamp, height: float | None) -> Floats:
-    """White paper, with the shadow on the floor if the camera sees it from above."""
+    """Return a white background, with the shadow on the floor if the camera sees the floor from above."""
     picture = np.ones((camera.height, camera.width, 3), np.float32)
     steep = float(camera.axes[2][2])
     if height is None or steep > -0.05:

@@ -49,7 +49,7 @@ class Panel:
 class Strip:
     """One motion of a filmstrip, a row for each view.
 
-    `views`: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.  `poses`: how many.  `title`: above the row.  `caption`: returns
+    `views`: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.  `poses`: number.  `title`: above the row.  `caption`: returns
     the line below a pose, given the motion and the pose's number; None: its time.  `bright`: parts that are not pale; None: those that
     moved.
     """
@@ -87,7 +87,7 @@ def panels(strip: Strip, height: int) -> list[list[Panel]]:
 
 
 def pictures_of(scenes: Sequence[Sequence[Solid]], view: View, height: int) -> list[Picture]:
-    """Return pictures of several scenes by one camera, whose frame holds what each of them must show."""
+    """Return pictures of several scenes by one camera, whose frame holds the solids of all scenes that must be visible."""
     about = [solid for scene in scenes for solid in focus(scene)]
     camera = framing(camera_axes(view), about, np.empty((0, 3)), height)
     floor = min(lowest(scene) for scene in scenes)
@@ -116,7 +116,7 @@ def marker_cloud(
     places = np.concatenate([pose.position(name) for name in names])
     given = pose.position(names[0])[:, 2] if values is None else np.asarray(values, dtype=np.float64)
     if given.shape != pose.q.shape[:1]:
-        raise InvalidValue(f"{len(pose.q)} poses and values of shape {given.shape}: must be one value a pose")
+        raise InvalidValue(f"{len(pose.q)} poses and values of shape {given.shape}: must be one value per pose")
     colored = places[:, 2] if values is None else np.tile(given, len(names))
     scene = cloud_solids(model.evaluate(model.robot.home if shown is None else shown), places, colored)
     row = [Panel(pictures_of([scene], view, height)[0], view if isinstance(view, str) else "") for view in views]
@@ -157,7 +157,7 @@ def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors:
 
 
 def _figure(width: float, height: float) -> Any:
-    """An empty figure, inches; Matplotlib is needed for the texts of a sheet only."""
+    """Return an empty figure of this size [inches]; only the texts of a sheet need Matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -197,7 +197,7 @@ def _time_caption(motion: Motion, moment: int) -> str:
 
 
 def _value_color(share: float) -> Color:
-    """The colour between LOWEST at 0, MIDDLE at one half and HIGHEST at 1."""
+    """Return the colour of a share, interpolated between LOWEST at 0, MIDDLE at one half and HIGHEST at 1."""
     first, second, part = (LOWEST, MIDDLE, 2.0 * share) if share < 0.5 else (MIDDLE, HIGHEST, 2.0 * share - 1.0)
     red, green, blue = ((1.0 - part) * first + part * second).tolist()
     return red, green, blue

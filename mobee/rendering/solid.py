@@ -31,11 +31,11 @@ TRAIL_GROUP, FIRST_OBJECT_GROUP = -2, 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A convex volume, as a robot's Shape or a WorldObject is one.
+    """A coloured convex volume of a picture; `kind`, `size` and `vertices` as in a robot's Shape.
 
     `position` (3,) m, `rotation` (3, 3): root frame.  `opacity`: below 1 the volume is transparent.  `veiled`: the share of its colour that
     shows through opaque volumes in front of it, 0 to 1.  `group`: there is no outline between solids of one group.
-    `aside`: the picture's frame need not hold it.
+    `aside`: True if it may lie outside of the picture.
     """
 
     kind: ShapeKind
@@ -50,7 +50,7 @@ class Solid:
     aside: bool = False
 
     def extent(self, along: Array) -> float:
-        """Return how far it extends from its position in the direction `along`, a unit vector (3,), in m."""
+        """Return the distance [m] that the solid extends from its position in the direction `along`, a unit vector (3,)."""
         x, y, z = along @ self.rotation
         if self.kind == "sphere":
             return self.size[0]
@@ -79,7 +79,7 @@ def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 
 
 
 def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
-    """Return the solid shapes of a robot in one pose, a group a link; parts that are not in `bright` are pale, none if it is None."""
+    """Return the solid shapes of a robot in one pose, one group per link; parts that are not in `bright` are pale, none if it is None."""
     shapes, parts = pose.robot.shapes, list(pose.robot.parts)
     vivid = set(parts if bright is None else bright)
     found = []
@@ -147,7 +147,7 @@ def packed(solids: Sequence[Solid]) -> tuple[NDArray[np.void], list[Array]]:
 
 @lru_cache(maxsize=256)
 def _planes(vertices: bytes) -> Array:
-    """The outward unit normals and offsets (F, 4) of the faces of a hull, of whose vertices (V, 3) these are the bytes."""
+    """Return the outward unit normals and offsets (F, 4) of a hull's faces; `vertices`: the bytes of its vertices (V, 3)."""
     corners = facets(np.frombuffer(vertices).reshape(-1, 3))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -155,7 +155,7 @@ def _planes(vertices: bytes) -> Array:
 
 
 def _rotation_with_z(z: Array) -> Array:
-    """Some rotation (3, 3) that has this unit vector as its z axis."""
+    """Return a rotation (3, 3) whose z axis is this unit vector (3,)."""
     other = np.zeros(3)
     other[np.abs(z).argmin()] = 1.0
     x = np.cross(other, z)

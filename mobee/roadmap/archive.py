@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Roadmap files: one .npz of plain arrays with the world and digests of robot and world, written whole or not at all."""
+"""Roadmap files: one .npz of plain arrays with the world and digests of robot and world, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _DIGITS, _DECIMALS = 16, 9
 def robot_digest(robot: Robot) -> str:
     """Return 16 hex digits of all properties that determine a robot's poses and contacts.
 
-    The names of motors and markers count, for costs and tasks speak of them; those of the robot, of its links and of its shapes do
-    not, nor does how fast its motors are.
+    The names of motors and markers are included, since costs and tasks refer to them. The names of the robot, its links and its shapes
+    are not included, and neither are the motors' speeds.
     """
     parts: list[bytes] = [b"robot"]
     for joint in robot.joints:
@@ -116,9 +116,9 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[str, Any]) -> None:
-    """Write arrays of numbers and notes, plain JSON; a reader finds the old file or the new one, also after a crash.
+    """Write arrays of numbers, and notes of plain JSON values; the file is complete or unchanged, also after a crash.
 
-    Raises MobeeError where the file cannot be written.
+    Raises MobeeError if the file cannot be written.
     """
     place = Path(path)
     part = place.with_name(f".{place.name}.{os.getpid()}.part")

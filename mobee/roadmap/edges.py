@@ -26,7 +26,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """`free` (E,): edges without contacts; `poses`: number of poses checked, ends included."""
+    """The result of a check: `free` (E,): whether each edge is without contacts; `poses`: number of poses checked, ends included."""
 
     free: Flags
     poses: int
@@ -35,19 +35,19 @@ class Checked:
 def check_edges(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Flags:
-    """Return which edges (E, 2) between poses q (V, n) rad are free of contacts, (E,) bool.
+    """Return whether each edge (E, 2) between poses q (V, n) rad is free of contacts, (E,).
 
     Every vertex is checked once.  The check of an edge begins at its middle and ends at the first pose with contacts.  Give each edge
     once: both directions have the same result.  The check is fastest if edges are sorted, as those of a Roadmap are.
 
     Args:
         model: its solid shapes are checked, in the present state of its world.
-        q: as of a Roadmap.
-        edges: as of a Roadmap.
+        q: see `Roadmap`.
+        edges: see `Roadmap`.
         step: largest straight distance that the marker moves between successive poses [m].
         marker: None: the shape of the robot that moves farthest.
         threads: number of threads; the result does not depend on it.
-        reaching: markers whose hands may touch targets, as of `Model.evaluate`.
+        reaching: markers whose hands may touch targets, see `Model.evaluate`.
     """
     return checked(model, q, edges, step, marker, threads, reaching).free
 
@@ -73,7 +73,7 @@ def checked(
 
 
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
-    """Return the number of poses between the ends of each edge (E, 2), (E,), so that none is farther than a step from the next."""
+    """Return the number of poses (E,) to check between the ends of each edge (E, 2), so that successive poses are at most a step apart."""
     far = np.zeros(len(edges))
     places = points(model, q, marker)
     for place in places:
@@ -83,7 +83,7 @@ def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
 
 
 def points(model: Model, q: Array, marker: str | None = None) -> Array:
-    """Return the positions of the marker in poses q (V, n), (1, V, 3) m; None: of the centres of all shapes that motors move."""
+    """Return the positions of a marker in poses q (V, n), (1, V, 3) m; without a marker, of the centres of all shapes that motors move."""
     if marker is not None:
         model.robot.marker(marker)
     found = []
@@ -113,9 +113,9 @@ _MARGIN = 1e-6  # m
 
 
 class EdgeWatch:
-    """Keeps `free` (E,) up to date: which edges (E, 2) between poses q (V, n) rad are free in the world of the last `update`.
+    """Keeps `free` (E,) up to date: whether each edge (E, 2) between poses q (V, n) rad was free of contacts at the last `update`.
 
-    `step`, `marker`, `threads`: as of `check_edges`.
+    `step`, `marker`, `threads`: see `check_edges`.
     """
 
     def __init__(self, model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> None:
@@ -148,7 +148,7 @@ class EdgeWatch:
         return again
 
     def near(self, item: WorldObject) -> Flags:
-        """Return along which edges the robot could touch an object, (E,) bool.
+        """Return whether the robot could touch an object along each edge, (E,).
 
         Each point of a shape's path is within half of the path's length of one of its two ends.
         """
@@ -160,7 +160,7 @@ class EdgeWatch:
 
 
 def apart(places: Array, item: WorldObject) -> Array:
-    """Return the distances of points (N, 3) from a free object, (N,) m, 0 inside."""
+    """Return the distances (N,) m of points (N, 3) m from a free object; 0 inside."""
     local = np.abs((places - item.position) @ item.rotation)
     size = item.size
     if item.kind == "box":

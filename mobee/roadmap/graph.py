@@ -18,7 +18,7 @@ from mobee.roadmap.edges import check_edges
 
 
 def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
-    """Return edges (E, 2) from each vertex to the `count` nearest others, by task coordinates y (V, m) in units of spacing.
+    """Return edges (E, 2) from each vertex to the `count` nearest others; distances are those of y (V, m) / spacing.
 
     Each edge occurs once, its lower vertex first, and the edges are sorted.
     """
@@ -77,10 +77,10 @@ class Graph:
     q: Array
     neighbours: list[list[int]]
     lengths: list[list[float]]
-    components: Ints  # (V,) which connected part a vertex belongs to, the largest is 0
+    components: Ints  # (V,) number of each vertex's connected part, 0 for the largest one
 
     def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
-        """Return the vertices of the shortest path from one to the other, both included; None if there is no path.
+        """Return the vertices of the shortest path from `start` to `goal`, both included; None if there is no path.
 
         `without`: edges that the path must not use, the lower vertex first.
         """
@@ -123,7 +123,7 @@ def graph(q: Array, edges: Ints) -> Graph:
 
 
 def components(count: int, edges: Ints) -> Ints:
-    """Return the number of the connected part of each vertex, (count,): 0 is the largest, of equal ones that of the first vertex."""
+    """Return the number of the connected part of each vertex, (count,): 0: the largest, or of equal ones the first."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -141,7 +141,7 @@ MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked
 
 
 def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
-    """Return the vertices of a path without contacts from a posture `start` (n,) rad, which enters the map at the nearest reachable vertex.
+    """Return the vertices of a path without contacts from a posture `start` (n,) rad, through the nearest vertex that can be entered.
 
     `to_enter`, `to_leave`: (V,) distances of the vertices from the start and from the goal; infinite: the vertex is not used.
     Raises MobeeError with the reason if every path has contacts.

@@ -15,7 +15,7 @@ from mobee.errors import InvalidValue, MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.ik.problem import chosen, solid_model
 
-EXTENSIONS = 3000  # of the trees, after which a search is given up
+EXTENSIONS = 3000  # number of extensions of the trees after which a search is given up
 RANGE = 0.25  # of the ranges, the longest extension
 
 
@@ -24,7 +24,7 @@ class OmplMissing(MobeeError):
 
 
 def require_ompl() -> tuple[Any, Any, Any]:
-    """OMPL's modules base, geometric and util; raises OmplMissing."""
+    """Return OMPL's modules base, geometric and util; raises OmplMissing."""
     try:
         from ompl import base, geometric, util
     except ImportError:
@@ -48,7 +48,7 @@ class ValidityChecker(Protocol):
         """Limits (d, 2) rad of the samples."""
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """Return which of the poses (P, d) are valid."""
+        """Return whether each pose (P, d) rad is valid, (P,)."""
 
     def sound_motion(self, start: Array, end: Array) -> bool:
         """Return whether the straight motion between two poses is valid."""
@@ -58,7 +58,7 @@ class Free:
     """A ValidityChecker that calls a function of whole poses.
 
     Args:
-        free: returns which of the poses (P, n) rad are valid, (P,).
+        free: returns whether each of the poses (P, n) rad is valid, (P,).
         rest: (n,) rad, positions of the motors that do not move.
         columns: (d,) indices of the motors that move.
         limits: (d, 2) rad.
@@ -98,10 +98,10 @@ class Grown:
 def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, extensions: int = EXTENSIONS) -> Array | None:
     """Find a valid path from a valid pose (d,) to one of (G, d) by RRT-Connect; return its corners (k, d) rad, or None.
 
-    Where it begins and ends may lie outside the box.  Raises OmplMissing.
+    `start` and `ends` may lie outside the box.  Raises OmplMissing.
     """
     base, geometric, util = require_ompl()
-    util.setLogLevel(util.LOG_NONE)  # that the seed is set once more; what is made from here on follows it
+    util.setLogLevel(util.LOG_NONE)  # a warning that the seed is set again; objects made from here on use it
     util.RNG.setSeed(seed % (2**31 - 1) + 1)
     low, span = checker.low, checker.span
     within = (np.concatenate([checker.box.T, start[None], ends]) - low) / span
@@ -139,7 +139,7 @@ def grown(
 ) -> Grown:
     """Grow a PRM or PRMstar over the box until it has `milestones` vertices.
 
-    `neighbours`: the nearest ones that each is tried to be joined with; None: the planner's own rule.  `resolution`: of the ranges,
+    `neighbours`: number of nearest vertices to which the planner tries to join each one; None: its own rule.  `resolution`: of the ranges,
     between poses of a motion that OMPL checks itself, one by one; None: the checker checks motions.  Raises OmplMissing.
     """
     base, geometric, util = require_ompl()
@@ -155,7 +155,7 @@ def grown(
         return bool(checker.sound(_pose(checker, state)[None])[0])
 
     information = _information(base, space, checker)
-    # OMPL's own sampler draws what no seed decides but the first of a process.
+    # OMPL's own sampler ignores every seed except the first one of a process.
     information.setValidStateSamplerAllocator(type("Sampler", (base.ValidStateSampler,), {"sample": sample}))
     motions = _motions(base, information, checker)
     if resolution is None:
@@ -231,10 +231,10 @@ def rrt_connect(
     Args:
         model: robot and world.
         start: (n,) rad, all motors.
-        goals: (n,) or (G, n) rad; of motors that may not move, the start counts.
+        goals: (n,) or (G, n) rad; motors that may not move keep their position at the start.
         motors: names of motors or parts that may move; None: all.
-        seed: decides everything.
-        extensions: of the trees, after which the search is given up.
+        seed: of all random numbers.
+        extensions: number of extensions of the trees after which the search is given up.
         step: fraction of each motor's range between the checked poses of a motion.
 
     Returns:
@@ -263,8 +263,8 @@ def prm(
     Args:
         model: robot and world.
         motors: names of motors or parts that move; None: all.
-        milestones: how many poses, at least.
-        neighbours: with how many nearest ones each is tried to be joined.
+        milestones: least number of poses.
+        neighbours: number of nearest poses to which the planner tries to join each pose.
         rest: (n,) rad, positions of the other motors; None: the home posture.
         seed: of the samples.
         step: as in `rrt_connect`.

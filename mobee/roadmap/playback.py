@@ -34,10 +34,10 @@ class Reference:
 
 
 def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """Return the motion along a path (K, n) rad within the motors' speeds (n,) rad/s and accelerations (n,) rad/s^2, a row each dt s.
+    """Return the motion along a path (K, n) rad within the motors' speeds (n,) rad/s and accelerations (n,) rad/s^2, one row per dt s.
 
-    `rounding`: how far before and behind a corner [rad, of all motors together] the motion leaves the path, at most half way to the
-    next; it passes the corner in half that distance or less.  0: it stops there instead.
+    `rounding`: distance before and after a corner [rad, over all motors] at which the motion leaves the path, at most half the distance
+    to the next corner; the motion passes the corner at half that distance or less.  0: it stops at every corner.
     """
     corners, fastest, hardest = (
         real_array("path", path),
@@ -93,7 +93,7 @@ def _line(start: Array, end: Array) -> Array:
 
 
 def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tuple[Array, Array, Array]:
-    """Return the fastest motion over points (S, n) within the limits: q, velocity and acceleration (T, n), a row each dt s."""
+    """Return the fastest motion over points (S, n) within the limits: q, velocity and acceleration (T, n), one row per dt s."""
     from scipy.interpolate import CubicHermiteSpline
 
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -105,7 +105,7 @@ def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tup
     when, gains = np.concatenate([[0.0], np.cumsum(spans)]), np.diff(speed) / spans
     where = CubicHermiteSpline(along, places, tangent)
     stretch = 1.0
-    while True:  # what was interpolated may be a little too fast between the places: then all is a little slower
+    while True:  # the interpolated motion may be a little too fast between the points: then slow all of it down a little
         count = max(1, int(np.ceil(when[-1] * stretch / dt)))
         moments = np.linspace(0.0, when[-1], count + 1)
         last = np.clip(np.searchsorted(when, moments, side="right") - 1, 0, len(spans) - 1)
@@ -149,18 +149,18 @@ def _require(path: Array, speeds: Array, accelerations: Array, rounding: float, 
         raise InvalidValue(f"rounding {rounding} rad, dt {dt} s: they must be at least 0, and above 0.")
 
 
-SPEED = 0.8  # of what the springs can do
+SPEED = 0.8  # share of the speed that the springs can give
 PERIOD = 0.05  # s between two places of the attractor
-PATIENCE = 5.0  # s for coming to rest behind the path
-_HARD = 0.8  # of its largest force: what a spring gives at most to follow
+PATIENCE = 5.0  # s to come to rest after the path
+_HARD = 0.8  # share of its largest force that a spring may use to follow the motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """The motion of a robot along a path, a row per tick.
+    """The motion of a robot along a path, one row per tick.
 
-    `wanted`, `q`: (T, n) rad, where it was to be and where it was; `solid`, `field`: (T,) m, the deepest contacts; `rested`: it came to
-    rest; `deepest`: what touched what where `solid` was largest.
+    `wanted`, `q`: (T, n) rad, planned and real positions; `solid`, `field`: (T,) m, depths of the deepest contacts; `rested`: whether the
+    robot came to rest; `deepest`: the solid contacts of the pose in which `solid` was largest.
     """
 
     times: Array
@@ -173,7 +173,7 @@ class Played:
 
     @property
     def lag(self) -> float:
-        """Largest distance of a motor from its planned position at the time [rad]."""
+        """Largest distance of a motor from its planned position at the same time [rad]."""
         return float(np.abs(self._q - self._wanted).max())
 
     @property
@@ -209,9 +209,9 @@ def play(
 
     Args:
         model: the robot in its world.
-        path: as of Roadmap.path.
-        speed: share of the speed that the springs of the attractor can give.
-        rounding: as of `reference`.
+        path: as `Roadmap.path` returns it.
+        speed: share of the largest speed that the springs of the attractor can give.
+        rounding: see `reference`.
         gains: of the control law; None: the default ones.
         seed: of the encoders' noise.
 
@@ -250,7 +250,7 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
-    """Return the solid contacts of that pose of q (T, n) in which they are deepest; solid: (T,) m."""
+    """Return the solid contacts of the pose, among q (T, n), with the deepest one; `solid`: depths (T,) m."""
     worst = int(solid.argmax())
     if not solid[worst] > 0.0:
         return ()
@@ -258,7 +258,7 @@ def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
 
 
 def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """Return the motion along a path (K, n) rad that the attractor's springs can follow, at a share of their speed."""
+    """Return the motion along a path (K, n) rad that the attractor's springs can follow; `speed`: share of their largest speed."""
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
     strength, damping = (gains.of_robot(name, robot) for name in ("max_spring", "damping"))
@@ -268,9 +268,9 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
 
 
 def attractors(robot: Robot, wanted: Reference, gains: Gains) -> Iterator[Array]:
-    """Yield the attractor (n,) rad every PERIOD: so far ahead that the spring of the law produces the motion (eq. 5.7).
+    """Yield the attractor (n,) rad every PERIOD, ahead of the motion such that the law's spring produces the motion (eq. 5.7).
 
-    The last is the reference's end.  A motor that has not to move keeps its place.
+    The last attractor is the end of the reference.  A motor that does not move in the reference keeps its position.
     """
     strength, stiffness, damping = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness", "damping"))
     held = np.arange(0.0, wanted.times[-1] + PERIOD, PERIOD) + 0.5 * PERIOD  # each is in force for a period: meant for its middle
@@ -292,7 +292,7 @@ def moving(robot: Robot, path: Array) -> tuple[str, ...]:
 
 
 def standing(robot: Robot, q: Array) -> Robot:
-    """Return the robot with home q (n,) rad, where an offline plant begins."""
+    """Return the robot with its home at q (n,) rad, so that an offline plant starts there."""
     return replace(robot, motor_table=tuple(replace(motor, home=float(x)) for motor, x in zip(robot.motor_table, q, strict=True)))
 
 

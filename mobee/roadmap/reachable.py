@@ -18,10 +18,10 @@ from mobee.roadmap.ik import costs
 from mobee.roadmap.ik.least_squares import Descent
 from mobee.roadmap.ik.problem import Problem
 
-POINT = 1e-3  # m, radius of what stands for a place
+POINT = 1e-3  # m, radius of the sphere that represents a point
 SHELL, FAR = 0.02, 0.5  # m
-MET = 1e-4  # m from the place: on it
-STARTS = 23  # random ones
+MET = 1e-4  # m: a smaller distance counts as 0
+STARTS = 23  # random start postures
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +36,9 @@ class Nearest:
 def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
     """Return the posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
 
-    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`: nothing keeps it from
-    touching, and what it finds is the nearest with all but certainty.  Raises InvalidValue if the part does not move the marker, or
-    for what is no place or no q.
+    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`. Contacts are ignored.
+    The posture is the nearest one with high probability, not with certainty.  Raises InvalidValue if the part does not move the marker,
+    or if position or q is not valid.
     """
     motors = [model.robot.motors[motor] for motor in _movers(model, part, marker)]
     problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)

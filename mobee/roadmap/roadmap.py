@@ -104,7 +104,7 @@ class Roadmap:
         return f"Roadmap({len(self.q)} poses, {len(self.edges)} edges, {self.model.robot.name!r}: {', '.join(self.names)})"
 
     def save(self, path: str | Path) -> None:
-        """Write the roadmap to a .npz file, whole or not at all; raises MobeeError."""
+        """Write the roadmap to a .npz file, completely or not at all; raises MobeeError."""
         model = self.model
         write(
             path,

@@ -21,7 +21,7 @@ SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A robot, the prefix of its names ("" for none), and its root frame in the common one."""
+    """A robot, the prefix of its names ("" for none), and the pose of its root frame in the common root frame."""
 
     prefix: str
     robot: Robot
@@ -87,7 +87,7 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
 
 
 def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
-    """Return a robot with its new names and place; its links come after `joints` others, its motors after `motors` of `all_motors`."""
+    """Return a robot with its new names, indices and pose; `joints`, `motors`: of the robots before it; `all_motors`: of all robots."""
     robot, turn = one.robot, one.rotation
 
     def link(index: int) -> int:

@@ -29,11 +29,11 @@ def load_robot(
 
     Args:
         name_or_path: a shipped name, or the path of a file.
-        field: URDF only: gives every solid a field that extends it by so many m; None: no fields.
+        field: URDF only: distance [m] by which fields extend beyond the solids, one field for every solid; None: no fields.
         meshes: URDF only: "hull" (the default) or "bounding", see `UrdfOptions`.
         corners: URDF only: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
-        srdf: URDF only: the SRDF file; None: the one that is found, see docs/robots.md.
-        home: URDF only: a <group_state> of the SRDF, or "zero".
+        srdf: URDF only: the SRDF file; None: one beside the URDF or in ../srdf, if there is any, see docs/robots.md.
+        home: URDF only: the name of a <group_state> of the SRDF, or "zero"; None: see docs/robots.md.
 
     Raises:
         UnknownName: with the nearest shipped name.

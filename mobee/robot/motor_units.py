@@ -27,14 +27,14 @@ def slides(robot: Robot, motor: Motor) -> bool:
 
 
 def angle_unit(limits: Array, sliding: bool) -> float:
-    """Return what 1 rad of the law is in the unit of a motor with these limits (2,): 1 if it turns, in m if it slides."""
+    """Return the motion that counts as 1 rad in the law: 1 rad for a motor that turns, a length [m] for a slide with limits (2,)."""
     span = float(limits[1] - limits[0])
     return span / SLIDE_RANGE if sliding and 0.0 < span < np.inf else 1.0
 
 
 @per_robot
 def motor_units(robot: Robot) -> Array:
-    """Return what 1 rad of the law is in the unit of each motor, (n,): 1 for motors that turn, see `angle_unit`."""
+    """Return the motion of each motor that counts as 1 rad in the law, (n,): 1 rad for motors that turn, see `angle_unit`."""
     units = np.array([angle_unit(motor.limits, slides(robot, motor)) for motor in robot.motor_table])
     units.flags.writeable = False
     return units
@@ -42,7 +42,7 @@ def motor_units(robot: Robot) -> Array:
 
 @per_robot
 def fine_units(robot: Robot) -> Array:
-    """Return what 1 rad of a threshold of rest, of play or of noise is in the unit of each motor, (n,): 1 for motors that turn."""
+    """Return the motion of each motor that counts as 1 rad in thresholds of rest, play and noise, (n,): 1 rad for motors that turn."""
     units = np.array(
         [unit * (FINE if slides(robot, motor) else 1.0) for unit, motor in zip(motor_units(robot), robot.motor_table, strict=True)]
     )

@@ -45,7 +45,7 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
 def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
     """Return the joints of each cluster; a joint joins the cluster of the first joint near it that carries it or is beside it."""
     points = np.array([joint.point for joint in joints]).reshape(-1, 3)
-    beside: dict[int, list[int]] = {}  # link -> joints that it carries
+    beside: dict[int, list[int]] = {}  # link -> its joints
     home: list[int] = []  # joint -> its cluster
     clusters: list[list[int]] = []
     for index, joint in enumerate(joints):
@@ -62,7 +62,7 @@ def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
 
 
 def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPair, str]:
-    """Return pairs of links of one noSelfCollision subtree; `subtree`: that of each link, -1 for none; `names`: of the subtrees."""
+    """Return the pairs of links inside one noSelfCollision subtree; `subtree`: of each link, -1 if none; `names`: of the subtrees."""
     members: dict[int, list[int]] = {}
     for link, start in enumerate(subtree):
         if start != -1:
@@ -106,7 +106,7 @@ def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
 
 
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
-    """Return pairs of shapes of one role, (p, 2), sorted: each robot's own, and all of different robots unless both are on the base.
+    """Return tested pairs of one role, (p, 2), sorted: each robot's own, and all between two robots unless both shapes are on the base.
 
     `starts`: the index of each robot's first shape.
     """
@@ -128,6 +128,6 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 
 
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
-    """Return the reasons of all robots, without those for pairs with the common base that are tested now."""
+    """Return the excluded pairs of links of all robots, with reasons, without pairs with the common base that are now tested."""
     tested = link_pairs(shapes, *pairs)
     return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

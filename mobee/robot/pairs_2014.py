@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tested pairs as in the program published in 2014, and as in our recorded reading of it.
+"""Tested pairs by the rule of the program published in 2014, and by an earlier interpretation of that rule.
 
 Both rules work on the elements <link> and <joint> of a file, and find neighbours by descents of the tree: below every element, and
 below those beside it. Fields of neighbours are not tested against each other; their solids are not if both are of one part, or one
 carries the other, or both hang on the same element.
 
 adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs): a descent ends when a link
-under a joint and a joint under a link that bear a solid have been passed, but goes on past elements of the kind that it began with.
+under a joint and a joint under a link that bear a solid have been passed, but continues past elements of the tag with which it began.
 
-adjacency="recorded_2014" is an earlier reading, with which the results of this project on icub_2014 were recorded: a descent ends when
+adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014: a descent ends when
 one link and one joint that bear a shape of the role in question have been passed. With it no field of icub_2014 touches another at
 home; by the rule of the program the forearm's field is 3 mm deep in that of the thumb.
 """
@@ -40,7 +40,7 @@ class Element:
 
 
 def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, rule: Rule) -> Ints:
-    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `hosts`: the element of each shape."""
+    """Return the tested pairs of shapes of one role, (p, 2), indices in `shapes`; `hosts`: the element of each shape."""
     chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
     near = _near(elements, hosts, shapes, role, rule)
     pairs = [(i, j) for i, j in combinations(chosen, 2) if not _reason(elements, hosts[i], hosts[j], role, near)]
@@ -48,7 +48,7 @@ def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: S
 
 
 def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], rule: Rule) -> dict[LinkPair, str]:
-    """Pairs of links that are never tested, and why: the rule for solids holds for every element of the one and of the other.
+    """Return the pairs of links that are never tested, with reasons: those for which the rule for solids excludes all pairs of elements.
 
     The elements of a link are those that bear a solid or, if there is none, all of them.
     """
@@ -74,12 +74,12 @@ def _near(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Sh
 
 
 def _bearing(hosts: Sequence[int], shapes: Sequence[Shape], role: str) -> set[int]:
-    """The elements that bear a shape of a role."""
+    """Return the elements that bear a shape of a role."""
     return {host for host, shape in zip(hosts, shapes, strict=True) if shape.role == role}
 
 
 def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collection[frozenset[int]]) -> str:
-    """Why shapes of two elements are not tested against each other; empty if they are."""
+    """Return the reason why shapes of two elements are not tested against each other; empty if they are tested."""
     a, b = elements[i], elements[j]
     if i == j:
         return "same element"
@@ -92,7 +92,7 @@ def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collec
 
 
 def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Pairs of elements that meet on a descent; `bearing`: the elements that bear a solid. Element 0 is the root of the file."""
+    """Return the pairs of elements that meet on a descent; `bearing`: the elements with a solid. Element 0 is the root of the file."""
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
         children.setdefault(element.parent, []).append(index)
@@ -113,7 +113,7 @@ def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[fro
 def _passed(
     elements: Sequence[Element], here: int, start: int, bearing: Collection[int], link: bool, joint: bool
 ) -> tuple[bool, bool] | None:
-    """Return whether the search down the tree has passed a link and a joint when it leaves an element; None where it ends before it."""
+    """Return whether the search down the tree has passed a link and a joint when it leaves an element; None if it ends before it."""
     element, carrier = elements[here], elements[here].parent
     if carrier <= 0 or carrier == elements[start].parent:
         return link, joint
@@ -127,7 +127,7 @@ def _passed(
 
 
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Return the pairs of elements between which the recorded reading counts no contacts: neighbours in the tree.
+    """Return the pairs of neighbours in the tree, between which the rule "recorded_2014" tests no contacts.
 
     From each element and from each of its siblings it goes down the tree, and ends a branch behind the first link and the first joint
     that have a shape.  `bearing`: the elements that have a shape of the role.
@@ -157,10 +157,11 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
 
 
 def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
-    """Whether the program of 2014 took an element for the base, which is never tested against the world (KinTreeNode::isNearRoot).
+    """Return whether an element counts as the base in the program of 2014 (KinTreeNode::isNearRoot); the base ignores the world.
 
-    It climbs from the element until a change from link to joint and one from joint to link are behind it, and on past elements of its own
-    kind; what comes to the root so is near it. `parents`: -1 for the first elements of the tree; `tags`: "link" or "joint".
+    The search climbs from the element over one change from link to joint and one from joint to link, and then over elements with the
+    element's own tag; an element is near the root if this search arrives there. `parents`: -1 for the first elements of the tree;
+    `tags`: "link" or "joint".
     """
     here, link, joint = index, False, False
     while parents[here] >= 0:

@@ -23,7 +23,7 @@ T = TypeVar("T")
 class Joint:
     """An axis of the tree, given in the root frame with every joint at zero (thesis 2.3.1).
 
-    `parent` is the index of the link that it is mounted on; joint j moves link j + 1.
+    `parent`: index of the link on which the joint is mounted. Joint j moves link j + 1.
     """
 
     name: str
@@ -36,9 +36,9 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motor:
-    """A motor, which commands set: it drives one or more joints affinely, joint = scale * motor + offset.
+    """A motor, the unit of command: it drives one or more joints affinely, joint = scale * motor + offset.
 
-    Its unit is rad. For a motor that drives a prismatic joint with scale 1, as from a URDF, it is m: read m for rad and N for N m.
+    Positions are in rad. For a motor that drives a prismatic joint with scale 1, as in a URDF, they are in m, and torques are forces in N.
     `zone_ends_at_home`: where the limit zone of the control law would include home, the zone ends at home instead, so that the robot
     rests there. It is set for motors of a URDF; a motor of a zero-position file is pushed away from such a home.
     """
@@ -73,7 +73,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """A volume on a link: a solid, or a larger field, which only generates force.
+    """A volume on a link: a solid, or a field, a larger volume that is not solid but causes a repulsive force.
 
     `size` in m: sphere (r,); capsule and cylinder (r, height along local z; a capsule's caps are beyond it); box (x, y, z), full
     edges; convex (): the hull of `vertices`. `position`, `rotation`: in the root frame, at zero pose.
@@ -113,9 +113,9 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clause:
-    """A condition on motor positions: at least one of its linear rows holds, a.q + b > 0 (thesis eqs. 5.14 to 5.17).
+    """A condition on motor positions: a.q + b > 0 must hold for at least one of its rows (thesis eqs. 5.14 to 5.17).
 
-    All clauses of a robot should hold. Of the file's degrees only b is converted to rad; a is unchanged.
+    All clauses of a robot should hold. b is converted from the file's degrees to rad; a is as in the file.
     """
 
     part: str
@@ -137,10 +137,10 @@ class Robot:
         shapes: solids and fields of all links.
         clauses: conditions on motor positions, all of which should hold.
         field_pairs, solid_pairs: (p, 2) indices into `shapes`: the pairs that are tested for contacts.
-        base_shapes: indices of shapes that are never tested against world objects, since they stand on them.
+        base_shapes: indices of shapes that are never tested against world objects, since the robot stands on these.
         untested: for every pair of links that is never tested, the reason.
         where: file and line of every element, as {("joint", name): "file:line"}.
-        bodies: masses, at most one for each link, in the order of the links; () where the file names none.
+        bodies: masses, at most one for each link, in the order of the links; () if the file has none.
     """
 
     name: str

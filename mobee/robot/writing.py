@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by the writers of robot files: which motor drives each joint, and numbers as text without loss of precision."""
+"""Functions of the writers of robot files: the motor of each joint, and numbers as text without loss of precision."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def numbers(values: Iterable[float]) -> str:
 
 
 def degrees(radians: float) -> str:
-    """Return an angle as text in degrees, rounded where that reads back as exactly the same radians."""
+    """Return an angle [rad] as text in degrees, rounded if the rounded text is read as exactly the same angle."""
     exact = float(np.rad2deg(radians))
     rounded = round(exact, 9)
     return number(rounded if np.deg2rad(rounded) == radians else exact)

@@ -108,7 +108,7 @@ def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | N
     how many run at once; None: one for each core; 1: in this process.  Exceptions of `work` are raised here.
     """
     if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
-        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one a core.")
+        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")
     given = list(seeds)
     count = min(processes or _cores(), len(given))
     if count <= 1:

@@ -94,7 +94,7 @@ class Braking:
         self._core = core.calls()
 
     def to_velocity(self, wanted: Array, q: Array) -> None:
-        """Approach the wanted velocities from q, no faster than the motors can brake before their position limits."""
+        """Change the velocities towards the wanted ones, no faster than the motors at q can brake before their position limits."""
         self._core.to_velocity(self._here, numbers(wanted, self._count), numbers(q, self._count))
 
     def to_position(self, wanted: Array) -> None:
@@ -102,7 +102,10 @@ class Braking:
         self._core.to_position(self._here, numbers(wanted, self._count), self._at)
 
     def runs_out(self, q: Array, moving: Array) -> bool:
-        """Whether a motor with these velocities, rad/s, can no longer stop before its position limit, by one tick of braking."""
+        """Return whether a motor at q, rad, with a velocity `moving`, rad/s, can no longer stop before its position limit.
+
+        A velocity that is too high by less than the change of one tick does not count.
+        """
         return bool(self._core.runs_out(self._here, numbers(q, self._count), numbers(moving, self._count)))
 
 
@@ -116,7 +119,7 @@ _HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 class Motors:
     """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
 
-    Either `move`, or in each substep `drive` and `adopt`: a physics engine then computes the joint side.
+    Call either `move`, or in each substep `drive` and then `adopt`, between which a physics engine computes the joint side.
     """
 
     def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
@@ -190,7 +193,7 @@ class Motors:
 
     @property
     def in_torque(self) -> NDArray[np.bool_]:
-        """Which motors are in torque mode."""
+        """Whether each motor is in torque mode, (n,)."""
         found: NDArray[np.bool_] = self.state["mode"] == _TORQUE
         return found
 
@@ -243,7 +246,7 @@ class Motors:
     def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
         """Return the joint positions [rad] at tick k with white noise whose density does not depend on the tick's length dt [s].
 
-        The noise is a function of seed, tick and motor alone.
+        The noise depends only on the seed, the tick and the motor.
         """
         noisy = self.q
         self._core.read(self.address, k, self.noise(dt).tobytes(), address(noisy))
@@ -276,7 +279,7 @@ class Motors:
 
 
 def _constants(robot: Robot, parameters: MotorParameters) -> Table:
-    """Return the constants of each motor, one row a motor."""
+    """Return the constants of each motor, one row per motor."""
     table: Table = np.zeros(len(robot.motor_table), dtype=core.CONSTANTS)
     table["low"], table["high"] = robot.limits.T
     for name in ("max_velocity", "max_acceleration", "max_torque"):

@@ -45,7 +45,7 @@ class PlantSettings(Settings):
         dt: s, the control tick.
         propagate: which motors a contact force acts on: those of the whole chain, "tree", or of the touching part alone, "part".
         modality: of the commands: "velocity", "position" or "torque".
-        speed_scale: share of the motors' speed that is used, above 0 to 1.
+        speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
         contact_forces: False: f_coll is zero.
         active: names or patterns of parts and motors that move; the others are rigid at home, without noise, and take no time; None: all.
         command_age: ticks between reading the encoders and moving by the command computed from them; 1 as live.
@@ -84,8 +84,8 @@ class OfflinePlant:
         model: the robot in its world.
         seed: of the encoders' noise, a whole number, 0 or more.
         gains: see `PlantSettings`; None: as in `settings`.
-        motors: likewise.
-        dt: likewise.
+        motors: see `PlantSettings`; None: as in `settings`.
+        dt: s, the control tick; None: as in `settings`.
         settings: None: the defaults.
         **changes: fields of `PlantSettings` by keyword, in place of those in `settings`.
 
@@ -138,7 +138,7 @@ class OfflinePlant:
 
     @property
     def time(self) -> float:
-        """Plant time, s."""
+        """The plant's clock: simulated time since its creation, s."""
         return self._ticks * self.dt
 
     @property
@@ -160,7 +160,7 @@ class OfflinePlant:
 
     @property
     def may_edit(self) -> bool:
-        """Whether its ticks may edit the world or change who reaches in it: a reach is under way, or a function is called meanwhile."""
+        """Whether ticks may edit the world or the reaching markers: a reach is under way, or a callback of `every` is set."""
         return bool(self._reaches.running) or self._callback is not None
 
     @property
@@ -178,11 +178,11 @@ class OfflinePlant:
 
     @property
     def q(self) -> Array:
-        """Positions of all motors by the encoders at the last tick, shape (n,), in [rad]."""
+        """The encoder values of all motors at the last tick, shape (n,), in [rad]."""
         return self._q.copy()
 
     def measure(self, part: str) -> Array:
-        """Return the positions of the part's motors by the encoders at the last tick, shape (n_part,), in [rad]."""
+        """Return the encoder values of the part's motors at the last tick, shape (n_part,), in [rad]."""
         return self._q[self.robot.part(part).slice].copy()
 
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
@@ -214,7 +214,7 @@ class OfflinePlant:
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Draw the marker to the presented target until the part has settled or timed out, then end the force: see `ReachPlant`.
 
-        Raises InvalidValue as `act` does too.
+        Raises InvalidValue also while another part is acting.
         """
         self._require_alone(part, "reach")
         self.begin_reach(part, marker, stay)
@@ -231,7 +231,7 @@ class OfflinePlant:
         return self._reaches.outcome(part)
 
     def follow(self) -> None:
-        """Give the world the pose of the last tick, for objects that are attached or detached from now on; every action ends with it."""
+        """Pass the pose of the last tick to the world, which needs it to attach and detach objects; called at the end of every action."""
         self.model.world.follow(self.model.evaluate(self._q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
@@ -329,7 +329,7 @@ class OfflinePlant:
         return self._actions.outcome(part, self._q, self.time - self.dt, self._touched(part))
 
     def _touched(self, part: str) -> tuple[str, ...]:
-        """Return the world objects in contact with the part, as `touched_by` of the pose, without computing self-contacts."""
+        """Return what `touched_by` returns for the part in the present pose, without computing self-contacts."""
         snapshot = self.model.world.snapshot
         if not snapshot.names:
             return ()

@@ -18,7 +18,7 @@ from mobee.robot.robot import Joint, Motor, Robot, per_robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the motors that match names or patterns of parts and motors; None: all."""
+    """Return a mask (n,) of the motors that match `active`: names or patterns of parts and motors; None: all."""
     if active is None:
         return np.ones(len(robot.motors), dtype=bool)
     alive = np.zeros(len(robot.motors), dtype=bool)

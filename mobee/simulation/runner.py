@@ -32,7 +32,7 @@ Work = Generator[int, None, T]
 
 
 def finished(work: Work[T]) -> T:
-    """Do a plant's work alone, and return its result."""
+    """Run the work of one plant to its end, and return its result."""
     run = core.calls().run
     try:
         while True:
@@ -46,7 +46,7 @@ def finished(work: Work[T]) -> T:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """One row a tick: encoders, positions of the joints, velocities, and depths of contacts."""
+    """The record of a run, one row per tick: encoders, positions of the joints, velocities, and depths of contacts."""
 
     encoders: Array  # (ticks, n) rad
     q: Array  # (ticks, n) rad, joint sides

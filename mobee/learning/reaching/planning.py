@@ -21,7 +21,7 @@ class ReachPlanning:
     Args:
         space: states and transitions.
         beliefs: outcomes of the transitions.
-        discount: factor a step, in [0, 1).
+        discount: factor per step, in [0, 1).
     """
 
     def __init__(self, space: Space, beliefs: OutcomeModel, discount: float) -> None:

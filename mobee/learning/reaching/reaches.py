@@ -17,7 +17,7 @@ SCALE = 0.01  # m, unit of distances in the published equations; the thesis leav
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reaches:
-    """The reach actions of a space, one a state.
+    """The reach actions of a space, one for each state.
 
     `samples`: (S, d) rad, poses of the joints at which the reaches begin.  `hands`: (S, 3) m, root frame, positions of the marker in
     them.  `scale`: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.  `jacobians`: (S, 3, d) m/rad, of the marker's
@@ -33,7 +33,7 @@ class Reaches:
         """Check; raises InvalidValue."""
         if self.samples.ndim != 2 or self.hands.shape != (len(self.samples), 3):
             raise InvalidValue(
-                f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row a state."
+                f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row per state."
             )
         shape = len(self.samples), 3, self.samples.shape[1]
         if self.jacobians is not None and not (self.jacobians.shape == shape and np.isfinite(self.jacobians).all()):

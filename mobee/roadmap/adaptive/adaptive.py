@@ -31,7 +31,7 @@ class AdaptiveRoadmap:
             or `mobee.roadmap_space(roadmap)`.
         mode: how a failed edge is treated, "remove" (thesis) or "reweigh"; see `EdgeBeliefs`.
         forgetting: see `EdgeBeliefs`.
-        both_ways: whether an observation of an edge also counts for the opposite direction.
+        both_ways: whether an observation of an edge also counts for the edge in the opposite direction.
 
     Raises:
         InvalidValue, UnknownName: an argument is not valid; the message says what is.
@@ -67,7 +67,7 @@ class AdaptiveRoadmap:
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Which edges ended at their goal when they were last tried, shape (S, A)."""
+        """Whether each edge ended at its goal when it was last tried, shape (S, A)."""
         return (self.beliefs.tried > 0) & self.beliefs.last
 
     @property
@@ -115,9 +115,9 @@ class AdaptiveRoadmap:
         return found
 
     def reward(self, goals: ArrayLike) -> Array:
-        """Return the reward (S, A) with which value iteration finds the paths of `plan`: minus the length of an edge.
+        """Return the reward (S, A) for which value iteration finds the paths of `plan`: minus the length of each edge.
 
-        It is -inf for edges that are removed, lead nowhere, or begin in a goal.
+        It is -inf for edges that are removed, that do not exist, or that begin in a goal.
         """
         left = self.costs(goals)
         usable = np.isfinite(self._edge_costs()) & np.isfinite(left)[self.space.goals] & np.isfinite(left)[:, None]
@@ -125,7 +125,7 @@ class AdaptiveRoadmap:
         return np.where(usable, -self.lengths, -np.inf)
 
     def reachable(self, start: int) -> NDArray[np.bool_]:
-        """Return which vertices can be reached from one, itself included, (S,) bool."""
+        """Return whether each vertex can be reached from `start`, (S,); True for `start` itself."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import breadth_first_order
 
@@ -145,7 +145,7 @@ class AdaptiveRoadmap:
         return int(rng.choice(len(self), p=untried / total)) if total else None
 
     def observe(self, state: int, action: int, arrived: int) -> None:
-        """Observe that an edge, begun in a state, ended at vertex `arrived`: at its goal, or elsewhere."""
+        """Record that a motion along an edge, from vertex `state`, ended at vertex `arrived`: its goal, or another one."""
         goal = self.space.goal(state, action)
         self.beliefs.observe(state, action, arrived == goal)
         back = self.action(goal, state) if self.both_ways else None
@@ -184,7 +184,7 @@ class AdaptiveRoadmap:
         return np.arange(old, old + len(new))
 
     def prune(self, start: int) -> Ints:
-        """Remove the vertices that cannot be reached from one, and failed edges of vertices that have others.
+        """Remove the vertices that cannot be reached from `start`, and the failed edges of vertices that have other edges.
 
         A vertex always keeps an edge, if necessary a new one to the nearest vertex.  Returns the new number of every
         vertex, -1 for removed ones, shape (S,).

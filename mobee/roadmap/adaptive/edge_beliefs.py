@@ -17,11 +17,11 @@ from mobee.roadmap.roadmap import Roadmap
 
 Mode = Literal["remove", "reweigh"]
 MODES = ("remove", "reweigh")
-PRIOR = (0.2, 0.01)  # successes and failures that every edge is imagined to have had: optimistic, and soon outweighed
+PRIOR = (0.2, 0.01)  # imagined successes and failures of every edge: optimistic, and small compared with real observations
 
 
 class EdgeBeliefs:
-    """An `OutcomeModel` of two outcomes: the goal of an edge, with probability p, or else the vertex where it began.
+    """An `OutcomeModel` with two outcomes of an edge: its goal, with probability p, or else the vertex where it began.
 
     "remove": a failed edge is excluded until it succeeds (thesis).  "reweigh": p is the mean of a Beta distribution over
     weighted counts; each observation of any edge lowers the weight of all counts, so that old failures are forgotten.
@@ -60,7 +60,7 @@ class EdgeBeliefs:
 
     @property
     def outcomes(self) -> Ints:
-        """The goal of an edge and where it began, shape (S, A, 2)."""
+        """The two outcomes of each edge, shape (S, A, 2): its goal, and the vertex where it began."""
         began = np.broadcast_to(np.arange(len(self.goals))[:, None], self.goals.shape)
         return np.stack([np.where(self.goals == NO_ACTION, began, self.goals), began], axis=-1)
 
@@ -71,7 +71,7 @@ class EdgeBeliefs:
         return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
 
     def observe(self, state: int, action: int, arrived: bool) -> None:
-        """Observe the outcome of an edge."""
+        """Count an outcome of an edge; `arrived`: whether it ended at its goal."""
         if self.forgetting < 1.0:
             self.worked *= self.forgetting
             self.failed *= self.forgetting
@@ -81,21 +81,21 @@ class EdgeBeliefs:
         self.last[state, action] = arrived
 
     def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
-        """Return these beliefs in a new table of goals; its entries (states, actions) are the entries `before` of this table."""
+        """Return these beliefs for a new table of goals, whose entries (states, actions) were the entries `before` of the old table."""
         found = EdgeBeliefs(goals, self.mode, self.forgetting)
         for name in ("worked", "failed", "tried", "last"):
             getattr(found, name)[states, actions] = getattr(self, name)[before]
         return found
 
 
-DECIMALS = 9  # rad: poses that agree to here are one
+DECIMALS = 9  # of rad: poses that are equal to this precision are one
 
 
 def roadmap_space(roadmap: Roadmap, joints: Sequence[str] | None = None) -> Space:
     """Return a space whose states are a roadmap's poses and whose actions are its edges, in both directions.
 
     States are the vertices of the map's largest connected part, in their order; other parts cannot be reached from it.
-    Vertices that differ only in motors other than the joints are one state.  The part's other motors stay where the map has them.
+    Vertices that differ only in motors other than the joints are one state.  The part's other motors keep their position in the map.
 
     Args:
         roadmap: e.g. of `mobee.build_roadmap`.

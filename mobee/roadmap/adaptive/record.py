@@ -22,7 +22,7 @@ CREATE TABLE IF NOT EXISTS map_changes (
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change of a map: `what`, the method of AdaptiveRoadmap; `given`, its arguments as plain JSON values; after `n` transitions."""
+    """A change of a map after `n` transitions; `what`: the method of AdaptiveRoadmap; `given`: its arguments as plain JSON values."""
 
     n: int
     what: str
@@ -33,7 +33,7 @@ class MapStore(TransitionStore):
     """A TransitionStore that also records the changes of a map between transitions.
 
     Args:
-        path, agent, read_only: of the AgentFile, which says too what is raised.
+        path, agent, read_only: see `AgentFile`, also for the errors.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:

@@ -16,7 +16,7 @@ from mobee.plant import Outcome, Plant
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
 from mobee.roadmap.adaptive.record import MapRecord, MapStore
 
-NEAR = 0.15  # rad: the part is at a vertex if every joint is within this distance of it
+NEAR = 0.15  # rad: the part is at a vertex if the distance of every joint from the vertex is at most this
 DOORS = 5  # number of nearest vertices that are tried if the part is off the map
 TRAIL = 50  # number of vertices visited last that are tried first
 
@@ -60,7 +60,7 @@ class Walker:
         self.near, self.back = near, back
         self.here: int | None = None
         """The vertex where the part is; None: off the map, or not known."""
-        self._trail: list[int] = []  # the vertices where it was, the last at the end
+        self._trail: list[int] = []  # the vertices visited, the last one at the end
         self.record = MapRecord(roadmap, store, self.settings)
         """Record of observations and changes; every change goes through it, and sets `here` to None if vertices may be renumbered."""
 
@@ -72,7 +72,7 @@ class Walker:
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
         """Move to one of the goals over at most `most` edges (None: no limit), with a new plan after each edge that fails.
 
-        Raises MobeeError if no path is left, ActionInterrupted if the plant does.
+        Raises MobeeError if there is no path, ActionInterrupted if the plant interrupts an action.
         """
         targets = set(target_states(self.roadmap.space, goals).tolist())
         edges, bumps = 0, 0
@@ -103,7 +103,7 @@ class Walker:
     def enter(self) -> int:
         """Return the vertex of the part; if it is off the map, move to the last vertex, or else to the nearest ones, until one is reached.
 
-        Raises MobeeError if it comes to none.
+        Raises MobeeError if none is reached.
         """
         if self.here is None:
             q = self.plant.measure(self.part)

@@ -49,7 +49,7 @@ def digest(requested: Mapping[str, Any]) -> str:
 
 
 def _meaning(problem: Problem, task: Task) -> str:
-    """Return 16 hex digits of the values of costs and coordinates in some poses: functions can be compared only by their values."""
+    """Return 16 hex digits of the values of costs and coordinates in a few poses, since functions can only be compared by values."""
     low, high = problem.limits.T
     drawn = np.random.default_rng(0).uniform(low, high, (_PROBES, len(low)))
     pose = problem.model.evaluate(np.concatenate([problem.start[None], problem.whole(drawn)]))
@@ -75,7 +75,7 @@ class Progress:
 
 
 class Builder(Protocol):
-    """Finds vertices step by step; equal states, generators and numbers of evaluations lead to equal steps."""
+    """A builder finds vertices step by step; equal states, generators and numbers of evaluations give equal steps."""
 
     rng: np.random.Generator
     problem: Problem
@@ -122,7 +122,7 @@ class Checkpoint:
         return load_roadmap(self._file, self._model)
 
     def run(self, name: str, builder: Builder) -> None:
-        """Take all steps of a builder, from the state in the file if this was written in the stage of that name."""
+        """Run all steps of a builder; it continues from the state in the file if this was written in the stage `name`."""
         if self._found is not None and self.stage == name:
             arrays, notes = self._found
             state = {key.removeprefix(_PREFIX): value for key, value in arrays.items() if key.startswith(_PREFIX)}

@@ -45,7 +45,7 @@ MANY_DIRECTIONS = 128  # in higher dimensions
 
 
 def directions(dimensions: int) -> Array:
-    """Return unit vectors (D, dimensions): both in 1-D, a circle in 2-D, a spiral over the sphere in 3-D, random opposite pairs above."""
+    """Return unit vectors (D, dimensions): +-1 in 1-D, a circle in 2-D, a spiral over the sphere in 3-D, else random opposite pairs."""
     count = DIRECTIONS.get(dimensions, MANY_DIRECTIONS)
     if dimensions == 1:
         return np.array([[1.0], [-1.0]])
@@ -88,7 +88,7 @@ class SimplexRegion:
         return inverse
 
     def covers(self, points: Array) -> Flags:
-        """Return which of the points (N, m), all near each other, are inside some simplex, (N,) bool."""
+        """Return whether each of the points (N, m), all near each other, is inside a simplex, (N,)."""
         covered: Flags = np.zeros(len(points), dtype=bool)
         if not len(self._origins) or not len(points):
             return covered
@@ -144,7 +144,7 @@ class Frontier:
 
     @property
     def free(self) -> Flags:
-        """Which of `directions` are free at each vertex, (V, D)."""
+        """Whether each of the `directions` is free at each vertex, (V, D)."""
         return self._free.rows
 
     @property
@@ -161,7 +161,7 @@ class Frontier:
         return order, np.sqrt(squares[order])
 
     def accepts(self, point: Array) -> bool:
-        """Return whether a vertex may be added at a point (m,): in the box, not covered, and neither too near nor too far from others."""
+        """Return whether a vertex may be added at a point (m,): in the box, not covered, neither too near to others nor too far away."""
         if not ((point >= self.low).all() and (point <= self.high).all()):
             return False
         if not len(self):

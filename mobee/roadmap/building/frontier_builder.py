@@ -30,7 +30,7 @@ BATCH = 80  # poses per call of the model; fixed, so that results do not depend 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluatedPoses:
-    """N poses: cost (N,), which meet all terms inside the box (N,), and points in the task space in spacings (N, m)."""
+    """N poses: `cost` (N,); `valid` (N,): all terms met, inside the box; `point` (N, m): in the task space, in spacings."""
 
     cost: Array
     valid: NDArray[np.bool_]
@@ -86,7 +86,7 @@ class PoseEvaluator:
 
 
 def scaled_cost(term: Term, residual: Array) -> Array:
-    """Return the cost of a term's residuals: (residual / tolerance)^2; for tolerance 0 a step of 1 and a slope; without one, the weight."""
+    """Return the cost of residuals: (residual / tolerance)^2; for tolerance 0, a step of 1 and a slope; without one, weight * residual."""
     if term.tolerance is None:
         return term.weight * residual
     if term.tolerance == 0.0:
@@ -167,7 +167,7 @@ class FrontierBuilder:
         return True
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return all that `restore` needs except the generator, with the vertices' poses "q" and task coordinates "y"."""
+        """Return the state for `restore`, without the generator, with the vertices' poses "q" and task coordinates "y"."""
         q, y = self.result()
         known = {"q": q, "y": y, "postures": self._postures.rows, "places": self.frontier.points, "weights": self.frontier.weights}
         return self.scheduler.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}
@@ -189,7 +189,7 @@ class FrontierBuilder:
         return self.problem.whole(np.minimum(self._low + postures * (self._high - self._low), self._high))
 
     def _spacing_cost(self, which: Ints, points: Array) -> tuple[Array, Flags]:
-        """Return eq. 3.6 and the cost of the aims at points (k, population, m), and which points keep their distance to near vertices."""
+        """Return the cost of eq. 3.6 and of the aims at points (k, population, m), and whether each keeps its distance to all vertices."""
         n = min(self.frontier.dimensions, len(self.frontier))
         squares = ((points[:, :, None] - self.scheduler.near[which, None]) ** 2).sum(axis=-1)
         nearest = np.sqrt(np.sort(np.partition(squares, n - 1, axis=-1)[..., :n], axis=-1))

@@ -23,7 +23,7 @@ _ROUNDING = 1e-9  # spacings
 
 
 class Lattice:
-    """The points in a box (m, 2) whose nearest neighbours are a spacing (m,) away; one is the middle of the box.
+    """The points of a lattice in a box (m, 2), one spacing (m,) apart from their neighbours; one point is the middle of the box.
 
     Intermediate points, half-way between lattice points, fill the gaps that the lattice leaves at the border of the reachable region.
     """
@@ -78,9 +78,9 @@ class Lattice:
 
 
 def _lattice_edges(dimensions: int) -> Array:
-    """Return the edges of the lattice (m, m), a row each, of length 1: hexagonal in 2-D, face-centred cubic in 3-D, else cubic.
+    """Return the edges of the lattice (m, m), one per row, of length 1: hexagonal in 2-D, face-centred cubic in 3-D, else cubic.
 
-    The first two leave the smallest holes for their number of points.
+    Among lattices with the same number of points, the first two have the smallest gaps.
     """
     if dimensions == 2:
         return np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
@@ -99,7 +99,7 @@ def _offsets(dimensions: int) -> Ints:
 
 @dataclass(slots=True, eq=False)
 class FailedPoint:
-    """A point that was not reached so far: its least bad posture (n,), the violation of this, the number of tries that are left."""
+    """A point that was not reached so far: its best posture (n,), the violation of that posture, and the number of tries left."""
 
     q: Array
     violation: float
@@ -201,7 +201,7 @@ def lattice_poses(
 ) -> tuple[Array, Array]:
     """Return poses q (V, n) and their task coordinates y (V, m), one for every reachable point of a lattice of that spacing (m,).
 
-    Every pose is within all tolerances and in the task's box, its y within MAX_DEVIATION spacings of its point.  V is 0 if no first
+    Every pose is within all tolerances and in the task's box; its y is within MAX_DEVIATION spacings of its point.  V is 0 if no first
     pose is found.  `progress` is called with the number of vertices.
 
     Raises:
@@ -276,7 +276,7 @@ class LatticeBuilder:
         return True
 
     def _retry_failed(self) -> bool:
-        """Try every failed point from starts around its least bad posture; return whether there was any left to try."""
+        """Try every failed point from starts around its best posture; return whether any was left to try."""
         points = [point for point, failed in self._table.failed.items() if failed.left > 0]
         if not points:
             return False

@@ -32,7 +32,7 @@ class SearchScheduler:
     """Starts and ends L simultaneous searches.
 
     `vertex` (L,): the start vertex of each search, IDLE, or FIRST for a search for the first pose.  `aim` (L, m): the point that it aims
-    at, in spacings; NaN without an aim.  `near` (L, K, m): the vertices nearest to this point; infinite where there are fewer.
+    at, in spacings; NaN without an aim.  `near` (L, K, m): the vertices nearest to that aim; infinite where there are fewer.
     """
 
     def __init__(
@@ -61,12 +61,12 @@ class SearchScheduler:
         return not len(self._frontier) and self._begun >= MAX_FIRST_SEARCHES and not (self.vertex == FIRST).any()
 
     def expandable(self) -> Flags:
-        """Return from which vertices a search may start, (V,) bool."""
+        """Return whether a search may start from each vertex, (V,)."""
         able: Flags = self._frontier.weights > 0.0
         return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
 
     def refill(self) -> None:
-        """Start as many searches as there is room for, at the vertex of the largest weight first, the oldest of equal ones."""
+        """Start new searches until L are running: first at the vertex with the largest weight, the oldest one among equals."""
         room = np.flatnonzero(self.vertex == IDLE).tolist()
         if not len(self._frontier):
             self._begin_first(room)
@@ -85,7 +85,7 @@ class SearchScheduler:
                 busy.append(self._centre(room.pop(0)))
 
     def end_successful(self, number: int, point: Array, simplex: Array | None) -> None:
-        """End a search that has found a vertex (m,) with its simplex, and those searches whose aims are now taken, without blame."""
+        """End a search that has found a vertex (m,) with its simplex, and those whose aims are now occupied; they did not fail."""
         if self.vertex[number] >= 0:
             self._ages.append(self.searches.age[number])
         self.vertex[number] = IDLE
@@ -109,7 +109,7 @@ class SearchScheduler:
         self.vertex[over] = IDLE
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return all that `restore` needs except the frontier, its postures and the generator."""
+        """Return the state for `restore`, without the frontier, its postures and the generator."""
         searches = {name: getattr(self.searches, name) for name in ("mean", "sigma", "shape", "path", "age")}
         own = {"vertex": self.vertex, "aim": self.aim, "patience": self._patience, "begun": np.array(self._begun)}
         return searches | own | {"failed": self._failed.rows, "ages": self._ages.rows}
@@ -142,7 +142,7 @@ class SearchScheduler:
         return around
 
     def _begin(self, number: int, vertex: int, points: Array) -> bool:
-        """Start a search from a vertex to that of the points (k, m) with the fewest failures; return False if all were given up."""
+        """Start a search from a vertex to the point with the fewest failures among `points` (k, m); return False if all were given up."""
         mean, std, patience = self._postures.rows[vertex], self._settings.std, self._usual_patience()
         if self._settings.frontier:
             failed = (((points[:, None] - self._failed.rows) ** 2).sum(axis=-1) < FAILURE_RADIUS**2).sum(axis=1)
@@ -175,7 +175,7 @@ class SearchScheduler:
         return point
 
     def _find_near(self, number: int) -> None:
-        """Set the vertices near a search."""
+        """Set the vertices nearest to the aim of a search."""
         near, _ = self._frontier.nearest(self._centre(number), self.near.shape[1])
         self.near[number] = np.inf
         self.near[number, : len(near)] = self._frontier.points[near]
@@ -195,7 +195,7 @@ _DAMPING = 0.1  # spacings squared
 
 
 def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Array) -> Array:
-    """Extrapolate a posture (d,) in [0, 1] at a point (m,), by a linear fit to similar postures (V, d) of vertices around a vertex."""
+    """Return a posture (d,) in [0, 1] for a point `aim` (m,), extrapolated linearly from similar `postures` (V, d) around a vertex."""
     near, distances = frontier.nearest(frontier.points[vertex], 6 * frontier.dimensions + 1)
     near = near[distances < _FIT_RADIUS]
     near = near[(np.abs(postures[near] - postures[vertex]) < _SAME_BRANCH).all(axis=1)]

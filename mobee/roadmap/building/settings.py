@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a roadmap: how its poses are found, and which of them edges join."""
+"""Settings of a roadmap: the search for its poses, and the choice of its edges."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class SearchSettings:
     Raises InvalidValue for a value out of range.
 
     Attributes:
-        delta: by how much a vertex's expansion weight, 1 at first, falls when a search from it fails.
+        delta: decrease of a vertex's expansion weight, 1 at first, for each failed search from it.
         frontier: search only where a point one spacing away is free, and aim at it.  False: from all vertices, without an aim, as printed.
-        predict: begin a search that has an aim where the postures of the neighbours extrapolate to.  False: at the vertex.
+        predict: begin a search that has an aim at a posture extrapolated from those of the neighbours.  False: at the vertex.
         std: largest standard deviation of a search from a vertex, in ranges of the motors.
         wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
         population: samples per generation; None: 4 + 3 ln(d).
-        patience: a search fails after this many times the generations in which three quarters of the recent searches succeeded.
+        patience: a search fails after this factor times the number of generations within which 3/4 of the recent searches succeeded.
         tries: failed searches within half a spacing of a point, after which the point is given up.
         searches: number of simultaneous searches.
     """
@@ -62,9 +62,9 @@ class RoadmapSettings:
     Attributes:
         method: "nes": thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task points, for coordinates
             with derivatives.  "hybrid": least squares where all coordinates have derivatives, then evolution for what it missed.
-        neighbours: how many of the nearest vertices each vertex is joined to.  None: as many of the earlier vertices as the task space
+        neighbours: number of nearest vertices to which each vertex is joined.  None: as many of the earlier vertices as the task space
             has dimensions (Algorithm 4).
-        longest: edges along which a motor turns by more [rad] are left out.  None: no edge is.
+        longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.
         margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
             out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.
         search: settings of the searches by evolution strategy.

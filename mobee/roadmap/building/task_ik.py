@@ -45,7 +45,7 @@ class TaskIK:
         return self._problem.whole(np.clip(here + np.where(self._descent.drawn, drawn, 0.0), low, high))
 
     def solve(self, y: Array, starts: Array) -> tuple[Array, Array, Array, Array]:
-        """Solve for task coordinates y (N, m) from starts (N, n), of which the motors that may move are used, within their limits.
+        """Find poses with task coordinates y (N, m), by least squares from starts (N, n); only the free motors move, within their limits.
 
         Returns:
             Poses (N, n), their task coordinates (N, m), violations (N,) and costs (N,).  A violation is 0 for a pose within all

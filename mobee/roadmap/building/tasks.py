@@ -90,7 +90,7 @@ class Task:
 
 
 def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
-    """Return the position of a marker along some axes of the root frame (table 3.2, second row); `box`: (low, high) m of each axis."""
+    """Return a marker's position along `axes` of the root frame as a task (table 3.2, second row); `box`: (low, high) m of each axis."""
     if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(AXES):
         raise InvalidValue(f"axes {axes!r}: valid are 'x', 'y', 'z', each at most once, as 'xy'.")
     if len(box) != len(axes):
@@ -103,7 +103,7 @@ def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
 
 
 def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
-    """Return direction . x of a marker's position x, in m times the length of the direction (3,); (1, 1, 1): table 3.2, first row."""
+    """Return direction . x as a task; x: a marker's position [m]; `direction` (3,): of any length, (1, 1, 1) for table 3.2, first row."""
     components = vector("direction", direction)
     if not components.any():
         raise InvalidValue("direction is 0; it must be 3 numbers that are not all 0.")
@@ -111,18 +111,18 @@ def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
 
 
 def motors(ranges: Mapping[str, Range]) -> Task:
-    """Return the positions of motors, by name, each in (low, high) rad (table 3.2, third row)."""
+    """Return the positions of motors as a task (table 3.2, third row); `ranges`: (low, high) rad by name of the motor."""
     return Task(tuple(_motor(name, low, high) for name, (low, high) in ranges.items()))
 
 
 def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: float, direction: ArrayLike | None = None) -> Task:
-    """Return the angle of a marker's direction about an axis, in (-pi, pi] rad.
+    """Return the angle of a marker's direction about an axis, in (-pi, pi] rad, as a task.
 
     Least squares also makes the direction perpendicular to the axis.
 
     Args:
         marker: its name.
-        about: the axis (3,), root frame; the component of the direction along it does not count.
+        about: the axis (3,), root frame; the component of the direction along the axis is ignored.
         zero: (3,), root frame: the direction of angle 0, perpendicular to the axis.
         low: rad, at least -pi.
         high: rad, at most pi: a roadmap does not wrap around.
@@ -152,7 +152,7 @@ def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: floa
 
 
 def function(f: Callable[[Pose], ArrayLike], low: float, high: float, name: str = "", unit: str = "") -> Task:
-    """Return a function of the pose, between low and high, as a coordinate; it has no derivative, so least squares cannot follow it.
+    """Return a function of the pose, between low and high, as a task; it has no derivative, so least squares cannot follow it.
 
     `f`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and returns N numbers; or it takes one pose
     (`pose.position(marker)` (3,)) and returns one number: then it is called pose by pose, which takes longer.

@@ -22,16 +22,16 @@ class PathRates:
     """
 
     weights: Array
-    effective: float  # how many samples the better half is worth
-    path: float  # what a path forgets in a generation
+    effective: float  # effective number of samples in the better half
+    path: float  # decay of the path per generation
     damping: float
-    rank_one: float  # how fast the shape follows the path
-    rank_all: float  # and the samples
-    length: float  # of a standard normal vector, on average
+    rank_one: float  # learning rate of the shape from the path
+    rank_all: float  # learning rate of the shape from the samples
+    length: float  # mean length of a standard normal vector
 
 
 def path_rates(dimensions: int, population: int, separable: bool = False) -> PathRates:
-    """The default rates; a diagonal shape has fewer numbers to learn and learns them faster (Ros and Hansen 2008)."""
+    """Return the default rates; a diagonal shape has fewer parameters, which are learned faster (Ros and Hansen 2008)."""
     d = dimensions
     weights = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))
     better, worse = weights[weights > 0.0], weights[weights <= 0.0]
@@ -60,7 +60,7 @@ def published_utilities(population: int) -> Array:
 
 
 def default_population(dimensions: int) -> int:
-    """4 + 3 ln(dimensions), of all these strategies."""
+    """Return the default number of samples per generation, 4 + 3 ln(dimensions), rounded down."""
     return 4 + int(3.0 * math.log(dimensions))
 
 
@@ -68,9 +68,9 @@ _NEGLIGIBLE = 1e-17
 
 
 def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
-    """B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)), exact to rounding; z (k, d), weights (k,).
+    """Return the updated shape B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)), exact to rounding; z (k, d), weights (k,).
 
-    The sum has no more than k directions of its own, so where k < d the series is one of matrices (k, k).
+    The sum has at most rank k, so for k < d the series is computed with matrices (k, k).
     """
     if shape.ndim == 1:
         diagonal: Array = shape * np.exp(0.5 * (weights @ z**2 - shrink))
@@ -86,7 +86,7 @@ def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
 
 
 def _series(a: Array) -> Array:
-    """(exp(a) - 1) / a by Taylor's series; the exponents of a generation are small."""
+    """Return (exp(a) - 1) / a of a matrix a, by its Taylor series; the exponents of one generation are small."""
     norm, size, power = math.sqrt(float((a * a).sum())), 1.0, 1
     total = term = np.eye(len(a))
     while size > _NEGLIGIBLE:
@@ -99,7 +99,7 @@ def _series(a: Array) -> Array:
 
 
 def stretched(shape: Array, z: Array) -> Array:
-    """B z of samples (k, d) or of one (d,), of the same form."""
+    """Return B z for samples z (k, d) or one sample (d,); `shape`: B, or its diagonal."""
     moved: Array = z * shape if shape.ndim == 1 else z @ shape.T
     return moved
 
@@ -109,15 +109,15 @@ METHODS: tuple[str, ...] = get_args(Method)
 
 
 class NES:
-    """A search distribution; `ask` returns a generation, `tell` takes the costs of its samples.
+    """A natural evolution strategy: `ask` returns a generation of samples, `tell` updates the search distribution by their costs.
 
-    The same seed gives the same samples.  Only the order of the costs counts, so that f and any growing function of f give the
-    same search.
+    The same seed gives the same samples.  Only the order of the costs matters: any increasing function of the costs gives the same
+    search.
 
     Args:
         start: (d,) mean to start from.
         std: standard deviation, one number or (d,).
-        population: samples a generation; None: 4 + 3 ln(d), at least 5.
+        population: samples per generation; None: 4 + 3 ln(d), at least 5.
         method: "full": exponential NES with an evolution path and negative weights; "separable": the same with a diagonal shape, for
             many dimensions; "xnes" and "snes": the published full and diagonal forms with their rates, which need more samples
             (docs/roadmaps.md).
@@ -177,7 +177,7 @@ class NES:
         return samples
 
     def tell(self, costs: ArrayLike) -> None:
-        """Follow the costs (population,) of the samples that `ask` gave; +inf is worst, NaN raises InvalidValue."""
+        """Update the distribution by the costs (population,) of the samples from `ask`; +inf is worst, NaN raises InvalidValue."""
         values = np.asarray(costs, dtype=np.float64)
         if self._z is None:
             raise InvalidValue("tell without ask: the costs belong to samples; ask first.")
@@ -192,7 +192,7 @@ class NES:
             self._follow(z)
 
     def _follow(self, z: Array) -> None:
-        """Step size by the length of the path, shape by the path and all samples; the worse ones at the length of an average one."""
+        """Update the step size by the path's length, the shape by the path and all samples, the worse ones scaled to average length."""
         rates, d = self._rates, len(self.mean)
         positive = np.maximum(rates.weights, 0.0)
         step = positive @ z

@@ -81,10 +81,10 @@ EVALUATIONS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """When a search restarts, alternately at a random point of the box and at its start.
+    """The condition for restarts of a search, which begin alternately at a random point of the box and at the first start.
 
-    `std`: restart if the largest standard deviation is below this share of the box.  `patience`, `gain`: restart if so many generations
-    have not lowered the best cost by this share.
+    `std`: restart if the largest standard deviation is below this share of the box.  `patience`, `gain`: restart if `patience` generations
+    have not lowered the best cost by the share `gain`.
     """
 
     std: float = 1e-3
@@ -106,7 +106,7 @@ class Search:
     """A search in a box: `ask` returns a generation, `tell` takes its costs; the best sample of all is kept.
 
     Args:
-        start, std, population, method, seed: as of NES.
+        start, std, population, method, seed: see `NES`.
         limits: (d, 2) box; samples outside are moved to its border, at an additional cost.  None: no box.
         restart: when to restart; needs limits.  None: never.
 
@@ -155,7 +155,7 @@ class Search:
             return places
         inside = np.minimum(np.maximum(places, 0.0), 1.0)
         self._beyond = ((places - inside) ** 2).sum(axis=1)
-        self._asked = np.minimum(self._low + inside * self._width, self._high)  # rounding must not leave the box either
+        self._asked = np.minimum(self._low + inside * self._width, self._high)  # rounding must not lead out of the box
         return self._asked
 
     def tell(self, costs: ArrayLike) -> None:
@@ -209,7 +209,7 @@ def minimize(
 
 
 def _box(limits: ArrayLike, start: Array) -> tuple[Array, Array]:
-    """Return the low and the high corner of the box; raises InvalidValue."""
+    """Return the lowest and the highest corner of the box, (d,) each; raises InvalidValue."""
     box = np.array(limits, dtype=np.float64)
     if box.shape != (*start.shape, 2) or not np.isfinite(box).all() or not (box[:, 0] < box[:, 1]).all():
         raise InvalidValue(

@@ -36,7 +36,7 @@ from mobee.robot.robot import Robot
 
 
 def vector(name: str, given: ArrayLike) -> Array:
-    """A copy of what was given, (3,); raises InvalidValue if it is not three finite numbers."""
+    """Return a copy of the vector `given` (3,); raises InvalidValue, with `name`, unless it is three finite numbers."""
     found = real_array(name, given)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
@@ -44,7 +44,7 @@ def vector(name: str, given: ArrayLike) -> Array:
 
 
 def unit_vector(name: str, given: ArrayLike) -> Array:
-    """The direction (3,) of what was given; raises InvalidValue if it has none."""
+    """Return the unit vector (3,) along the vector `given`; raises InvalidValue, with `name`, if that is 0 or not finite."""
     found = vector(name, given)
     if not np.linalg.norm(found) > 0.0:
         raise InvalidValue(f"{name} is {given!r}; it must be a direction (3,), or a rotation (3, 3).")
@@ -58,19 +58,19 @@ def lengths(vectors: Array) -> Array:
 
 
 def units(vectors: Array) -> Array:
-    """Vectors (..., d) at length 1; those of no length stay so."""
+    """Return vectors (..., d) scaled to length 1; zero vectors stay zero."""
     found: Array = vectors / np.maximum(lengths(vectors)[..., None], 1e-12)
     return found
 
 
 def angle_between(one: Array, other: Array) -> Array:
-    """The angle between unit vectors (..., 3), (...,) rad; exact near 0 and near pi too."""
+    """Return the angles (...,) rad between unit vectors (..., 3); exact also near 0 and near pi."""
     angle: Array = 2.0 * np.arctan2(lengths(one - other), lengths(one + other))
     return angle
 
 
 def rotation(name: str, given: ArrayLike) -> Array:
-    """A copy of what was given, (3, 3); raises InvalidValue if it is no rotation."""
+    """Return a copy of the rotation `given` (3, 3); raises InvalidValue, with `name`, if it is not a rotation."""
     found = real_array(name, given)
     if found.shape != (3, 3) or not np.allclose(found @ found.T, np.eye(3), atol=1e-6) or np.linalg.det(found) < 0.0:
         raise InvalidValue(f"{name} is no rotation: its rows must be a right-handed set of three unit vectors.")
@@ -78,7 +78,7 @@ def rotation(name: str, given: ArrayLike) -> Array:
 
 
 def turn_between(one: Array, other: Array) -> Array:
-    """The angle of the turn from rotations (..., 3, 3) to others, (...,) rad."""
+    """Return the angles (...,) rad of the rotations from `one` (..., 3, 3) to `other` (..., 3, 3)."""
     apart = np.sqrt(((one - other) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
     angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
     return angle
@@ -89,7 +89,7 @@ _NONE = np.zeros(3)
 
 
 def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE, offset: ArrayLike | None = None) -> Term:
-    """Put a marker, or a point that is `offset` (3,) m from it in its frame, on a place (3,) m (table 3.1)."""
+    """Return the term that brings a marker, or the point at `offset` (3,) m in its frame, to a place (3,) m, root frame (table 3.1)."""
     goal = vector("place", place)
     aside = None if offset is None else vector("offset", offset)
 
@@ -107,10 +107,10 @@ def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: f
 def orientation(
     marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD, direction: ArrayLike | None = None
 ) -> Term:
-    """Let a marker's normal point along a goal (3,), or turn the whole marker to a rotation (3, 3) (table 3.1).
+    """Return the term that turns a marker's normal to a direction `goal` (3,), or the marker to a rotation `goal` (3, 3) (table 3.1).
 
-    `direction` (3,) in the marker's frame points there instead of the normal.
-    The residual is the angle between them: u.u* + 1, as printed, is that of opposite directions, and flat at both its ends.
+    `goal` is in the root frame. `direction` (3,), in the marker's frame, replaces the normal. The residual is the angle between the two
+    [rad]. The printed residual u.u* + 1 is smallest for opposite directions, and its slope is 0 at both ends.
     """
     wanted = np.array(goal, dtype=np.float64)
     if wanted.shape == (3, 3):
@@ -130,7 +130,7 @@ def orientation(
 
 
 def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Hold two markers at a distance [m] from each other (table 3.1)."""
+    """Return the term that keeps two markers at a distance [m] from each other (table 3.1)."""
 
     def residual(pose: Pose) -> Array:
         found: Array = np.abs(lengths(pose.position(first) - pose.position(second)) - distance)
@@ -144,7 +144,7 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
 
 
 def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Turn two markers' normals to each other: each points along the line to the other marker; the residual is the larger angle."""
+    """Return the term that points two markers' normals at each other's position; the residual is the larger of both angles [rad]."""
 
     def residual(pose: Pose) -> Array:
         between = units(pose.position(second) - pose.position(first))
@@ -162,7 +162,7 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
 
 
 def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Let a marker's normal point to a place (3,) m, or to another marker."""
+    """Return the term that points a marker's normal at a place (3,) m in the root frame, or at another marker; residual [rad]."""
     at = goal if isinstance(goal, str) else vector("goal", goal)
 
     def residual(pose: Pose) -> Array:
@@ -178,7 +178,7 @@ def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS
 
 
 def collision(by: str = "depth", weight: float | None = None) -> Term:
-    """No solid contacts: costs are their summed depth [m], whose gradient leads out of contact, or their number |K| (table 3.1)."""
+    """Return the term against solid contacts: their summed depth [m], whose gradient leads out of contact, or their number (table 3.1)."""
     if by not in ("depth", "count"):
         raise InvalidValue(f"collision by {by!r}: valid are 'depth' and 'count'.")
 
@@ -194,7 +194,7 @@ def collision(by: str = "depth", weight: float | None = None) -> Term:
 
 
 def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
-    """Stay near a posture (n,) rad, None: the robot's home; the residual is the distance in ranges of the motors (table 3.1)."""
+    """Return the term for a pose near a posture (n,) rad, None: home; the residual is the distance in ranges of the motors (table 3.1)."""
     given = None if posture is None else np.array(posture, dtype=np.float64)
 
     def residual(pose: Pose) -> Array:
@@ -205,7 +205,7 @@ def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
 
 
 def comfort(weight: float = 0.5) -> Term:
-    """Keep away from the motors' limits: the mean of ((q - middle) / half range)^4, 1 where all motors are at a limit."""
+    """Return the term against positions near motor limits: the mean of ((q - middle) / half range)^4, 1 if all motors are at a limit."""
 
     def residual(pose: Pose) -> Array:
         low, high = pose.robot.limits.T
@@ -216,7 +216,7 @@ def comfort(weight: float = 0.5) -> Term:
 
 
 def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
-    """Keep the centre of mass above a place (2,) m, None: where it is at home; the residual is horizontal [m]."""
+    """Return the term that keeps the centre of mass above a place (2,) m, None: as at home; the residual is a horizontal distance [m]."""
     above = None if place is None else np.array(place, dtype=np.float64)
     if above is not None and above.shape != (2,):
         raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")
@@ -229,7 +229,7 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
 
 
 def constraints(weight: float = PER_RAD) -> Term:
-    """Keep the robot's own linear constraints (thesis eqs. 5.14-5.17): the sum of what its clauses miss, rad."""
+    """Return the term for the robot's clauses (thesis eqs. 5.14-5.17): the sum of the amounts by which they are violated, rad."""
 
     def residual(pose: Pose) -> Array:
         distance: Array = np.zeros(pose.q.shape[:-1])
@@ -243,11 +243,11 @@ def constraints(weight: float = PER_RAD) -> Term:
 def term(
     function: Callable[[Pose, ContactTable], ArrayLike], tolerance: float | None = METRES, weight: float | None = None, name: str = ""
 ) -> Term:
-    """A function of pose and contacts as a term; solved when it is no more than the tolerance, None: only as small as may be.
+    """Return a function of pose and contacts as a term, met when its value is at most the tolerance; None: it is only minimised.
 
     `function`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their
     contacts, and returns N numbers; or it is written for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) and
-    returns one number: then it is called pose by pose, which takes longer.  `weight`: None: 1 at ten times the tolerance.
+    returns one number: then it is called pose by pose, which takes longer.  `weight`: None: the cost is 1 at ten times the tolerance.
     """
     if not callable(function):
         raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
@@ -270,7 +270,7 @@ def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Te
 
 
 def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Put a marker on a place (3,) m in the frame of another marker, as what both hold would."""
+    """Return the term that brings a marker to a place (3,) m in the frame of the marker `to`, for example of two hands on one object."""
     goal = vector("place", place)
 
     def residual(pose: Pose) -> Array:
@@ -284,7 +284,7 @@ def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float =
 
 
 def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Turn a marker to a rotation (3, 3) in the frame of another marker; the identity: both are turned alike."""
+    """Return the term that turns a marker to a rotation (3, 3) in the frame of the marker `to`; the identity: equal orientations."""
     wanted = rotation("goal", goal)
 
     def residual(pose: Pose) -> Array:
@@ -300,7 +300,10 @@ def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float
 def aligned(
     first: str, second: str, direction: ArrayLike, other: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD
 ) -> Term:
-    """Let a direction (3,) in the frame of a marker be parallel to one in that of another, None: the same numbers in that frame."""
+    """Return the term that makes `direction` (3,) in the first marker's frame parallel to `other` (3,) in the second marker's frame.
+
+    `other` None: the same three numbers as `direction`.
+    """
     one = unit_vector("direction", direction)
     two = one if other is None else unit_vector("other", other)
 
@@ -316,9 +319,9 @@ def aligned(
 
 
 def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Keep a marker's normal, or a direction (3,) in its frame, across an axis (3,): the residual is the angle to the plane across it.
+    """Return the term that keeps a marker's normal, or a direction (3,) in its frame, perpendicular to an axis (3,); residual [rad].
 
-    It has no derivative of its own; beside an angle about the same axis as task coordinate least squares needs none.
+    The term has no derivative. Least squares needs none if an angle about the same axis is a task coordinate.
     """
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 
@@ -331,7 +334,7 @@ def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tol
 
 
 def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Keep a marker in the plane of all x with normal . x = offset [m]; for the normal (0, 0, 1), `offset` is its height."""
+    """Return the term that keeps a marker in the plane of all x with normal . x = offset [m], root frame; (0, 0, 1): at a height."""
     across = unit_vector("normal", normal)
 
     def residual(pose: Pose) -> Array:
@@ -345,7 +348,7 @@ def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METR
 
 
 def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Keep a marker at x with direction . x <= most [m]; for the direction (0, 0, 1), `most` is its largest height."""
+    """Return the term that keeps a marker at positions x with direction . x <= most [m], root frame; (0, 0, 1): at most at a height."""
     along = unit_vector("direction", direction)
 
     def residual(pose: Pose) -> Array:

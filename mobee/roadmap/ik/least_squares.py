@@ -16,15 +16,15 @@ from mobee.robot.robot import Robot
 
 RESTARTS, AT_ONCE = 40, 4
 STEPS = 60  # of one start at most
-NEAR = 0.15  # of the motors' ranges: standard deviation of every second restart about the start; the others are anywhere
+NEAR = 0.15  # of the motors' ranges: standard deviation of every second restart about the start; the others are uniform
 REALS = 26  # of an aim, see `aim_reals`
-_EXACT = 1e-6  # m or rad, for a term that is without tolerance
+_EXACT = 1e-6  # m or rad, for a term without a tolerance
 
 
 class Descent:
     """Damped least squares on a problem's aims and on other aims, from many starts; the goals of the others may differ per start.
 
-    `threads` share the starts; the results are the same for any number.
+    `threads`: number of threads that share the starts; the results do not depend on it.
     """
 
     def __init__(self, problem: Problem, besides: Sequence[tuple[Aim, float]] = (), threads: int = 1) -> None:
@@ -44,24 +44,24 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Which of the motors that may move (d,) are random in a random start, see `needed`."""
+        """Whether each motor that may move (d,) gets a random position in a random start, see `needed`."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
-        """Return the solutions (K, n) from poses q (B, n) that meet every aim; goals: as of `ends`."""
+        """Return those solutions (K, n), from starts q (B, n), that meet every aim; goals: see `ends`."""
         ends, met = self.met(q, goals)
         return ends[met]
 
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
-        """Return the solutions (B, n) from poses q (B, n), and which of them meet every aim, (B,); goals: as of `ends`."""
+        """Return the solutions (B, n) from starts q (B, n), and whether each meets every aim, (B,); goals: see `ends`."""
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
         return ends, met
 
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
-        """Return the solutions (B, n) from poses q (B, n) within the limits, and the residuals of every aim, (B, aims) m or rad.
+        """Return the solutions (B, n) from starts q (B, n), within the limits, and the residuals (B, aims) of every aim, m or rad.
 
-        `goals`: numbers of the other aims for each start, (B, reals of these), see `aim_reals`; None: as given to the constructor.
+        `goals`: numbers of the other aims for each start, one row each, see `aim_reals`; None: those of the aims in the constructor.
         """
         from mobee._core.least_squares import descend  # loads the core: not before somebody asks
         from mobee.model.engine import robot_handle

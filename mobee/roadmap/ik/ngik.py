@@ -63,8 +63,8 @@ def solve_ik(
         start: (n,) rad, where the search begins, and the posture of the motors that may not move; None: home.
         seed: of the random numbers.
         motors: names of parts and motors that may move; None: all.
-        method: "nes": by an evolution strategy, whatever the terms are; "least_squares": damped least squares with restarts on the terms
-            that have a derivative, accepted if the others are within their tolerances; "hybrid": least squares, then evolution if it fails.
+        method: "nes": by an evolution strategy, for all terms; "least_squares": damped least squares with restarts on the terms
+            that have a derivative, accepted if the others are within their tolerances; "hybrid": least squares, then "nes" if it fails.
         evaluations: largest number of poses that the evolution strategy evaluates.
 
     Raises:
@@ -102,7 +102,7 @@ def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
 
 
 def _result(model: Model, problem: Problem, q: Array) -> IK:
-    """Return the result, from another evaluation of the whole model."""
+    """Return the result for q, from a new evaluation with the whole model."""
     pose = model.evaluate(q[None])
     missing = {name: float(one.residual(pose)[0]) for name, one in problem.by_name.items()}
     reached = all(one.tolerance is None or missing[name] <= one.tolerance for name, one in problem.by_name.items())

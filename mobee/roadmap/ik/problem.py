@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pose search problem: which motors move, which are sampled, and the costs of batches of poses."""
+"""The pose search problem: the motors that move, the motors that are sampled, and the costs of batches of poses."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ _MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Return which of the motors that may move affect an aim, or a term without aims such as a plain function, (d,) bool.
+    """Return whether each motor that may move affects an aim, or a term without aims such as a plain function, (d,).
 
-    Contacts do not count: a random finger posture only adds contacts.
+    An effect on contacts does not count: a random finger posture only adds contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
@@ -72,7 +72,7 @@ def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
 
 
 def _movers(robot: Robot, aims: Iterable[Aim]) -> Flags:
-    """Return the motors (n,) that move the links of aims, and those that are aims themselves."""
+    """Return whether each motor, (n,), moves a link of an aim or is an aim itself."""
     scale = robot.coupling[0]
     moves = np.zeros(len(robot.motors), dtype=bool)
     for aim in aims:
@@ -114,7 +114,7 @@ class Problem:
         return q
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Return the costs (N,) of poses q (N, n), and whether each is within all tolerances, (N,) bool."""
+        """Return the costs (N,) of poses q (N, n), and whether each is within all tolerances, (N,)."""
         pose = self.model.evaluate(q)
         self.evaluations += len(q)
         total, good = np.zeros(len(q)), np.ones(len(q), dtype=bool)

@@ -18,8 +18,8 @@ Residual = Callable[[Pose], Array]
 
 PER_METRE, PER_RAD = 20.0, 2.0  # weights
 METRES, RADIANS = 0.005, float(np.deg2rad(5.0))  # tolerances
-UPRIGHT = np.eye(3)  # the frame of an aim that needs none
-NOWHERE = np.zeros(3)  # the point of an aim that needs none
+UPRIGHT = np.eye(3)  # the frame of an aim without a frame
+NOWHERE = np.zeros(3)  # the point of an aim without a point
 
 
 # Kinds of residuals, numbered as in core/aims.hpp:
@@ -82,22 +82,22 @@ def direction_frame(direction: Array) -> Array:
 
 
 def directed(marker: Marker, direction: Array, goal: Array) -> Aim:
-    """Aim a direction (3,) fixed to the marker's link (root frame, zero pose) along a direction (3,) of the root frame."""
+    """Return the aim that turns a direction (3,), fixed to the marker's link (root frame, zero pose), to `goal` (3,), root frame."""
     return Aim(ALONG, marker.link, marker.position, direction_frame(direction), 0, NOWHERE, direction_frame(goal))
 
 
 def level(marker: Marker, direction: Array, value: float) -> Aim:
-    """Bring direction . x of a marker's position x to a value [m times the direction's length]."""
+    """Return the aim that brings direction . x, x a marker's position, to a value [m times the direction's length]."""
     return Aim(COORDINATE, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
 
 def below(marker: Marker, direction: Array, value: float) -> Aim:
-    """Bring direction . x of a marker's position x to at most a value."""
+    """Return the aim that brings direction . x, x a marker's position, to at most a value [m times the direction's length]."""
     return Aim(AT_MOST, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
 
 def motor_at(motor: int, value: float) -> Aim:
-    """Bring a motor to a value [rad]."""
+    """Return the aim that brings a motor to a value [rad]."""
     return Aim(MOTOR, 0, NOWHERE, UPRIGHT, 0, NOWHERE, UPRIGHT, value, motor)
 
 
@@ -108,7 +108,7 @@ class Function:
     """Calls a user's function with a batch of poses and their table of contacts, or pose by pose with a tuple of contacts.
 
     `contacts`: False for a function of the pose alone.
-    The first call finds out which of the two the function was written for: a batch must give the same values as the single poses.
+    The first call tests whether the function accepts a batch: it must then return the same values as for single poses.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.robot.xml.node import Node
 
-FARTHEST = 1e6  # m: beyond it a number is a slip, and the arithmetic would lose millimetres
+FARTHEST = 1e6  # m: a larger number is a mistake, and the arithmetic would lose millimetres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Frame:
     rotation: Array  # (3, 3)
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """Return the frame `inner`, given in this one, in the frame in which this one is given."""
+        """Return the product of this frame and `inner`, which is relative to this frame, as a frame relative to this one's parent."""
         return Frame(self.rotation @ inner.position + self.position, self.rotation @ inner.rotation)
 
 
@@ -30,7 +30,7 @@ IDENTITY = Frame(np.zeros(3), np.eye(3))
 
 
 def read_origin(parent: Node) -> Frame:
-    """The <origin> of a joint or shape; none means the parent's own frame. Raises RobotFileError."""
+    """Return the <origin> of a joint or shape, or the identity if it has none; raises RobotFileError."""
     node = child(parent, "origin")
     if node is None:
         return IDENTITY
@@ -64,7 +64,7 @@ def bounded(node: Node, name: str, default: float | None = None) -> float:
 
 
 def rotation_of(rpy: Array) -> Array:
-    """The rotation (3, 3) of roll, pitch, yaw in [rad]."""
+    """Return the rotation (3, 3) of roll, pitch, yaw (3,) [rad]."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
     return np.array(
         [
@@ -76,10 +76,10 @@ def rotation_of(rpy: Array) -> Array:
 
 
 def rpy_of(rotation: Array) -> Array:
-    """Roll, pitch, yaw (3,) in [rad] of a rotation (3, 3); exact at a pitch of 90 deg too, where roll is arbitrary."""
+    """Return roll, pitch, yaw (3,) [rad] of a rotation (3, 3); exact at a pitch of 90 deg too, where roll is arbitrary."""
     r = rotation
     roll = atan2(r[2, 1], r[2, 2])
     sine, cosine = sin(roll), cos(roll)
-    # With the roll taken back, what remains turns about y and z only, so a roll that is off is made up for by the yaw.
+    # Without the roll, the rest is a rotation about y and z only, so the yaw compensates for any error of the roll.
     yaw = atan2(sine * r[0, 2] - cosine * r[0, 1], cosine * r[1, 1] - sine * r[1, 2])
     return np.array([roll, atan2(-r[2, 0], hypot(r[0, 0], r[1, 0])), yaw])

@@ -19,17 +19,17 @@ CORNERS = 64
 FEWEST = 8  # a hull is reduced from the box around it
 THINNEST = 1e-4  # m, half the thickness that a flat mesh is given
 FLAT = 1e-7  # m, the thickness below which a mesh is flat
-SLIM = 1e-5  # the same, and half of what it is given, as a part of the mesh's length
+SLIM = 1e-5  # relative to the mesh's length: the thickness below which a mesh is flat, and half the thickness that it is given
 MARGIN = 1e-7  # of the mesh's size, so that neither rounding nor merging leaves a point outside
 NEAR = 1e-8  # of the mesh's size between corners that are one
 
 
 def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
-    """Vertices (v, 3) of a convex body with at most that many corners that holds all `points`, v >= 4.
+    """Return the vertices (v, 3), v >= 4, of a convex body that contains all `points` (n, 3) m and has at most `corners` corners.
 
-    It is the exact hull where that has no more vertices, or where `corners` is "all"; else planes of the hull's facets are
-    intersected, most protruding corner first, until no more corners are allowed. Flat meshes are given a thickness of 0.2 mm.
-    Raises InvalidValue for points that no hull can be computed of.
+    It is the exact hull if this has no more corners, or if `corners` is "all". Otherwise it is an intersection of planes of the hull's
+    facets: planes are added where corners protrude most, until there are `corners` corners. Flat meshes get a thickness of 0.2 mm.
+    Raises InvalidValue for points that have no hull.
     """
     from scipy.spatial import ConvexHull, QhullError  # 0.3 s, and only robots with meshes need it
 
@@ -47,7 +47,7 @@ def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
 
 
 def facets(vertices: Array) -> Array:
-    """The triangles (f, 3, 3) of the hull of `vertices`, corners anticlockwise as seen from outside."""
+    """Return the triangles (f, 3, 3) of the hull of `vertices` (v, 3), corners anticlockwise as seen from outside."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(vertices)
@@ -58,7 +58,7 @@ def facets(vertices: Array) -> Array:
 
 
 def _thickened(points: Array) -> Array:
-    """The points; where they lie in a plane or on a line, copies of them on both sides."""
+    """Return the points; for points in a plane or on a line, shifted copies on both sides."""
     for _ in range(3):
         spread = points - points.mean(axis=0)
         axes = np.linalg.svd(spread.T @ spread)[0]  # (3, 3), columns by falling extent
@@ -73,7 +73,7 @@ def _thickened(points: Array) -> Array:
 
 
 def _enclosing(vertices: Array, planes: Array, most: int) -> Array:
-    """At most that many vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
+    """Return at most `most` vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
     from scipy.spatial import HalfspaceIntersection
 
     inside = vertices.mean(axis=0)
@@ -95,7 +95,7 @@ def _enclosing(vertices: Array, planes: Array, most: int) -> Array:
 
 
 def _merged(points: Array, near: float) -> Array:
-    """The points without those that repeat another up to rounding."""
+    """Return the points without those that are equal to another up to rounding."""
     close = np.abs(points[:, None] - points).max(axis=2) <= near
     kept: Array = points[~np.tril(close, -1).any(axis=1)]
     return kept
@@ -103,7 +103,7 @@ def _merged(points: Array, near: float) -> Array:
 
 STEPS = 400  # of the centre towards the farthest point; the radius is then right to a fraction of a percent
 ROOM = 1e-9  # m, so that rounding leaves no point outside
-LEAST = 1e-6  # m, the least edge, radius or height, for flat and thin meshes
+LEAST = 1e-6  # m, the smallest edge, radius or height, for flat and thin meshes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +117,7 @@ class Primitive:
 
     @property
     def volume(self) -> float:
-        """In [m^3]."""
+        """The volume [m^3]."""
         match self.kind:
             case "sphere":
                 return 4 / 3 * pi * self.size[0] ** 3
@@ -130,7 +130,7 @@ class Primitive:
 
 
 def smallest(points: Array) -> Primitive:
-    """The primitive of least volume that holds all points (v, 3) m."""
+    """Return the primitive of smallest volume that contains all points (v, 3) m."""
     axes = _axes(points)
     boxes = [_box(points, frame) for frame in axes]
     round_ones = [fit(points, axis) for frame in axes for axis in frame.T for fit in (capsule_along, _cylinder)]
@@ -138,24 +138,24 @@ def smallest(points: Array) -> Primitive:
 
 
 def smallest_capsule(points: Array) -> Primitive:
-    """The capsule of least volume that holds all points, its axis one of their natural axes."""
+    """Return the smallest capsule that contains all points (v, 3) m and whose axis is an axis of the mesh or a main axis of its points."""
     return min((capsule_along(points, axis) for frame in _axes(points) for axis in frame.T), key=lambda one: one.volume)
 
 
 def bounding_sphere(points: Array) -> Primitive:
-    """A sphere around all points, little larger than the smallest."""
+    """Return a sphere around all points (v, 3) m, a little larger than the smallest one."""
     centre = _centre(points)
     radius = float(np.linalg.norm(points - centre, axis=1).max())
     return Primitive("sphere", (max(radius, LEAST) + ROOM,), centre, np.eye(3))
 
 
 def capsule_along(points: Array, axis: Array) -> Primitive:
-    """The shortest capsule along a unit axis that holds all points, with the radius of the cylinder around them."""
+    """Return the shortest capsule along a unit axis that contains all points (v, 3) m, with the radius of the cylinder around them."""
     rotation, centre, radius, off, along = _around(points, axis)
     reach = np.sqrt(np.maximum(radius**2 - off**2, 0.0))  # how far beyond its cap's centre a point may lie
     low, high = float((along + reach).min()), float((along - reach).max())
     middle, height = (low + high) / 2.0, max(high - low, 0.0)
-    if height == 0.0:  # then the point that is farthest from the middle sets the radius
+    if height == 0.0:  # then the point farthest from the middle determines the radius
         radius = float(np.hypot(off, along - middle).max())
     size = (max(radius, LEAST) + ROOM, max(height, LEAST))
     return Primitive("capsule", size, centre + middle * axis, rotation)
@@ -176,7 +176,7 @@ def _box(points: Array, frame: Array) -> Primitive:
 
 
 def _around(points: Array, axis: Array) -> tuple[Array, Array, float, Array, Array]:
-    """Orientation, a point of the best axis, its radius, and of each point the distance from it and the place along it."""
+    """Return orientation, a point on the best axis, the radius, and for each point its distance from the axis and position along it."""
     rotation = align(Z, axis)
     local = points @ rotation
     middle = _centre(local[:, :2])
@@ -185,7 +185,7 @@ def _around(points: Array, axis: Array) -> tuple[Array, Array, float, Array, Arr
 
 
 def _centre(points: Array) -> Array:
-    """About the centre of the smallest ball around points of any dimension (Badoiu and Clarkson's walk)."""
+    """Return approximately the centre of the smallest ball around points of any dimension (algorithm of Badoiu and Clarkson)."""
     centre: Array = (points.min(axis=0) + points.max(axis=0)) / 2.0
     best, least = centre, float(np.linalg.norm(points - centre, axis=1).max())
     for step in range(1, STEPS):
@@ -198,7 +198,7 @@ def _centre(points: Array) -> Array:
 
 
 def _axes(points: Array) -> list[Array]:
-    """Frames (3, 3), axes in columns, in which a tight fit is likely: the mesh's own, and the main axes of its points."""
+    """Return frames (3, 3), axes in columns, in which a tight fit is likely: the mesh's own, and the main axes of its points."""
     spread = points - points.mean(axis=0)
     main: Array = np.linalg.svd(spread.T @ spread)[0]
     if np.linalg.det(main) < 0:

@@ -32,7 +32,7 @@ class Skeleton:
 
 
 def lay_out(tree: Tree) -> Skeleton:
-    """The skeleton of a tree; joints without play become part of what carries them."""
+    """Return the skeleton of a tree; links of fixed joints, and of joints with equal limits, are merged into the links that carry them."""
     skeleton = Skeleton([tree.root], {tree.root: 0}, {tree.root: IDENTITY})
     for joint in tree.walk():
         frame = skeleton.frames[joint.parent] @ joint.origin
@@ -84,7 +84,7 @@ def read_markers(tree: Tree, skeleton: Skeleton, where: dict[tuple[str, str], st
 
 
 def _normal(note: Node) -> Array:
-    """The direction that `write_urdf` noted, in the link's frame; z where there is none."""
+    """Return the normal that `write_urdf` noted, in the link's frame; z if there is none."""
     if "normal" not in note.attributes:
         return Z
     normal = triple(note, "normal")
@@ -98,7 +98,7 @@ SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of a symmetric matrix
 
 
 def read_bodies(tree: Tree, skeleton: Skeleton) -> tuple[Body, ...]:
-    """Return the masses of all links, those of fixed joints merged with the links that carry them; raises RobotFileError."""
+    """Return the masses of all links, links of fixed joints merged with the links that carry them; raises RobotFileError."""
     return one_a_link(_bodies(tree, skeleton))
 
 

@@ -23,10 +23,10 @@ REMEDY = "Put the package's folder beside or above the URDF, or name where it li
 
 
 def find_mesh(node: Node) -> Path:
-    """The file that a <mesh filename="..."> names.
+    """Return the path of the file in a <mesh filename="...">.
 
-    `package://name/...` is looked for from the URDF's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH;
-    a plain path starts at the URDF's folder. Raises RobotFileError with the places that were looked at.
+    `package://name/...` is searched from the URDF's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH;
+    a plain path starts at the URDF's folder. Raises RobotFileError with the places that were searched.
     """
     given = node.text("filename")
     try:
@@ -73,10 +73,10 @@ OBJ_FACES = re.compile(rb"^[ \t]*f[ \t]+([^\r\n]+)", re.MULTILINE)
 
 
 def read_mesh(path: Path) -> Array:
-    """The points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
+    """Return the points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
 
-    They are the corners of its faces; where a file has none, all its points.
-    Raises RobotFileError with the remedy for what cannot be read, is no mesh, or holds no points.
+    They are the corners of its faces; for a file without faces, all its points.
+    Raises RobotFileError, with the remedy, for a file that cannot be read, is no mesh, or holds no points.
     """
     kind = path.suffix.lower()
     if kind not in READERS:
@@ -99,7 +99,7 @@ def _stl(path: Path) -> Array:
         return _stl_facets(content, facets)
     if content.lstrip()[:5].lower() == b"solid":
         return _numbers(path, FACETS.findall(content), content.lower().count(b"vertex"))
-    if 0 < STL_FACET * facets < body:  # some programs add what they like behind the facets
+    if 0 < STL_FACET * facets < body:  # some programs add data behind the facets
         return _stl_facets(content, facets)
     what = f"announces {facets} facets and has room for {max(body, 0) // STL_FACET}" if body >= 0 else "is too short"
     raise RobotFileError(f"{path}: not a complete STL file: it {what}. Export the mesh again.")
@@ -113,10 +113,10 @@ def _stl_facets(content: bytes, facets: int) -> Array:
 
 
 def _obj(path: Path) -> Array:
-    content = _content(path).replace(b"\\\n", b" ")  # a line may go on in the next
+    content = _content(path).replace(b"\\\n", b" ")  # a backslash continues a line
     points = _numbers(path, OBJ_VERTICES.findall(content), len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE)))
     corners = _obj_corners(path, content)
-    if not len(corners) or corners[0] < 0:  # counted back from the face: rare, and all points hold more, not less
+    if not len(corners) or corners[0] < 0:  # indices relative to the end: rare; all points are used, whose hull is no smaller
         return points
     if corners[0] == 0 or corners[-1] > len(points):
         raise RobotFileError(f"{path}: a face names a vertex beyond the {len(points)} that there are. Export the mesh again.")
@@ -124,7 +124,7 @@ def _obj(path: Path) -> Array:
 
 
 def _obj_corners(path: Path, content: bytes) -> Ints:
-    """The vertices that faces name, sorted; what no face names, decorates."""
+    """Return the indices of the vertices that belong to a face, sorted; the others are not part of the surface."""
     named = b" ".join(OBJ_FACES.findall(content)).split()
     try:
         return np.unique(np.array([word.partition(b"/")[0] for word in named], dtype=np.bytes_).astype(np.intp))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads the points of COLLADA files, placed as in their scene.
 
-Lengths are turned into metres by the file's <unit>. Its <up_axis> is left alone, as ROS tools do: the URDF says which way is up.
+Lengths are converted to metres by the file's <unit>. Its <up_axis> is ignored, as by ROS tools: the URDF gives the orientation.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class _Element:
     text: str = ""
 
     def all(self, tag: str) -> list[_Element]:
-        """Every element of that tag below this one."""
+        """Return every element of a tag below this one."""
         found, stack = [], list(reversed(self.children))
         while stack:
             element = stack.pop()
@@ -73,7 +73,7 @@ class _Builder(LineHandler):
 
 
 def read_dae(path: Path) -> Array:
-    """The points (v, 3) in [m] of the geometries that the scene of a COLLADA file shows; raises RobotFileError."""
+    """Return the points (v, 3) m of all geometries in the scene of a COLLADA file; raises RobotFileError."""
     builder = _Builder(path)
     parse_xml(path, builder)
     root = builder.root
@@ -84,7 +84,7 @@ def read_dae(path: Path) -> Array:
 
 
 def _points(path: Path, geometry: _Element) -> Array:
-    """The points that its faces have as corners, for one array of points may serve many geometries; all where it has no faces."""
+    """Return the corners of a geometry's faces, since several geometries may share one array of points; all points if it has no faces."""
     sources = {source.attributes.get("id", ""): source for source in geometry.all("source")}
     arrays = []
     for vertices in geometry.all("vertices"):
@@ -171,7 +171,7 @@ def _transform(path: Path, element: _Element) -> Array:
 
 
 def _numbers(path: Path, element: _Element, text: str, group: int) -> Array:
-    """A multiple of `group` finite numbers."""
+    """Return the numbers in a text; raises RobotFileError unless all are finite and their count is a multiple of `group`."""
     try:
         values = np.array(text.split(), dtype=np.float64)
     except ValueError as error:

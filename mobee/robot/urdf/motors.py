@@ -23,7 +23,7 @@ SLIDE = 2.0  # m, of a prismatic joint without limits
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Joint = scale * motor + offset, where the motor is named after the joint that mimics none."""
+    """The drive of a joint: joint = scale * motor + offset; `master`: the joint at the end of the <mimic> chain, and the motor's name."""
 
     master: str
     scale: float
@@ -69,9 +69,9 @@ def _multiplier(mimic: Node) -> float:
 
 
 def joint_limits(joint: UrdfJoint) -> Array:
-    """The interval (2,) of a joint in [rad] or [m], finite, for a motor has limits here.
+    """Return the limits (2,) of a joint, rad or m; always finite, since every motor needs limits.
 
-    A joint without limits gets a turn, or 2 m, about zero; where one limit is missing the interval is as long and ends at the other.
+    A joint without limits gets an interval of one turn, or of 2 m, about zero; with one limit, an interval of that length which ends there.
     """
     low, high = stated_limits(joint).tolist()
     span = SLIDE if joint.kind == "prismatic" else TURN
@@ -99,7 +99,7 @@ def stated_limits(joint: UrdfJoint) -> Array:
 
 
 def _or_infinite(limit: Node, name: str) -> float:
-    """A number of a <limit>, 0 where it is left out; infinite where it is farther, or faster, than any joint goes."""
+    """Return a number of a <limit>, 0 if it is left out; infinite if it is larger than any joint's position or velocity can be."""
     try:
         value = float(limit.optional(name))
     except ValueError:
@@ -108,7 +108,7 @@ def _or_infinite(limit: Node, name: str) -> float:
 
 
 def _warn_of_free(joint: UrdfJoint) -> None:
-    """Warn which range is assumed for a joint that should have limits and states none."""
+    """Warn that a joint has no limits, and name the range that is assumed."""
     limit = child(joint.node, "limit")
     if joint.kind == "continuous" or np.isfinite(stated_limits(joint)).all():
         return
@@ -126,9 +126,9 @@ def _warn_of_free(joint: UrdfJoint) -> None:
 
 
 def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
-    """The motor of a joint and of all that mimic it: its limits are those that keep every one of them within its own.
+    """Return the motor of a joint and of all joints that mimic it; its limits keep every one of these joints within its own limits.
 
-    In units of the joint: [rad], or [m] if it is prismatic. Home is 0, or what is nearest to it outside the limit zones.
+    Units are those of the joint: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones.
     """
     limits = joint_limits(master)
     _warn_of_free(master)
@@ -139,7 +139,7 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
         narrowed = np.array([max(limits[0], ends[0]), min(limits[1], ends[1])])
         if narrowed[1] - narrowed[0] < 1e-6:
             joint.node.warn(f"the limits of {joint.name!r} leave {master.name!r}, which it mimics, no room, so they are ignored")
-        elif np.abs(narrowed - limits).max() > 1e-9:  # not by the last digit of a file
+        elif np.abs(narrowed - limits).max() > 1e-9:  # a difference in the last digit of the file does not count
             limits = narrowed
     joints = tuple((index, drive.scale, drive.offset) for index, _, drive in driven)
     motor = Motor(master.name, part, limits, float(np.clip(0.0, *limits)), joints, zone_ends_at_home=True)
@@ -153,13 +153,13 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
     if limit is None:
         return motor
     velocity, effort = _or_infinite(limit, "velocity"), limit.number("effort", 0.0)
-    if 0 < velocity < inf:  # exporters write 0 for what they do not know
+    if 0 < velocity < inf:  # exporters write 0 for an unknown value
         motor = replace(motor, max_velocity=velocity)
     return replace(motor, max_torque=effort) if effort > 0 else motor
 
 
 def _extended(master: UrdfJoint, motor: Motor) -> Motor:
-    """Read what `write_urdf` adds for a motor and URDF cannot express: its name, its own unit, its acceleration."""
+    """Return the motor with the values that `write_urdf` adds because URDF has no element for them: name, unit, acceleration."""
     note = child(master.node, "mobee")
     if note is None:
         return motor

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which shapes of a robot from a URDF are tested against each other, solids and generated fields.
 
-Every two shapes on different links are, save
+Two shapes on different links are tested, except
 - those of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
   links between them that have no solid, as in a wrist that is written as three joints;
 - those whose links (of the URDF, before fixed joints are merged) the SRDF disables;
 - fields of one part, as in a zero-position file; where the SRDF makes no parts, see own_fields.py.
 
-So without an SRDF nothing else is left out: what overlaps in every pose is for `mobee check` to report.
+Without an SRDF no other pairs are left out; `mobee check` reports shapes that overlap in every pose.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mobee.robot.pairs import CLUSTER
 from mobee.robot.robot import Joint, LinkPair, Shape
 from mobee.robot.urdf.srdf import NamePair, Srdf
 
-MOST_BETWEEN = 6  # joints at one place: there are no more ways to move
+MOST_BETWEEN = 6  # joints at one place: a rigid body has six degrees of freedom
 OwnFields = Literal["none", "far apart", "all"]
 
 
@@ -39,7 +39,7 @@ class PairRules:
 
 
 def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
-    """Pairs of links with a joint between them, or joints at one place and nothing solid between, and why."""
+    """Return pairs of links, with reasons, that are joined by one joint, or by joints at one place without a solid between them."""
     solid = {shape.link for shape in shapes if shape.role == "solid"}
     found: dict[LinkPair, str] = {}
     for index, joint in enumerate(joints):
@@ -58,7 +58,7 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
 
 
 def shape_pairs(joints: Sequence[Joint], shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
-    """Pairs of shapes of one role that are tested, shape (p, 2), indices into `shapes`; `owners`: the URDF link of each."""
+    """Return the tested pairs of shapes of one role, (p, 2), indices in `shapes`; `owners`: the URDF link of each shape."""
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     names = {name: k for k, name in enumerate(rules.links)}
     owner = np.array([names[owners[index]] for index in chosen], dtype=np.intp)
@@ -100,7 +100,7 @@ BENT = 2  # joints between links whose fields overlap wherever they bend
 
 
 def far_apart(joints: Sequence[Joint], fields: Sequence[Shape]) -> NDArray[np.bool_]:
-    """Table (k, k): which of the fields are more than two joints apart and do not meet with every joint at zero."""
+    """Return a table (k, k): whether two fields are more than two joints apart and do not touch while every joint is at zero."""
     link = np.array([field.link for field in fields], dtype=np.intp)
     far: NDArray[np.bool_] = (_joints_between(joints) > BENT)[link[:, None], link]
     half_axes, radii = np.zeros((len(fields), 3)), np.zeros(len(fields))
@@ -115,7 +115,7 @@ def far_apart(joints: Sequence[Joint], fields: Sequence[Shape]) -> NDArray[np.bo
 
 
 def _joints_between(joints: Sequence[Joint]) -> Ints:
-    """Joints on the way from each link to each other, (links, links)."""
+    """Return the number of joints on the path from each link to each other link, (links, links)."""
     between = np.zeros((len(joints) + 1,) * 2, dtype=np.intp)
     for index, joint in enumerate(joints):  # parents come first
         between[index + 1, : index + 1] = between[: index + 1, index + 1] = between[joint.parent, : index + 1] + 1
@@ -123,7 +123,7 @@ def _joints_between(joints: Sequence[Joint]) -> Ints:
 
 
 def _capsule(shape: Shape) -> tuple[Array, float]:
-    """Half the axis (3,) m, root frame, and the radius of a capsule about a shape's position that holds the shape."""
+    """Return half the axis (3,) m, root frame, and the radius of a capsule, centred at a shape's position, that contains the shape."""
     if shape.kind == "box":
         longest = int(np.argmax(shape.size))
         across = np.delete(np.array(shape.size), longest)
@@ -135,9 +135,10 @@ def _capsule(shape: Shape) -> tuple[Array, float]:
 
 
 def segment_distances(offsets: Array, along: Array, across: Array) -> Array:
-    """Distances (k,) m of a segment from others: its half axis (3,), theirs (k, 3), `offsets` (k, 3) from their centres to its own.
+    """Return the distances (k,) m of one line segment from k others.
 
-    Either the nearest points are inside of both segments, or one of them is an end.
+    `along` and `across`: half axes of the one (3,) and of the others (k, 3); `offsets` (k, 3): from their centres to its centre. Either
+    the nearest points are inside of both segments, or one of them is an end.
     """
     a, b, c = along @ along, across @ along, (across**2).sum(axis=1)
     d, e = offsets @ along, (offsets * across).sum(axis=1)

@@ -27,10 +27,10 @@ from mobee.robot.xml.pairs import without_ignored
 class UrdfOptions:
     """Options for reading a URDF.
 
-    `field`: how much farther than the body the fields reach, in [m]; None: no fields. `meshes`: the convex hull of a mesh
-    ("hull"), or the smallest sphere, capsule, cylinder or box around it ("bounding"). `corners`: how many a hull may have, from 8
-    on ("all": the exact hull). `srdf`: the SRDF file, else the one that `find_srdf` finds. `home`: the name of a <group_state>, or
-    "zero"; None: as `choose_home` says.
+    `field`: distance [m] by which fields extend beyond the solids; None: no fields. `meshes`: "hull": the convex hull of a mesh;
+    "bounding": the smallest sphere, capsule, cylinder or box around it. `corners`: largest number of corners of a hull, at least 8; "all":
+    the exact hull. `srdf`: the SRDF file; None: see `find_srdf`. `home`: the name of a <group_state>, or "zero"; None: see
+    `choose_home`.
     """
 
     field: float | None = None
@@ -41,10 +41,10 @@ class UrdfOptions:
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
-    """The robot described by a URDF file.
+    """Return the robot described by a URDF file.
 
-    Motors are named after their joints and count in [rad], those of prismatic joints in [m]. Raises RobotFileError with
-    file, line, field and remedy, InvalidValue for options out of range; warns of what it ignores.
+    Motors have the names of their joints; their unit is rad, or m for a prismatic joint. Raises RobotFileError with
+    file, line, field and remedy, InvalidValue for options out of range; warns of elements that it ignores.
     """
     options = options or UrdfOptions()
     _check(options)
@@ -148,14 +148,14 @@ def _motors(tree: Tree, skeleton: Skeleton, srdf: Srdf, drives: dict[str, Drive]
 
 
 def _limited(joints: list[Joint], motors: tuple[Motor, ...]) -> Iterator[Joint]:
-    """The joints with the intervals that their motors move them through."""
+    """Yield the joints, with the intervals through which their motors move them as limits."""
     limits: dict[int, Array] = {j: np.sort(scale * motor.limits + shift) for motor in motors for j, scale, shift in motor.joints}
     return (replace(joint, limits=limits[index]) for index, joint in enumerate(joints))
 
 
 @dataclass(slots=True, eq=False)
 class _Body:
-    """All shapes, links in order, and for each the URDF link that it is on; which ones stand on the world."""
+    """All shapes, in the order of the links; `owners`: the URDF link of each; `base`: indices of the shapes on the base."""
 
     shapes: list[Shape] = field(default_factory=list)
     owners: list[str] = field(default_factory=list)
@@ -186,7 +186,7 @@ def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], option
 
 
 def _free(name: str, taken: dict[str, int]) -> str:
-    """The name, or with the first number behind it that makes it the only one."""
+    """Return the name, with a number appended if it is taken."""
     if name not in taken:
         taken[name] = 0
         return name

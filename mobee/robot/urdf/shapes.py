@@ -46,7 +46,7 @@ class ShapeReader:
     count: int = 0
 
     def read(self, link: Node, index: int, frame: Frame, part: str) -> list[Found]:
-        """The solids of a <link>, and the fields that `write_urdf` noted; `frame`: the link's at zero pose, root frame."""
+        """Return the solids of a <link>, and the fields that `write_urdf` noted; `frame`: of the link at zero pose, in the root frame."""
         found: list[Found] = []
         for node in link:
             if node.tag not in LINK_TAGS and nearest(node.tag, LINK_TAGS):
@@ -133,7 +133,7 @@ def _length(form: Node, name: str) -> float:
 
 
 def _capsules(found: list[Found]) -> list[Found]:
-    """URDF has no capsule of its own, so a cylinder with a sphere of its radius at either end is one."""
+    """Replace each cylinder with a sphere of its radius at both ends by a capsule, for which URDF has no element."""
     caps: set[int] = set()
     merged = list(found)
     for role in ("solid", "field"):
@@ -155,7 +155,7 @@ def _capsules(found: list[Found]) -> list[Found]:
 
 
 def grown(shape: Shape, by: float, name: str) -> Shape:
-    """The field around a solid that reaches `by` [m] farther; around a mesh it is a capsule."""
+    """Return the field around a solid, which extends `by` m beyond it; around a mesh it is a capsule."""
     around = replace(shape, name=name, role="field")
     match shape.kind:
         case "sphere" | "capsule":

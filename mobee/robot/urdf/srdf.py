@@ -25,7 +25,7 @@ FREE_BASE = "root_joint"  # Pinocchio's name for the joint that lets a base move
 
 @dataclass(slots=True, eq=False)
 class Srdf:
-    """Everything by the names that the URDF uses."""
+    """The content of an SRDF file; links and joints have the names of the URDF."""
 
     disabled: dict[NamePair, str] = field(default_factory=dict)  # two links -> reason, file and line
     enabled: set[NamePair] = field(default_factory=set)
@@ -35,7 +35,7 @@ class Srdf:
 
 
 def find_srdf(urdf: Path, robot: str) -> Path | None:
-    """The SRDF of a URDF: named as the file, or else as the robot in it, beside the file or in ../srdf; case does not count."""
+    """Return the SRDF of a URDF: named as the file or else as the robot, beside the file or in ../srdf, case ignored; None without one."""
     folders = (urdf.resolve().parent, urdf.resolve().parent.parent / "srdf")
     for name in dict.fromkeys((urdf.stem.lower(), robot.lower())):
         for folder in folders:
@@ -46,14 +46,14 @@ def find_srdf(urdf: Path, robot: str) -> Path | None:
 
 
 def read_srdf(path: Path, tree: Tree) -> Srdf:
-    """The SRDF of the robot of that tree; warns of links, joints and groups that the robot does not have; raises RobotFileError."""
+    """Return the content of an SRDF; warns of links, joints and groups that the robot `tree` does not have; raises RobotFileError."""
     root = read_xml(path)
     if root.tag != "robot":
         root.fail("root element", "this is not an SRDF file", "Its root is <robot name=...>")
     srdf = Srdf(path=path)
     groups = {node.text("name"): node for node in root if node.tag == "group"}
     if len(groups) > MOST_GROUPS:
-        root.fail("group", f"has {len(groups)} groups", f"Write one group a part; at most {MOST_GROUPS} can be read")
+        root.fail("group", f"has {len(groups)} groups", f"Write one group per part; at most {MOST_GROUPS} can be read")
     virtual = {FREE_BASE, *(node.text("name") for node in root if node.tag == "virtual_joint")} - set(tree.joints)
     for name, node in groups.items():
         joints = dict.fromkeys(_joints_of(node, groups, tree, virtual))
@@ -91,7 +91,7 @@ def _known(node: Node, attribute: str, valid: Mapping[str, object]) -> Iterable[
 
 
 def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree, virtual: Collection[str]) -> Iterable[str]:
-    """The joints of a group without virtual ones, those of its subgroups included; a group that holds itself is gone through once."""
+    """Return the joints of a group and of its subgroups, without virtual joints; a group that contains itself is read only once."""
     above = {joint.child: joint for joint in tree.joints.values()}
     seen = {group.text("name")}
     stack = list(reversed(group.children))
@@ -111,7 +111,7 @@ def _joints_of(group: Node, groups: Mapping[str, Node], tree: Tree, virtual: Col
 
 
 def _chain(node: Node, tree: Tree) -> list[str]:
-    """The joints between two links, in order; from one branch to another the way leads through the link that carries both."""
+    """Return the joints on the path between two links, in order; for links on different branches it passes the link that carries both."""
     ends = [name for end in ("base_link", "tip_link") for name in _known(node, end, tree.links)]
     if len(ends) != 2:
         return []
@@ -133,7 +133,7 @@ def _to_root(link: str, tree: Tree) -> list[UrdfJoint]:
 
 
 def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:
-    """Parts with their motors' joints, where the groups that hold no other group divide the motors among them; else one part `all`."""
+    """Return the joints of each part: the groups without subgroups, if every motor is in one of them; else one part `all`."""
     everything = tuple(masters)
     motors: dict[str, tuple[str, ...]] = {}
     for name, (_, joints) in srdf.groups.items():
@@ -151,16 +151,16 @@ def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) 
     return {"all": everything}
 
 
-HOMES = ("home", "ready", "half_sitting", "standing", "default")  # the first of them that an SRDF has is home
+HOMES = ("home", "ready", "half_sitting", "standing", "default")  # the first of these names in an SRDF is home
 ZERO = "zero"  # a home that every robot has, unless its SRDF gives the name to another pose
 BEYOND = 1e-6  # rad or m, of a limit, by rounding
 
-State = dict[str, tuple[Node, float]]  # joint -> its line in the SRDF, and where it is in [rad] or [m]
+State = dict[str, tuple[Node, float]]  # joint -> its line in the SRDF, and its position [rad or m]
 
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """A pose of joints, and its name; `meant`: it is named home or was requested, so that an unreachable value is an error."""
+    """A pose of joints with its name; `meant`: it is named home or was requested, so that a value beyond the limits is an error."""
 
     name: str
     state: State
@@ -168,7 +168,7 @@ class Home:
 
 
 def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Collection[str]) -> State:
-    """The joints of a <group_state> that the robot has and that move; `elsewhere`: virtual joints, which place the robot in the world."""
+    """Return the positions of moving joints in a <group_state>; `elsewhere`: virtual joints, which place the robot in the world."""
     found: State = {}
     for node in group_state:
         name = node.text("name")
@@ -180,7 +180,7 @@ def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Co
 
 
 def _value(node: Node, joint: UrdfJoint) -> float:
-    """One number; of a continuous joint also the cosine and the sine, as some tools write, and any number of turns."""
+    """Return the position of a joint; for a continuous joint, it may be given as cosine and sine, or with any number of turns."""
     if joint.kind != "continuous":
         return bounded(node, "value")
     numbers = node.numbers("value") if "value" in node.attributes else [bounded(node, "value")]
@@ -191,9 +191,9 @@ def _value(node: Node, joint: UrdfJoint) -> float:
 
 
 def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | None) -> Home:
-    """The pose that was asked for by name; else the first of HOMES, else the only one, else none. Case does not count.
+    """Return the requested pose; without a request, the first of HOMES, else the only pose, else a home without a pose.
 
-    Raises UnknownName with the names there are.
+    Case is ignored. Raises UnknownName with the valid names.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:

@@ -46,7 +46,7 @@ class Tree:
     below: dict[str, list[UrdfJoint]] = field(default_factory=dict)  # parent link -> its joints in the order of the file
 
     def walk(self) -> Iterator[UrdfJoint]:
-        """Every joint, parents first, depth first, siblings in the order of the file."""
+        """Yield every joint, parents first, depth first, siblings in the order of the file."""
         stack = list(reversed(self.below.get(self.root, ())))
         while stack:
             joint = stack.pop()
@@ -55,7 +55,7 @@ class Tree:
 
 
 def read_tree(robot: Node) -> Tree:
-    """The checked tree of a <robot>; raises RobotFileError for double names, missing links, loops and second roots."""
+    """Return the checked tree of a <robot>; raises RobotFileError for duplicate names, missing links, loops and a second root."""
     links: dict[str, Node] = {}
     joints: dict[str, UrdfJoint] = {}
     for node in robot:
@@ -77,7 +77,7 @@ def read_tree(robot: Node) -> Tree:
 
 
 def read_name(node: Node, attribute: str = "name") -> str:
-    """A name that a person can read; raises RobotFileError where it is empty, blank, or longer than LONGEST_NAME."""
+    """Return the name in an attribute; raises RobotFileError if it is empty, blank, or longer than LONGEST_NAME."""
     name = node.text(attribute)
     if len(name) > LONGEST_NAME:
         node.fail(attribute, f"{shown(name)!r} has {len(name)} letters", f"Give it a name of at most {LONGEST_NAME}")

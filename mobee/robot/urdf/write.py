@@ -24,7 +24,7 @@ from mobee.robot.xml.pairs import role_elements
 
 @dataclass(slots=True)
 class GeometryWriter:
-    """Draws shapes of one robot; `folder` is where meshes go, and is made when the first one comes."""
+    """Writes shapes of one robot as URDF elements; `folder`: for meshes, created for the first mesh."""
 
     folder: Path
     written: int = 0
@@ -60,7 +60,7 @@ class GeometryWriter:
         return geometry
 
     def _mesh(self, shape: Shape) -> str:
-        """Write the hull as an STL in text, for a binary one keeps seven digits only; returns its path from the URDF's folder."""
+        """Write the hull as a text STL, since a binary one has only seven digits; return its path relative to the URDF's folder."""
         if shape.vertices is None:
             raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
         self.folder.mkdir(exist_ok=True)
@@ -98,14 +98,14 @@ Master = tuple[int, float, float]  # joint, scale, offset
 
 
 def write_urdf(robot: Robot, path: str | Path) -> Path:
-    """Write a robot to a URDF file and return its path; x.srdf and, for convex shapes, the folder x_meshes come beside it.
+    """Write a robot to a URDF file x.urdf and return its path; beside it, write x.srdf and, for convex shapes, the folder x_meshes.
 
-    Every link's frame stands at its joint and is not turned at zero pose. The first joint of a motor stands for it, the others mimic
-    that joint; markers are links on fixed joints. `load_robot` reads it back as the same robot, but for the clauses, and for
-    convex shapes of more than 64 vertices, which it encloses. Raises InvalidValue for a joint that no motor or more than one drives.
+    Every link's frame is at its joint, with the orientation of the root frame at zero pose. The first joint of a motor represents it; the
+    others mimic that joint. Markers are links on fixed joints. `load_robot` reads the file as the same robot, except for the clauses,
+    and for convex shapes of more than 64 vertices, which it encloses. Raises InvalidValue for a joint that no motor or several drive.
     """
     path = Path(path)
-    drives_of(robot)  # or else there is no master
+    drives_of(robot)  # raises for a joint without a master
     masters = tuple(_master(motor) for motor in robot.motor_table)
     part_of = ["", *(robot.motor_table[drive.motor].part for drive in drives_of(robot))]
     root = ET.Element("robot", name=robot.name)

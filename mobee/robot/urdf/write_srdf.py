@@ -46,10 +46,10 @@ _END = re.compile(rb"[ \t]*</robot\s*>")
 
 
 def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tuple[str, str, str]]) -> None:
-    """Write an SRDF with <disable_collisions> for pairs of links, (link1, link2, reason): all of it, or nothing.
+    """Write an SRDF with <disable_collisions> for pairs of links, (link1, link2, reason); the file is complete or unchanged.
 
-    `base`: the SRDF whose text is kept word for word, the new lines behind it; None begins one for a robot of that name.  Raises
-    RobotFileError if that text cannot take the lines, or if the file cannot be written.
+    `base`: an SRDF whose text is kept word for word, before the new lines; None: a new one for the robot `name`.  Raises
+    RobotFileError if lines cannot be added to that text, or if the file cannot be written.
     """
     lines = [f"<disable_collisions link1={quoteattr(a)} link2={quoteattr(b)} reason={quoteattr(why)}/>" for a, b, why in pairs]
     text = _merged(base, lines) if base is not None else _begun(name, lines)
@@ -73,7 +73,7 @@ def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tup
 
 
 def disabled_and_enabled(path: Path) -> tuple[set[NamePair], set[NamePair]]:
-    """The pairs of links that an SRDF names in <disable_collisions> and in <enable_collisions>; raises RobotFileError."""
+    """Return the pairs of links in the <disable_collisions> and in the <enable_collisions> of an SRDF; raises RobotFileError."""
     root = read_xml(path)
     return _pairs(root, "disable_collisions"), _pairs(root, "enable_collisions")
 

@@ -33,7 +33,7 @@ FLAT = 1e-6  # a hull thinner than this part of its length has no inside that a 
 
 
 def read_convex(node: Node) -> Volume:
-    """The volume of a <convex>: `points` (x y z each, in m) about its centre, turned like a box; raises RobotFileError."""
+    """Return the volume of a <convex>: `points` (x y z each, in m) about its centre, rotated like a box; raises RobotFileError."""
     numbers = node.numbers("points")
     if len(numbers) % 3 or not 4 <= len(numbers) // 3 <= MOST_POINTS:
         node.fail("points", f"has {len(numbers)} numbers", f"Write x y z of 4 to {MOST_POINTS} points, separated by blanks")
@@ -44,7 +44,7 @@ def read_convex(node: Node) -> Volume:
     return Volume("convex", (), node.vector(PLACE), box_rotation(node), vertices)
 
 
-MOST_SHAPES = 2000  # what is tested grows with the square
+MOST_SHAPES = 2000  # the number of tested pairs grows with the square
 
 
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
@@ -105,7 +105,7 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <marker>; its normal is +x, or the z axis of its rotation; without a rotation z is turned the shortest way to the normal."""
+    """Add a <marker>; its normal is +x, or z of its rotation; without a rotation, it gets the smallest one that turns z to the normal."""
     name = node.text("name")
     if name in draft.markers:
         node.fail("name", f"a second marker {name!r}", "Rename one of the two")
@@ -116,7 +116,7 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
         rotation = np.array(node.numbers("rotation", 9)).reshape(3, 3)
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
             node.fail("rotation", "is not a rotation matrix", "Write a right-handed orthonormal 3 x 3 matrix row by row")
-        left, _, right = np.linalg.svd(rotation)  # the nearest exact rotation to what the digits of the file say
+        left, _, right = np.linalg.svd(rotation)  # the nearest exact rotation to the rounded one in the file
         rotation = left @ right
         normal = normal if given else rotation[:, 2]
     draft.note("marker", name, node)

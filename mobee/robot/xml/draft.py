@@ -23,14 +23,14 @@ class Draft:
     drives: list[tuple[Node, str]] = field(default_factory=list)  # for each joint its element and the name of its motor
     motors: dict[str, MotorDraft] = field(default_factory=dict)
     parts: dict[str, list[Node]] = field(default_factory=dict)
-    hands: dict[int, str] = field(default_factory=dict)  # the elements with noSelfCollision, and what a reason calls them
+    hands: dict[int, str] = field(default_factory=dict)  # the elements with noSelfCollision, and their names in reasons
     elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
     shapes: list[Shape] = field(default_factory=list)
     hosts: list[int] = field(default_factory=list)  # for each shape its element
     shape_names: dict[str, int] = field(default_factory=dict)  # and how many more were named after it
     base_shapes: set[int] = field(default_factory=set)
     markers: dict[str, Marker] = field(default_factory=dict)
-    bodies: list[Body] = field(default_factory=list)  # several a link, perhaps
+    bodies: list[Body] = field(default_factory=list)  # perhaps several for one link
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
     others: list[tuple[Node, Placed]] = field(default_factory=list)  # included robots, and the elements that include them
@@ -45,10 +45,10 @@ class Draft:
 class Place:
     """The position of the reader in the tree: two points, link, part, motor, and the element whose noSelfCollision applies."""
 
-    point: Array  # (3,) m, where links and joints go on: the end of a link
-    start: Array  # (3,) m, where shapes and markers stand: the start of a link
+    point: Array  # (3,) m, the end of a link, where its links and joints are attached
+    start: Array  # (3,) m, the start of a link, to which shapes and markers are relative
     link: int = 0
-    carrier: int = 0  # in a joint the link that carries it, else the same link: what has turns="false" is on it
+    carrier: int = 0  # in a joint the link that carries it, else the same link: elements with turns="false" belong to it
     part: str = ""
     motor: str = ""
     subtree: int = -1

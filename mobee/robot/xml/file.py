@@ -33,7 +33,7 @@ CONFLICT = (b"<<<<<<<", b"=======", b">>>>>>>")
 
 
 class MalformedXml(RobotFileError):
-    """A file that is not well-formed XML; has line and column from 1, and the message of the parser."""
+    """Raised for a file that is not well-formed XML; has line and column, counted from 1, and the message of the parser."""
 
     def __init__(self, message: str, line: int, column: int, problem: str) -> None:
         super().__init__(message)
@@ -83,7 +83,7 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
 
 
 def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
-    """Send the elements of the content of an XML file to `handler`; errors as parse_xml."""
+    """Send the elements of the content of an XML file to `handler`; raises the errors of `parse_xml`."""
     try:
         defusedxml.sax.parseString(content, handler)
     except defusedxml.DefusedXmlException as error:
@@ -123,7 +123,7 @@ _ATTRIBUTE = re.compile(rb"""\s*([\w:.-]+)\s*=\s*("[^"<]*"|'[^'<]*')""")
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """A repair: its line, what was changed, and the error without it."""
+    """A repair of a file: its line, the change, the remedy, and the error that the file would cause without it."""
 
     line: int
     what: str
@@ -140,7 +140,7 @@ class Mended:
 
 
 def mend(content: bytes, error: RobotFileError) -> Mended | None:
-    """Return the content without the fault that a parser reported; None where the old reader refused the file too."""
+    """Return the content without the fault that a parser reported; None if the programs of 2010 to 2014 refused the file too."""
     if not isinstance(error, MalformedXml):
         return None
     if error.problem == "duplicate attribute":

@@ -69,7 +69,7 @@ def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list
 def finish_joints(
     joints: Sequence[Joint], drives: Sequence[tuple[Node, str]], motors: Sequence[MotorDraft]
 ) -> tuple[tuple[Joint, ...], tuple[Motor, ...]]:
-    """Return joints with limits in SI units, and motors with the affine map of thesis 2.3.1: motor range onto joint range."""
+    """Return joints with limits in SI units, and motors, each with the affine map of its range onto the joint's range (thesis 2.3.1)."""
     places = {motor.name: k for k, motor in enumerate(motors)}
     driven: list[list[tuple[int, float, float]]] = [[] for _ in motors]
     finished = []
@@ -107,9 +107,9 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
 
 
 def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
-    """One <constraintList> as a clause; its rows are satisfied when a.q + b > 0, `negate` flips a row.
+    """Return a <constraintList> as a clause; a row is satisfied when a.q + b > 0, or when this is below 0 with `negate`.
 
-    `q` of a row names motors of the part, or gives their numbers within it.
+    The attribute `q` of a row holds the names of motors of the part, or their numbers within it.
     """
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):

@@ -38,7 +38,7 @@ class Node:
     tag: str
     attributes: dict[str, str]
     children: list[Node] = field(default_factory=list)
-    repairs: list[Repair] = field(default_factory=list)  # of the root: what was wrong with the form of the file
+    repairs: list[Repair] = field(default_factory=list)  # of the root: faults in the form of the file
 
     def __iter__(self) -> Iterator[Node]:
         return iter(self.children)
@@ -119,7 +119,7 @@ class Node:
         return given
 
     def missing(self, name: str) -> NoReturn:
-        """Raise RobotFileError for a required attribute that is absent, with an attribute that looks misspelt."""
+        """Raise RobotFileError for a required attribute that is absent; the message names a similar attribute, perhaps a misspelling."""
         given = sorted(self.attributes)
         near = difflib.get_close_matches(name, given, n=1, cutoff=0.5) if len(given) <= LISTED else []
         remedy = f"Did you misspell it as {near[0]!r}? " if near else ""
@@ -155,7 +155,7 @@ def nearest(given: str, valid: Collection[str]) -> str:
 
 
 def listed(names: Collection[str]) -> str:
-    """Format names, sorted, for a message: only the first of many."""
+    """Format names, sorted, for a message; of more than LISTED only the first."""
     words = [shown(name) for name in sorted(names)]
     rest = f" and {len(words) - LISTED} more" if len(words) > LISTED else ""
     return (", ".join(words[:LISTED]) or "none") + rest
@@ -176,9 +176,9 @@ def descendants(root: Node) -> Iterator[Node]:
 
 
 def read_xml(path: Path, *, repair: bool = False) -> Node:
-    """The root node of an XML file.
+    """Return the root node of an XML file.
 
-    `repair`: attributes given twice and bytes that are not UTF-8 do not end the reading; the root lists them in `repairs`.
+    `repair`: repair attributes given twice and bytes that are not UTF-8, and list the repairs in the root's `repairs`.
     Entities and external references are refused (they can exhaust memory or read other files).
     Raises RobotFileError when the file is missing, not XML, hostile, or larger than any robot needs.
     """
@@ -207,7 +207,7 @@ class _Builder(LineHandler):
         self.root: Node | None = None
         self.open: list[Node] = []
         self.elements = 0
-        self.length = 0  # of attributes: a DTD can give a long default value to every element
+        self.length = 0  # of all attributes: a DTD can give a long default value to every element
 
     def startElement(self, name: str, attrs: xml.sax.xmlreader.AttributesImpl) -> None:
         node = Node(self.path, self.line, name.lower(), dict(attrs.items()))
@@ -242,10 +242,10 @@ def tree_of(node: Node) -> ET.Element:
 
 
 def write_tree(root: ET.Element, path: Path, heading: str = "") -> Path:
-    """Write elements with their attributes, one a line, and return the path; `heading` becomes a comment above the root.
+    """Write elements with their attributes, one per line, and return the path; `heading` becomes a comment above the root.
 
-    The standard library's writer calls itself for every level and ends at some hundred; a chain of 500 joints nests deeper.
-    The file is complete or unchanged: a temporary file beside it takes its place at the end. Raises OSError.
+    The standard library's writer is recursive and fails beyond some hundred levels; a chain of 500 joints nests deeper.
+    The file is complete or unchanged: a temporary file beside it replaces it at the end. Raises OSError.
     """
     lines = ['<?xml version="1.0" encoding="utf-8"?>'] + ([f"<!--\n{heading.strip().replace('--', '- -')}\n-->"] if heading else [])
     waiting: list[tuple[ET.Element | str, int]] = [(root, 0)]

@@ -3,11 +3,11 @@
 
 The rules are those of the published program (kailfrank/MoBeE, 2014):
 
-- a <motor> whose name was defined before means that motor, and its other attributes do not count;
+- a <motor> whose name was defined before refers to that motor, and its other attributes are ignored;
 - a motor without limits has -1 to 1, a joint without limits -180 to 180 deg; a home outside the limits is the nearest limit;
-- what stands inside a <link> or <joint> stands relative to its start, a marker exactly there; a marker without a normal has +x;
-- what stands inside a <joint> does not turn with it: it stays with the link that carries the joint;
-- a radius of 0 or less draws nothing, and an unknown tag is skipped, but not what stands inside;
+- elements inside a <link> or <joint> are placed relative to its start, a marker exactly there; a marker without a normal has +x;
+- elements inside a <joint> do not turn with it: they belong to the link that carries the joint;
+- a radius of 0 or less makes no volume, and an unknown tag is skipped, but not the elements inside;
 - a <constraint> outside a <constraintList> is ignored, and so is one that cannot be read;
 - pairs of shapes are tested by the rule of pairs_2014.py; shapes near the root of the tree are never tested against the world.
 
@@ -33,8 +33,8 @@ PROGRAMS = "the programs of 2010 to 2014"
 VOLUMES = ("sphere", "cylinder", "box")
 TAGS = frozenset({"zeropositionkinematictree", "bodypart", "constraintlist", "constraint", "motor", "link", "joint", "marker", *VOLUMES})
 LIMITS: dict[str, dict[str, str]] = {"motor": {"minPos": "-1", "maxPos": "1"}, "joint": {"minPos": "-180", "maxPos": "180"}}
-UNSEEN = {"sphere": (*AXIS, "angle"), "cylinder": ("angle",)}  # turns that do not show
-DRAWN = ("tracer", "detail", "r")  # how a thing was drawn
+UNSEEN = {"sphere": (*AXIS, "angle"), "cylinder": ("angle",)}  # rotations that do not change the volume
+DRAWN = ("tracer", "detail", "r")  # appearance only
 BRANCH_VOLUME = {"vx": "hx", "vy": "hy", "vz": "hz"}
 BRANCH_BOX = {"x": "width", "y": "height", "z": "depth"}
 GENERATION = "VirtualSkin or MoBeE, 2011 to 2014"
@@ -50,7 +50,7 @@ class Evidence:
     certain: bool = True
 
     def remark(self) -> Remark:
-        """A note that names the generation."""
+        """Return a note that names the generation."""
         return Remark(self.node, f"read as a file of {self.generation}, for {self.what}", severity="note")
 
 
@@ -88,7 +88,7 @@ def _evidence(root: Node) -> Iterator[Evidence]:
 
 
 def rewrite_original(root: Node) -> list[Remark]:
-    """Rewrite the elements of a robot of 2010 to 2014 into today's grammar, in place, and return how they were understood."""
+    """Rewrite the elements of a robot of 2010 to 2014 into today's grammar, in place; return remarks on their interpretation."""
     remarks = [Remark(at_line(root, repair.line), repair.what, repair.remedy) for repair in root.repairs]
     old = any(node.tag == "branch" for node in descendants(root))
     remarks += _rewrite_structure(root, old)
@@ -103,12 +103,12 @@ def rewrite_original(root: Node) -> list[Remark]:
 
 
 def at_line(root: Node, line: int) -> Node:
-    """A line of the file that is no element of it."""
+    """Return a node for a line of the file that has no element."""
     return Node(root.file, line, "", {})
 
 
 def _with_parents(root: Node) -> Iterator[tuple[Node, Node]]:
-    """Every element below the root with the one that holds it, in the order of the file."""
+    """Yield every element below the root with its parent, in the order of the file."""
     waiting = [(child, root) for child in reversed(root.children)]
     while waiting:
         node, parent = waiting.pop()
@@ -117,7 +117,7 @@ def _with_parents(root: Node) -> Iterator[tuple[Node, Node]]:
 
 
 def _rewrite_structure(root: Node, old: bool) -> list[Remark]:
-    """Name parts, rename what had another name, and put what an unknown tag holds in its place."""
+    """Name parts, rename tags and attributes that had other names, and replace unknown tags by the elements inside them."""
     remarks = []
     waiting, parts = [root], 0
     while waiting:
@@ -161,7 +161,7 @@ def _known_children(node: Node, old: bool) -> tuple[list[Node], list[Remark]]:
 
 
 def _rewrite_volumes_of_2010(root: Node) -> None:
-    """Places, axes and sizes of volumes, which the program of 2010 took from the link or joint around them where they were left out."""
+    """Fill in absent positions, axes and sizes of volumes, which the program of 2010 took from the link or joint around them."""
     for node, parent in list(_with_parents(root)):
         if node.tag not in VOLUMES:
             continue
@@ -183,7 +183,7 @@ def _rewrite_volumes_of_2010(root: Node) -> None:
 
 
 def _rewrite_motors(root: Node) -> list[Remark]:
-    """Limits and homes of motors and joints, and joints that name their motor where its element is a second one."""
+    """Fill in limits and homes of motors and joints; for a second <motor> of one name, write the motor's name at the joint."""
     remarks: list[Remark] = []
     known: dict[str, Node] = {}
     waiting: list[tuple[Node, str]] = [(root, "")]
@@ -214,7 +214,7 @@ def _rewrite_motors(root: Node) -> list[Remark]:
 
 
 def _fixed(node: Node) -> Remark:
-    """Make a fixed joint of one that stays at 0."""
+    """Change a joint whose limits are both 0 into a fixed joint."""
     node.attributes = {name: text for name, text in node.attributes.items() if name not in ("minPos", "maxPos")} | {"type": "fixed"}
     return Remark(node, "the joint cannot move, for its limits are both 0", 'Write type="fixed" in place of the limits', "note")
 
@@ -234,7 +234,7 @@ def _named_again(node: Node, first: Node) -> list[Remark]:
 
 
 def _limits(node: Node) -> list[Remark]:
-    """Fill in limits that are left out, and move the home of a motor inside them."""
+    """Fill in absent limits, and move the home of a motor inside its limits."""
     remarks = []
     missing = {name: text for name, text in LIMITS[node.tag].items() if not node.optional(name)}
     if missing:
@@ -250,7 +250,7 @@ def _limits(node: Node) -> list[Remark]:
 
 
 def _dissolve(root: Node, elements: set[int]) -> None:
-    """Put what some elements hold in their place."""
+    """Replace some elements by the elements inside them."""
     for node in list(descendants(root)):
         while any(id(child) in elements for child in node.children):
             node.children = [inner for child in node.children for inner in (child.children if id(child) in elements else [child])]
@@ -276,7 +276,7 @@ def _rewrite_constraints(root: Node) -> list[Remark]:
 
 
 def _ignored_constraint(node: Node, parent: Node, in_part: bool) -> Remark | None:
-    """Why the program of 2014 ignored a row or a list; None where it did not."""
+    """Return a remark with the reason why the program of 2014 ignored a row or a list; None if it did not ignore it."""
     if node.tag == "constraintlist":
         if not in_part:
             return Remark(node, "<constraintList> outside of every part is ignored, as by the program of 2014", "Move it into a <bodypart>")
@@ -293,7 +293,7 @@ def _ignored_constraint(node: Node, parent: Node, in_part: bool) -> Remark | Non
 
 
 def _has_row(node: Node) -> bool:
-    """Whether a <constraint> has as many factors as motors, and a number b."""
+    """Return whether a <constraint> has as many factors as motors, and a number b."""
     a, q = (node.attributes.get(name, "").split(" ") for name in ("a", "q"))
     try:
         float(node.attributes.get("b", ""))
@@ -349,14 +349,14 @@ def _rewrite_marker(node: Node, taken: Counter[str]) -> list[Remark]:
 
 
 def free_name(name: str, taken: dict[str, Node] | Counter[str]) -> str:
-    """The name, with _ behind it as often as it is taken."""
+    """Return the name, with as many _ appended as are necessary to make it unique."""
     while name in taken:
         name += "_"
     return name
 
 
 def _mark_base(root: Node) -> None:
-    """Say of every link and joint whether the program of 2014 took it for the base of the robot."""
+    """Write into every link and joint whether it belonged to the robot's base in the program of 2014."""
     parents: list[int] = []
     tags: list[str] = []
     elements: list[Node] = []

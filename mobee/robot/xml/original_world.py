@@ -19,8 +19,8 @@ LOWEST = 1e-6  # m; a shorter height axis counts as none, as in Qt
 def rewrite_world_list(root: Node) -> list[Remark]:
     """Rewrite a <WorldList> of objects, each of volumes in a frame of its own, into a <World> of volumes, in place.
 
-    The volumes of an object keep its name where it has one volume, and are numbered otherwise. An object drawn by colours of 0 to 255 keeps
-    them. A target exerted no force in 2014; here it repels all but the link that reaches for it.
+    An object's only volume gets its name; several volumes get its name and a number. Colours of 0 to 255 are converted. A target exerted
+    no force in 2014; here it repels all links except the hand that reaches for it.
     """
     remarks = [Remark(root, "read as a world of VirtualSkin or MoBeE, 2011 to 2014: <WorldList>", severity="note")]
     remarks += [Remark(at_line(root, repair.line), repair.what, repair.remedy) for repair in root.repairs]
@@ -74,13 +74,13 @@ def _world_volume(thing: Node, volume: Node, name: str) -> Node:
 
 
 def _turned(node: Node) -> tuple[Array, bool]:
-    """The rotation (3, 3) of an object or a volume of a world, and whether the program of 2014 mirrored it, which it did along -y."""
+    """Return the rotation (3, 3) of an object or volume, and whether the program of 2014 mirrored it, as it did for an axis along -y."""
     if np.linalg.norm(node.vector(AXIS)) <= LOWEST:
         axis = Y
     else:
         axis = direction(node, AXIS)
     mirrored = bool(np.hypot(axis[0], axis[2]) <= UPRIGHT and axis[1] < 0)
     angle = np.deg2rad(node.number("angle", 0.0))
-    if mirrored:  # every volume is symmetric about its centre: only the places of an object's volumes are mirrored
+    if mirrored:  # every volume is symmetric about its centre: only the positions of an object's volumes are mirrored
         return turn_about(axis, angle), True
     return height_along(axis, angle), False

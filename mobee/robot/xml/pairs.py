@@ -22,7 +22,7 @@ IGNORE_ATTRIBUTES = frozenset({"first", "second", "of", "part", "role", "reason"
 
 @dataclass(slots=True)
 class _Ignored:
-    """The pairs that the tags of one role name."""
+    """The pairs in the <ignore> tags of one role."""
 
     links: dict[LinkPair, str] = field(default_factory=dict)  # and why
     shapes: set[frozenset[int]] = field(default_factory=set)
@@ -89,7 +89,7 @@ Table = NDArray[np.bool_]
 
 
 def ignore_elements(robot: Robot) -> list[ET.Element]:
-    """Return <ignore> elements: parts without tests inside, then pairs of links with their reasons, then pairs of shapes."""
+    """Return the <ignore> elements of a robot: parts without internal tests, then pairs of links with reasons, then pairs of shapes."""
     elements = []
     for pair, reason in robot.untested.items():
         first, second = sorted(pair)
@@ -100,7 +100,7 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the elements by which a file excludes the pairs of a role that its rule `untested` still includes.
+    """Return the <ignore> elements that exclude the pairs of a role which `robot.untested` does not exclude.
 
     `pairs`: indices of the shapes to be tested with each other. `own`: the rule also tests fields of one part with each other.
     """

@@ -33,8 +33,8 @@ ROBOTS = Path(__file__).parents[1] / "robots"
 INCLUDE_ATTRIBUTES = frozenset({"name", "file", "angle", *PLACE, *AXIS})
 DEEPEST_INCLUDE = 8  # files that include each other
 MOST_FILES = 32  # in one robot: files that include several could grow without end
-MOST_JOINTS = 500  # pairs of links grow with the square
-MOST_ELEMENTS_2014 = 500  # and the descents of pairs_2014.py faster
+MOST_JOINTS = 500  # the number of pairs of links grows with the square
+MOST_ELEMENTS_2014 = 500  # the time of the rules in pairs_2014.py grows faster
 
 
 def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
@@ -130,10 +130,10 @@ KNOWN = {
 
 
 def read_robot(path: Path) -> Robot:
-    """The robot described by a zero-position XML file of any version (xml_versions.py).
+    """Return the robot described by a zero-position XML file of any version (see versions.py).
 
     Lengths in the file are in [m], angles in [deg]; everything in the Robot is in SI units, root frame, zero pose.
-    Raises RobotFileError with file, line, field and remedy; warns of what it ignores or repairs.
+    Raises RobotFileError with file, line, field and remedy; warns of elements that it ignores and faults that it repairs.
     """
     return _read(path, Trail())
 
@@ -306,9 +306,9 @@ class Trail:
 
 
 def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot]) -> Placed:
-    """The robot of a <robot>, read by `read`, at (px, py, pz), z turned the shortest way to (hx, hy, hz), then by `angle` about it.
+    """Return the robot of a <robot> and its pose: at (px, py, pz), z turned to (hx, hy, hz), then turned by `angle` about that axis.
 
-    Raises RobotFileError when the file cannot be found, includes itself, or too many are read; errors in it carry its own lines.
+    `read`: reads the file. Raises RobotFileError if the file is not found or includes itself, or if there are too many files.
     """
     prefix = node.optional("name")
     if prefix and not re.fullmatch("[a-z0-9_]+", prefix):
@@ -339,7 +339,7 @@ def _find(node: Node) -> Path:
     return path
 
 
-# What reads a tag, and the place for what stands inside; None where nothing does, or where it has been read already.
+# The reader of each tag; it returns the place for the elements inside, or None if there are none or they have been read.
 READERS: dict[str, Callable[[Node, Draft, Place], Place | None]] = {
     "bodypart": _read_part,
     "motor": _read_motor,

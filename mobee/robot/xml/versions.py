@@ -7,8 +7,8 @@
 | 0.1 | MoBeE 0.1 |
 | 1.0, or none | the programs of 2010 to 2014, or MoBeE 0.1 where a tag or an attribute shows it, for it wrote 1.0 too |
 
-MoBeE 0.1 differs from today in three rules: what stands inside a <link> stood relative to the link's end, a box was turned the
-shortest way to its height axis, and a marker without a normal had +z. What the older programs read differently: xml_original.py.
+MoBeE 0.1 differs from today in three rules: elements inside a <link> were placed relative to the link's end, the smallest rotation turned
+a box to its height axis, and a marker without a normal had +z. original.py lists the differences of the older programs.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _TAGS_OF_0_1 = frozenset({"capsule", "convex", "mass", "ignore", "robot"})
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """One thing that MoBeE 0.1 and today's grammar read differently: where, in words, and today's attributes for the meaning of 0.1."""
+    """An element that MoBeE 0.1 read differently: the rule of 0.1 in words, and today's attributes that express it."""
 
     node: Node
     rule: str
@@ -58,7 +58,7 @@ class _Change:
 
 
 def upgrade_robot(root: Node) -> list[Remark]:
-    """Rewrite a robot's elements into today's grammar, in place, and return how they were understood.
+    """Rewrite a robot's elements into today's grammar, in place; return remarks on their interpretation.
 
     Raises RobotFileError for an unknown version, and for a fault of form in a file that is not of 2010 to 2014.
     """
@@ -75,7 +75,7 @@ def upgrade_robot(root: Node) -> list[Remark]:
 
 
 def upgrade_world(root: Node) -> list[Remark]:
-    """Rewrite a world's elements into today's grammar, in place, and return how they were understood; errors as upgrade_robot."""
+    """Rewrite a world's elements into today's grammar, in place; return remarks on their interpretation; errors: see upgrade_robot."""
     if root.tag == "worldlist":
         remarks = rewrite_world_list(root)
     else:
@@ -138,7 +138,7 @@ def _rewrite_0_1(root: Node) -> list[Remark]:
 
 
 def _ambiguous(root: Node) -> list[Remark]:
-    """The warnings of a file that MoBeE 0.1 read too, but otherwise."""
+    """Return the warnings for a file that MoBeE 0.1 could also read, but read differently."""
     rules: dict[str, list[_Change]] = {}
     for change in _changes(root):
         rules.setdefault(change.rule, []).append(change)
@@ -154,7 +154,7 @@ def _times(changes: list[_Change]) -> str:
 
 
 def _changes(root: Node) -> Iterator[_Change]:
-    """Everything in a tree that MoBeE 0.1 and today's grammar read differently; a list of points must be complete."""
+    """Yield the elements that MoBeE 0.1 and today's grammar read differently; lists of points must be complete."""
     waiting: list[tuple[Node, Array]] = [(root, np.zeros(3))]
     while waiting:
         node, step = waiting.pop()
@@ -177,7 +177,7 @@ def _turned(node: Node) -> Iterator[_Change]:
     if node.tag == "box":
         axis, angle = height_and_angle(rotation)
         texts = dict(zip(AXIS, map(number, axis), strict=True)) | {"angle": degrees(angle)}
-    else:  # a hull is not the same when it is turned by 180 deg: its points are written as they stand
+    else:  # a hull is not symmetric: its points are written unchanged
         texts = {"points": numbers((np.array(node.numbers("points")).reshape(-1, 3) @ rotation.T).reshape(-1)), "angle": "0"}
     yield _Change(node, f"a <{node.tag}> turns the shortest way to its height axis", texts)
 

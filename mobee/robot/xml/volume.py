@@ -30,7 +30,7 @@ KINDS: dict[str, ShapeKind] = {"sphere": "sphere", "capsule": "capsule", "cylind
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Volume:
-    """Kind, size and vertices as in mobee.robot.robot.Shape, centre (3,) m and orientation (3, 3), relative to its parent point."""
+    """A volume of a file: kind, size, vertices as in `Shape`; centre (3,) m and rotation (3, 3), relative to its parent point."""
 
     kind: ShapeKind
     size: tuple[float, ...]
@@ -53,12 +53,12 @@ def read_volume(node: Node) -> Volume:
 
 
 def box_rotation(node: Node) -> Array:
-    """The orientation (3, 3) of a box: its height along (hx, hy, hz), y when left out, then turned by `angle` [deg] about it."""
+    """Return the rotation (3, 3) of a box: height along (hx, hy, hz), or y if these are absent, then turned by `angle` [deg] about it."""
     return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
 
 
 def height_along(axis: Array, angle: float) -> Array:
-    """The orientation (3, 3) of a box whose height lies along a unit vector, as the program of 2014 turned it.
+    """Return the rotation (3, 3) of a box with its height along the unit vector `axis`, as computed by the program of 2014.
 
     The box turns about y by the angle between x and the axis seen along y (0 to 180 deg), then about the common normal of y and the
     axis until its height lies along the axis, then by `angle` [rad] about the axis. Along -y it turns half a turn about x.
@@ -72,7 +72,7 @@ def height_along(axis: Array, angle: float) -> Array:
 
 
 def height_and_angle(rotation: Array) -> tuple[Array, float]:
-    """The unit vector (3,) and the angle [rad] from which `height_along` makes a box with the orientation `rotation` (3, 3)."""
+    """Return the unit vector (3,) and the angle [rad] for which `height_along` returns the rotation of the same box."""
     if rotation[1, 1] < HALFWAY:
         rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
     axis: Array = rotation[:, 1]
@@ -80,13 +80,13 @@ def height_and_angle(rotation: Array) -> tuple[Array, float]:
 
 
 def angle_about(axis: Array, rotation: Array) -> float:
-    """The angle [rad] about a unit vector (3,) for which `height_along` comes nearest to `rotation` (3, 3)."""
+    """Return the angle [rad] about a unit vector (3,) for which `height_along` is nearest to `rotation` (3, 3)."""
     rest = height_along(axis, 0.0).T @ rotation
     return float(np.arctan2(rest[0, 2] - rest[2, 0], rest[0, 0] + rest[2, 2]))
 
 
 def link_step(node: Node) -> tuple[Array, float]:
-    """The step (3,) m of a <link> and its length: (x, y, z), or with `length` along it."""
+    """Return the vector (3,) m from start to end of a <link>, and its length [m]: (x, y, z), or `length` along this direction."""
     step = node.vector(STEP)
     if "length" in node.attributes:
         length = node.positive("length")
@@ -95,7 +95,7 @@ def link_step(node: Node) -> tuple[Array, float]:
 
 
 def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-    """A unit vector along three attributes; raises RobotFileError when it has no length."""
+    """Return the unit vector along three attributes; raises RobotFileError if all are 0."""
     vector = node.vector(names, default)
     length = float(np.linalg.norm(vector))
     if length < 1e-9:

@@ -20,7 +20,7 @@ from mobee.robot.xml.pairs import ignore_elements
 from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world
 from mobee.robot.xml.volume import height_and_angle
 
-DIGITS = 1e-14  # m; less is the rounding of a sum
+DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 
 
 def write_xml(robot: Robot, path: str | Path) -> Path:
@@ -45,7 +45,7 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
 
 
 def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
-    """Write a robot or world file of an older version in today's form, element by element, and return how it was understood.
+    """Write a robot or world file of an older version in today's form, element by element; return remarks on its interpretation.
 
     Comments are left out, and files that it includes stay as they are. Returns None, and writes nothing, for a robot in today's form.
     Raises RobotFileError.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motor models fitted to the responses of a robot, one TOML file a robot; `mobee experiment run motor-identification` makes them."""
+"""Motor models fitted to the responses of a robot, one TOML file per robot; `mobee experiment run motor-identification` makes them."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ FITTED = ("lag", "delay", "backlash", "friction")
 
 
 def identified_robots() -> tuple[str, ...]:
-    """Names of the robots whose motors have been identified, sorted."""
+    """Return the names of the robots whose motors have been identified, sorted."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
 def load_identified(robot_name: str, motors: Sequence[str] | None = None) -> dict[str, Any]:
-    """The arguments of MotorParameters: lag, delay [s], backlash [rad], friction [rad/s], each (n,), and encoder_noise [rad].
+    """Return arguments of MotorParameters: lag, delay [s], backlash [rad], friction [rad/s], each (n,), and encoder_noise [rad].
 
-    In the order of the file, which is that of the robot, or of `motors`.  Raises UnknownName with the nearest for a robot that
-    has not been identified, InvalidValue for one that has other motors.
+    `motors`: names of the robot's motors, which give the order; None: the order of the file.  Raises UnknownName for a robot that has
+    not been identified, InvalidValue for one that has other motors.
     """
     if robot_name not in (known := identified_robots()):
         raise UnknownName("identified robot", robot_name, known)

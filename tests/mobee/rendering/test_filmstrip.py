@@ -122,7 +122,7 @@ def test_a_cloud_is_written_and_needs_one_value_a_pose(model: mobee.Model, tmp_p
     pytest.importorskip("matplotlib")
     q = np.tile(model.robot.home, (4, 1))
     assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=("top",), height=30).stat().st_size > 0
-    with pytest.raises(InvalidValue, match="one value a pose"):
+    with pytest.raises(InvalidValue, match="one value per pose"):
         marker_cloud(model, q, PALM, tmp_path / "cloud.png", values=[1.0])
 
 
