@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Encodes messages as msgpack; decodes them typed, versioned, length-checked and finite, or refuses them with a reason."""
+"""Encodes messages as msgpack, and decodes them; a message of a wrong type, version, length or with NaN is refused with a reason."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Refused(Exception):
 
 @cache
 def encoding_of(cls: type[Struct]) -> str:
-    """The encoding string that travels with a message of this type."""
+    """Return the encoding string that is sent with a message of this type."""
     return f"application/msgpack;icub/{cls.__name__}/{VERSION}"
 
 
@@ -36,7 +36,7 @@ def encode(message: Struct) -> bytes:
 
 
 def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = None, robot: int | None = None) -> _S:
-    """The message, if everything about it is right.
+    """Return the message in `payload`, after all checks.
 
     `part`, `robot`: number of motors that PartVector and RobotVector fields must have (None: not checked).
     Raises Refused with the reason.
@@ -70,7 +70,7 @@ def _decoder(cls: type[Struct]) -> msgspec.msgpack.Decoder[Any]:
 
 @cache
 def _vectors(cls: type[Struct]) -> tuple[tuple[str, str], ...]:
-    """(field, "part" or "robot") of every field whose length depends on the robot."""
+    """Return (field, "part" or "robot") for every field whose length depends on the robot."""
     found = []
     for name, hint in get_type_hints(cls, include_extras=True).items():
         kind = _length_kind(hint)
@@ -103,7 +103,7 @@ def _check_lengths(message: Struct, part: int | None, robot: int | None) -> None
 
 @cache
 def _numbers(cls: type[Struct]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Names of the fields that are a float, a list of floats, or something with a float in it; the rest is always finite."""
+    """Return the names of the fields of three kinds: a float, a list of floats, a value that contains floats; others are always finite."""
     kinds = {name: _number_kind(hint) for name, hint in get_type_hints(cls).items()}
     return (
         tuple(name for name, kind in kinds.items() if kind == "float"),

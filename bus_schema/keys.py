@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of calls and of liveliness tokens, as functions; the keys of streams stand beside their messages.
+"""Keys of calls and of liveliness tokens, as functions; the keys of streams are in the messages (`Message.stream`).
 
 The robot's name is the namespace of the session, so it is not part of them.
 """
@@ -15,7 +15,7 @@ EYES = ("left", "right")
 
 
 def meta(part: str) -> str:
-    """Motors and limits of a part: robot_sim."""
+    """Return the key of the call to robot_sim for the motors and limits of a part."""
     return f"{chunk(part)}/meta"
 
 
@@ -36,27 +36,27 @@ def goal(part: str, verb: str) -> str:
 
 
 def waypoint(part: str) -> str:
-    """Mark a pose to which a motion may be undone: port_filter."""
+    """Return the key of the call to port_filter that marks the present pose as one to which it may move back."""
     return f"{_part_or_all(part)}/rpc/waypoint"
 
 
 def sim(verb: str) -> str:
-    """The simulator: robot_sim; reset, pause, resume, place."""
+    """Return the key of a call to robot_sim about the simulation; `verb`: reset, pause, resume or place."""
     return f"sim/rpc/{chunk(verb)}"
 
 
 def world_rpc(verb: str) -> str:
-    """Edits of the model's world: model; add, move, remove, role, attach, detach, list."""
+    """Return the key of a call to the model about its world; `verb`: add, move, remove, role, attach, detach or list."""
     return f"model/rpc/world/{chunk(verb)}"
 
 
 def service_rpc(who: str, verb: str) -> str:
-    """Calls that every service answers: stat, mark, config, shutdown."""
+    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown."""
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 
 
 def alive(who: str, instance: str) -> str:
-    """Liveliness token of one process."""
+    """Return the key of the liveliness token of one process."""
     return f"alive/{chunk(who)}/{chunk(instance)}"
 
 

@@ -25,8 +25,8 @@ Quaternion = Annotated[list[float], Meta(min_length=4, max_length=4)]
 Matrix3 = Annotated[list[float], Meta(min_length=9, max_length=9)]  # row-major
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Text = Annotated[str, Meta(max_length=2000)]
-Link = Annotated[int, Meta(ge=-1)]  # index of the link that carries a shape, -1 = none does
-Count = Annotated[int, Meta(ge=0, le=2**62)]  # differences of two still fit into msgpack
+Link = Annotated[int, Meta(ge=-1)]  # index of the link that carries a shape, -1 = none
+Count = Annotated[int, Meta(ge=0, le=2**62)]  # so small that the difference of two fits into msgpack
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
@@ -54,15 +54,15 @@ class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Clock(Message, frozen=True, kw_only=True):
     """Start of tick k.  In mode "lock" the next tick begins when all participants have answered this one."""
 
-    stream: ClassVar[Stream] = Stream("clock", "CONTROL", writer="robot_sim, every tick up to 100 a second", readers="all others")
+    stream: ClassVar[Stream] = Stream("clock", "CONTROL", writer="robot_sim, every tick up to 100 per second", readers="all others")
 
-    dt: Annotated[int, Meta(gt=0)]  # ns a tick
+    dt: Annotated[int, Meta(gt=0)]  # ns per tick
     mode: Literal["free", "lock", "paused"]
     rate: Annotated[float, Meta(gt=0)]  # simulated seconds per second of real time, as configured
 
 
 class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
-    """When a part was sampled, and which command its motors follow; as in `State`."""
+    """The sampling time of a part, and the command that its motors follow; the same fields as in `State`."""
 
     k: Count  # tick
     t: Count  # ns, bus clock
@@ -71,7 +71,7 @@ class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
     faults: Count  # bit field, 0 = none
     epoch: Count  # drive epoch in force
     cmd_seq: int  # of the command in force, -1 = none
-    cmd_age: int  # ticks since the state it answers, -1 = none
+    cmd_age: int  # ticks since the state from which it was computed, -1 = none
 
 
 class Tick(Clock, frozen=True, kw_only=True):
@@ -92,8 +92,8 @@ class StepDone(Message, frozen=True, kw_only=True):
 
     re_k: Count  # tick that is answered
     ok: bool = True  # False: an input was missing, so the run is not repeatable
-    busy: list[Name] = []  # of the controller: services with nothing to decide, because every part that they own is moving
-    last: bool = False  # the sender leaves: later ticks do not wait for it
+    busy: list[Name] = []  # from the controller: services that have nothing to decide, because all their parts are moving
+    last: bool = False  # the sender leaves lockstep: later ticks do not wait for it
     including: list[Name] = []  # participants whose answers to that tick were used, so that they need not send StepDone
 
 
@@ -102,7 +102,7 @@ class Turn(Message, frozen=True, kw_only=True):
 
     stream: ClassVar[Stream] = Stream("turn/{service}", "STEP", writer="robot_sim, in lockstep", readers="that service")
 
-    dt: Count  # ns a tick
+    dt: Count  # ns per tick
 
 
 class State(Message, frozen=True, kw_only=True):
@@ -123,11 +123,11 @@ class State(Message, frozen=True, kw_only=True):
     faults: Count  # bit field, 0 = none
     epoch: Count  # drive epoch in force
     cmd_seq: int  # of the command in force, -1 = none
-    cmd_age: int  # ticks since the state it answers, -1 = none
+    cmd_age: int  # ticks since the state from which it was computed, -1 = none
 
 
 class Command(Message, frozen=True, kw_only=True):
-    """Command to the motors of one part, computed from tick re_k."""
+    """Command to the motors of one part, computed from the state of tick re_k."""
 
     stream: ClassVar[Stream] = Stream(
         "{part}/cmd", "CONTROL", writer="a client that drives a single part", readers="robot_sim, port_filter"
@@ -148,7 +148,7 @@ class Order(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Answer(Struct, frozen=True, forbid_unknown_fields=True):
-    """Lockstep: the content of `StepDone`, sent along with the commands."""
+    """Lockstep: the content of `StepDone`, sent in the same message as the commands."""
 
     ok: bool
     busy: list[Name]
@@ -156,7 +156,7 @@ class Answer(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Commands(Message, frozen=True, kw_only=True):
-    """Commands to the motors of several parts, computed from tick re_k; parts that are not named are not affected."""
+    """Commands to the motors of several parts, computed from the state of tick re_k; parts that are not named are not affected."""
 
     stream: ClassVar[Stream] = Stream("commands", "CONTROL", writer="controller, every tick", readers="robot_sim, port_filter")
 
@@ -171,7 +171,7 @@ class Motion(Message, frozen=True, kw_only=True):
     """State of a part's action."""
 
     stream: ClassVar[Stream] = Stream(
-        "{part}/motion", "CONTROL", writer="controller, at once after a change, else up to 100 a second", readers="agents, monitor"
+        "{part}/motion", "CONTROL", writer="controller, at once after a change, else up to 100 per second", readers="agents, monitor"
     )
 
     action_id: Text  # empty: none yet
@@ -190,11 +190,11 @@ class Reach(Message, frozen=True, kw_only=True):
     """State of a part's reach."""
 
     stream: ClassVar[Stream] = Stream(
-        "{part}/reach", "CONTROL", writer="controller, at once after a change, during a reach up to 100 a second", readers="model, agents"
+        "{part}/reach", "CONTROL", writer="controller, at once after a change, during a reach up to 100 per second", readers="model, agents"
     )
 
     action_id: Text  # as in Motion
-    phase: ReachPhase  # the force acts; the attractor draws back; ended with ("over") or without ("interrupted") an outcome
+    phase: ReachPhase  # reaching: under the force; returning: drawn back by the attractor; over, interrupted: ended with, without outcome
     marker: Name
     object: Name  # the target, an object of the model's world
     end_k: Count  # tick at which the force ended, the newest tick while it acts; the fields below are of that tick
@@ -202,7 +202,7 @@ class Reach(Message, frozen=True, kw_only=True):
     q: PartVector  # rad, encoders
     position: Vector3  # m, of the marker
     missing: float  # m, remaining distance of the marker to its goal
-    settled: bool  # the force ended because the part had settled
+    settled: bool  # True: the force ended because the part had settled
     touched: list[Name]  # world objects in contact
 
 
@@ -247,12 +247,12 @@ class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Forces(Message, frozen=True, kw_only=True):
-    """Terms of the control law at tick re_k (thesis eqs. 5.11-5.17); the controller publishes the user-defined terms."""
+    """Constraint forces at tick re_k by term (thesis eqs. 5.11-5.17); the controller publishes the user-defined terms."""
 
     stream: ClassVar[Stream] = Stream(
         "{source}/forces",
         "CONTROL",
-        writer="model, every tick; controller, if it has terms from outside (LATEST)",
+        writer="model, every tick; controller, if it has user-defined terms (LATEST)",
         readers="controller; monitor",
     )
 
@@ -260,7 +260,7 @@ class Forces(Message, frozen=True, kw_only=True):
     terms: dict[Name, RobotVector]  # rad/s^2, by name, in the order of addition
     part_age: dict[str, int]  # ns between the part's sample and tick re_k
     touched: dict[str, list[Name]]  # part -> world objects in contact
-    contacts: list[ContactItem] | None = None  # all contacts at that tick, if the controller has terms that may depend on them
+    contacts: list[ContactItem] | None = None  # all contacts at that tick, if the controller has user-defined terms
 
 
 class Contacts(Message, frozen=True, kw_only=True):
@@ -325,10 +325,10 @@ class Transition(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream("agents/{part}/transition", "EVENTS", writer="agents", readers="monitor, launcher")
 
     agent: Name
-    n: Count  # transitions the agent has observed, including this one
+    n: Count  # number of transitions that the agent has observed, including this one
     s: Count
     a: Count
-    goal: Count  # intended state of the action
+    goal: Count  # state at which the action aims
     s_next: Count
     reward: float  # 'Kail' divergence, nats; of a reaching agent 0, or the penalty of a failure
     value: float  # V(s) before the action
@@ -338,7 +338,7 @@ class Transition(Message, frozen=True, kw_only=True):
 
 
 class Surprise(Struct, frozen=True, forbid_unknown_fields=True):
-    """An outcome of an action other than its goal."""
+    """An outcome of an action that differs from its goal."""
 
     s: Count
     a: Count
@@ -357,7 +357,7 @@ class Learned(Message, frozen=True, kw_only=True):
     space: Annotated[str, Meta(max_length=1_000_000)]  # JSON of the settings from which the space can be made
     tries: bytes  # (S A) little-endian uint32; 0 also where a state has no such action
     reward: bytes  # (S A) little-endian float32, nats, or failures as in Transition; -inf where a state has no such action
-    value: bytes  # (S A) little-endian float32, of the plan; -inf likewise
+    value: bytes  # (S A) little-endian float32, action values of the plan; -inf where a state has no such action
     surprises: list[Surprise]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the tables of docs/bus.md from the messages: `python -m bus_schema.page`."""
+"""Writes the tables of docs/bus.md from the messages: `python -m bus_schema.page`."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 def main() -> None:
-    """Bring the page up to date."""
+    """Write the tables of the page anew."""
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def with_tables(page: str) -> str:
-    """The page with a new table between each pair of markers `begin NAME` and `end NAME`; raises KeyError for an unknown name."""
+    """Return the page with a new table between each pair of markers `begin NAME`, `end NAME`; raises KeyError for an unknown name."""
     tables = {"deliveries": _deliveries, "streams": _streams, "calls": _calls, "messages": _messages, "requests": _requests}
     return _MARKED.sub(lambda match: f"{match[1]}{tables[match[2]]()}{match[3]}", page)
 
 
 def structs(module: object) -> list[type[Struct]]:
-    """The messages, or requests and replies, of a module and the structs inside them, in the order of the source."""
+    """Return the messages, or requests and replies, of a module, and the structs inside them, in the order of the source."""
     found = [cls for _, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Struct) and cls not in _BASES]
     own = [cls for cls in found if inspect.getmodule(cls) is module]
     return sorted(own, key=lambda cls: inspect.getsourcelines(cls)[1])
 
 
 def streams() -> list[type[Message]]:
-    """All messages that have a key of their own."""
+    """Return all messages that have a key of their own."""
     return [cls for cls in structs(messages) if issubclass(cls, Message)]
 
 
@@ -87,7 +87,7 @@ def _anchor(cls: type[Struct]) -> str:
 
 
 def _fields(cls: type[Struct]) -> str:
-    """The fields that the class itself declares, as its source has them."""
+    """Return a table of the fields that the class itself declares, with the comments of the source."""
     rows = []
     for line in inspect.getsource(cls).splitlines():
         match = _FIELD.match(line)
@@ -97,7 +97,7 @@ def _fields(cls: type[Struct]) -> str:
 
 
 def _kind(annotation: str) -> str:
-    """The type of a field, with its bounds instead of Annotated[..., Meta(...)]."""
+    """Return the type of a field, with its bounds instead of Annotated[..., Meta(...)]."""
     match = _BOUNDED.match(annotation)
     if match is None:
         return annotation.replace("|", "\\|")

@@ -15,7 +15,7 @@ class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The header of every request."""
 
     v: int  # version of the contract
-    id: Name  # unique per call: a repeated request with the same id happens once
+    id: Name  # unique per call: a repeated request with the same id has no second effect
     who: Name  # service that calls
 
 
@@ -24,7 +24,7 @@ class Empty(Request, frozen=True, kw_only=True):
 
 
 class Take(Request, frozen=True, kw_only=True):
-    """Ask for ownership, which ends with the caller's liveliness token."""
+    """Take the ownership of a part's drive or goal; it ends with the caller's liveliness token."""
 
     instance: Name  # instance in the caller's token
 
@@ -105,14 +105,14 @@ class OneName(Request, frozen=True, kw_only=True):
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """Let an object move with a link from now on."""
+    """Attach an object to a link, with which it then moves."""
 
     name: Name
     link: Name
 
 
 class JacobianAt(Request, frozen=True, kw_only=True):
-    """Ask for the Jacobian of a marker at q; without q, at the newest pose."""
+    """Request the Jacobian of a marker at q [rad]; without q, at the newest pose."""
 
     marker: Name
     q: RobotVector | None = None
@@ -178,7 +178,7 @@ class World(Reply, frozen=True, kw_only=True):
 
 
 class JacobianReply(Reply, frozen=True, kw_only=True):
-    """A Jacobian: rows linear, then angular; columns are the robot's motors."""
+    """A Jacobian, root frame: rows linear [m/rad], then angular; one column for each of the robot's motors."""
 
     rows: Annotated[int, Meta(ge=1)]
     columns: Annotated[int, Meta(ge=1)]

@@ -13,7 +13,7 @@ DELIVERIES: dict[Delivery, str] = {
     "CONTROL": "LATEST in free mode, STEP in lockstep",
     "LATEST": "dropped rather than blocking the sender, highest priority; a receiver keeps the newest message only",
     "STEP": "every message, in order: a full queue blocks the sender",
-    "STOP": "as STEP: an emergency stop that is late is better than none",
+    "STOP": "as STEP, since a late emergency stop is better than a lost one",
     "DATA": "dropped rather than blocking the sender, lower priority than control",
     "BULK": "as DATA, lowest priority: pictures",
     "EVENTS": "as BULK; a subscriber that joins late gets the last 100 messages",
@@ -34,7 +34,7 @@ def chunk(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """The key of a message and how it is delivered; the tables in docs/bus.md are written from these.
+    """The key and the delivery class of a message; the tables in docs/bus.md are written from these.
 
     `pattern`: the key, with at most one variable in braces, such as "{part}/state".  `writer` and `readers`: names of services, and when
     they write.
@@ -52,9 +52,9 @@ class Stream:
         return found[1] if found else ""
 
     def key(self, name: str = "") -> str:
-        """The key to write, with `name` for its variable; raises ValueError for a name that cannot be part of a key."""
+        """Return the key to write, with `name` for its variable; raises ValueError for a name that cannot be part of a key."""
         return _VARIABLE.sub(lambda _: chunk(name), self.pattern)
 
     def keys(self, name: str = "*") -> str:
-        """The key expression to read; by default it matches all values of the variable."""
+        """Return the key expression to read; by default it matches all values of the variable."""
         return self.pattern if not self.variable else _VARIABLE.sub("*", self.pattern) if name == "*" else self.key(name)

@@ -96,7 +96,7 @@ def _prepare(path: Path, database: sqlite3.Connection) -> None:
 
 
 def _is_ours(path: Path, database: sqlite3.Connection) -> bool:
-    """False for a new file; raises MobeeError for one of another program or schema."""
+    """Return whether the file has our tables; False for a new file; raises MobeeError for one of another program or schema."""
     application, version = (database.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
     tables = database.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     if not tables and not application and not version:

@@ -27,7 +27,7 @@ class Range:
     lt: float | None = None
 
     def holds(self, value: float | np.integer | np.floating) -> bool:
-        """Whether a number is valid."""
+        """Return whether a number is valid."""
         return bool(
             np.isfinite(value)
             and (self.ge is None or value >= self.ge)
@@ -59,7 +59,7 @@ class Settings:
 
     @classmethod
     def made(cls, settings: Self | None, changes: Mapping[str, Any]) -> Self:
-        """The given settings, or the defaults if None, with some values replaced; raises UnknownName for a name that is no field."""
+        """Return the given settings, or the defaults if None, with some values replaced; raises UnknownName for a name that is no field."""
         valid = [field.name for field in fields(cls)]
         for name in changes:
             if name not in valid:

@@ -187,5 +187,5 @@ class CuriousLearner:
             self._learn(transition)
 
     def _pursued(self) -> Array:
-        """The reward (S, A) to plan with."""
+        """Return the reward (S, A) for plans: that of the model, or of the agent's goal."""
         return self.model.reward if self._external is None else self._external.combined(self.model.reward)

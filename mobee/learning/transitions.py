@@ -265,7 +265,7 @@ class TransitionModel(Tabled):
         return reward
 
     def _own_gain(self, state: int, action: int, outcome: int) -> float:
-        """The reward of an observation by the divergence function of the user, from the counts that Algorithm 6 would then have."""
+        """Return the reward of an observation by the user's divergence function, for the counts before and after it (Algorithm 6)."""
         states, counts = self.bins(state, action)
         imagined = self._imagined[: len(counts)]
         before = (counts - imagined) * self.forgetting + imagined
@@ -277,7 +277,7 @@ class TransitionModel(Tabled):
         return self._valued(after, before)
 
     def _valued(self, after: Array, before: Array) -> float:
-        """The divergence function of the user for counts; raises InvalidValue if it does not return a finite number."""
+        """Return the user's divergence for counts after and before; raises InvalidValue if the function returns no finite number."""
         assert self._function is not None
         value = self._function(after / after.sum(), before / before.sum())
         if not (isinstance(value, int | float | np.integer | np.floating) and np.isfinite(value)):

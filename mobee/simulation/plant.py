@@ -248,7 +248,7 @@ class OfflinePlant:
         return finished(self.advancing())
 
     def advancing(self) -> Work[list[tuple[str, Outcome]]]:
-        """Do `advance` in steps, for a caller that runs several plants at once."""
+        """Return the work of `advance` in steps, for a caller that runs several plants at once."""
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")
@@ -271,7 +271,7 @@ class OfflinePlant:
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:
-        """Do `run` in steps, for a caller that runs several plants at once."""
+        """Return the work of `run` in steps, for a caller that runs several plants at once."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
             rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))

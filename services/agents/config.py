@@ -31,7 +31,7 @@ TASK = ("goal", "goal_weight")  # settings of other types in a file, see Config
 
 
 def _of_file(hint: Any) -> Any:
-    """The type of a setting in a scenario file: text where the library takes a name or an object, and bounds as msgspec has them."""
+    """Return the type of a setting in a scenario file: text if the library takes a name or an object; bounds in msgspec's form."""
     if str in get_args(hint):
         return str
     kind, *valid = get_args(hint) if hasattr(hint, "__metadata__") else (hint,)
@@ -40,7 +40,7 @@ def _of_file(hint: Any) -> Any:
 
 
 def _fields_of(settings: type[Settings]) -> dict[str, tuple[str, Any, Any]]:
-    """Name, type and default of each setting."""
+    """Return name, type and default of each setting."""
     hints = hints_of(settings)
     return {one.name: (one.name, _of_file(hints[one.name]), one.default) for one in fields(settings) if one.name not in TASK}
 
@@ -60,9 +60,9 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     """An agent's configuration; the joints default to the published ones of its part (thesis 7.4)."""
 
     part: str = "left_arm"
-    """The part it moves."""
+    """Part that the agent moves."""
     joints: tuple[str, ...] = ()
-    """Motors that span its state space; empty: all of its part, or shoulder and elbow of a part that has a motor called elbow."""
+    """Motors that span the state space; empty: all of the part, or shoulder and elbow of a part that has a motor called elbow."""
     levels: tuple[float, ...] = (0.25, 0.5, 0.75)
     """Fractions of each joint's range at which the samples lie."""
     neighbours: Annotated[int, Meta(ge=0)] = 0
@@ -74,19 +74,19 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     goal_weight: float = 0.0
     """Reward of an action in such a state, nats, added to the information gain; 0: it replaces the information gain."""
     run_dir: str = ""
-    """Folder of the run, where its transitions are written and read again; empty: they are not kept."""
+    """Folder of the run, in which transitions are stored and from which a restarted agent reads them; empty: they are not stored."""
     transitions: Annotated[int, Meta(ge=0)] = 0
-    """Number of transitions after which it ends; 0: it does not end."""
+    """Number of transitions after which the agent ends; 0: no limit."""
     targets: tuple[tuple[float, float, float], ...] = ()
-    """Positions to learn to reach for, m, root frame; empty: it explores its space."""
+    """Positions for which the agent learns to reach, m, root frame; empty: it explores its space."""
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
-    """Radius of the sphere presented there, m."""
+    """Radius of the sphere that is presented at a target position, m."""
     marker: str = ""
-    """Marker to be put there; empty: the palm of its part, or the marker that most motors of the part move."""
+    """Marker that reaches for the targets; empty: the palm of the part, or the marker that most motors of the part move."""
     learned: str = ""
-    """Folder of a run with whose transitions it plans paths to reaches; empty: it assumes that most actions reach their goals."""
+    """Folder of a run whose transitions are used to plan paths to reaches; empty: most actions are assumed to reach their goals."""
     tries: Annotated[int, Meta(ge=0)] = 0
-    """Number of problem-tries after which it ends; 0: it does not end."""
+    """Number of problem-tries after which the agent ends; 0: no limit."""
 
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if a name is unknown, the part spans no state space, or it has no marker for the targets."""

@@ -32,7 +32,7 @@ class Work:
         self.interrupted = 0
 
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
-        """Make steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, empty if it is new."""
+        """Run steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, else empty."""
         self._service.ready()
         if resumed:
             self._service.bus.event("info", "resumed", resumed)

@@ -21,11 +21,11 @@ from mobee.store import Transition
 from services.common.bus import Bus, Publisher
 
 PERIOD = 0.5  # s of wall-clock time between two `Learned` messages: in lockstep, transitions come faster than a viewer needs them
-MAX_SURPRISES = 2000  # in a message: a picture cannot show more
+MAX_SURPRISES = 2000  # in one message
 
 
 def publish_transition(stream: Publisher[TransitionMessage], space: Space, n: int, made: Transition | Step, value: float) -> None:
-    """Publish a transition, the n-th of its agent; `value`: V(s) of the plan that it was part of."""
+    """Publish a transition, the n-th of its agent; `value`: V(s) of the plan in which it was chosen."""
     stream.put(
         agent=space.part,
         n=n,
@@ -71,7 +71,7 @@ class LearnedStream:
 
 
 def surprises(model: TransitionModel) -> list[Surprise]:
-    """Return the observed outcomes that are not the goals of their actions, with their shares of the tries; the most frequent 2000."""
+    """Return the observed outcomes that differ from the goals of their actions, with their shares of the tries; the 2000 most frequent."""
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
     share = real / np.maximum(real.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
@@ -82,7 +82,7 @@ def surprises(model: TransitionModel) -> list[Surprise]:
 
 
 class ReachStream:
-    """Publishes each transition, and `Learned` with the model of them; reaches are published by the controller (`Reach`)."""
+    """Publishes each transition, and `Learned` from their counts; the controller publishes the reaches (`Reach`)."""
 
     def __init__(self, bus: Bus, agent: ReachAgent) -> None:
         self._agent, self._seen, self._count = agent, TransitionModel(agent.space), 0
@@ -92,7 +92,7 @@ class ReachStream:
         self._learned = LearnedStream(bus, self._seen)
 
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
-        """Publish a step towards a target, with the values V (S,) and Q (S, A + 1) of the plan that it was part of."""
+        """Publish a step towards a target; `plan`: values V (S,) and Q (S, A + 1) of the plan in which the step was chosen."""
         values, action_values = plan
         self._note(step)
         if step.a != REACH:

@@ -28,16 +28,16 @@ class Body:
         return len(self.states) == len(self._streams)
 
     def forget(self) -> None:
-        """A new run: no state is known."""
+        """Drop all states, at the start of a new run."""
         self.states.clear()
 
     def q(self) -> Array:
-        """Motor positions, shape (n,), in [rad]; only after `update` returned True."""
+        """Return the motor positions, shape (n,), in [rad]; call it only after `update` has returned True."""
         q = np.empty(len(self._robot.motors))
         for name, part in self._robot.parts.items():
             q[part.slice] = self.states[name].q
         return q
 
     def ages(self, t: int) -> dict[str, int]:
-        """Age of each part's sample at bus time t, in [ns]."""
+        """Return the age [ns] of each part's sample at bus time t [ns]."""
         return {name: t - state.t for name, state in self.states.items()}

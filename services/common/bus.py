@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Typed streams on a session: delivery classes, headers on the way out, checks and counts on the way in."""
+"""Typed streams on a session: delivery classes, headers of sent messages, checks of received ones, counts of refused ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bus_schema.stream import Delivery
 
 @dataclass(frozen=True, slots=True)
 class _Settings:
-    """Zenoh's settings of a delivery class.  `history`: how many messages a late subscriber gets; 0 = none."""
+    """Zenoh's settings of a delivery class.  `history`: number of past messages that a late subscriber gets."""
 
     congestion: zenoh.CongestionControl
     priority: zenoh.Priority
@@ -45,11 +45,11 @@ NO_RUN = "-"  # before the first clock message
 
 
 class Publisher(Generic[_M]):
-    """One stream of one type; numbers its messages."""
+    """Publishes the messages of one stream, with sequence numbers."""
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
-        self._is_heard: bool | None = None  # None: not asked for yet
+        self._is_heard: bool | None = None  # None: not requested yet
         how = _SETTINGS[bus.control if delivery == "CONTROL" else delivery]
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
@@ -88,25 +88,25 @@ class Publisher(Generic[_M]):
         return self._is_heard
 
     def _note_matching(self, status: zenoh.MatchingStatus) -> None:
-        """On Zenoh's thread: a callback is much cheaper than a query in every tick."""
+        """Store whether there is a subscriber; Zenoh's thread calls it, which takes much less time than a query in every tick."""
         self._is_heard = bool(status.matching)
 
 
 class Latest(Generic[_M]):
-    """The newest message of a stream, polled; older ones are overwritten, never queued."""
+    """Holds the newest message of a stream until it is read; older ones are overwritten, never queued."""
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], part: str | None) -> None:
         self._bus, self._cls, self._part = bus, cls, part
         self._subscriber = bus.session.declare_subscriber(key, RingChannel(1))
 
     def take(self) -> _M | None:
-        """The newest valid message since the last call; None if there is none."""
+        """Return the newest valid message since the last call; None if there is none."""
         sample = self._subscriber.try_recv()
         return None if sample is None else self._bus.receive(self._cls, sample, self._part)
 
 
 def part_of(cls: type[Message], name: str) -> str | None:
-    """The part whose motors a message's vectors are over; None if its key names no part."""
+    """Return the part to whose motors the vectors of a message refer; None if its key has no part."""
     return name if cls.stream.variable == "part" and name != "*" else None
 
 
@@ -120,28 +120,28 @@ class Bus:
         self.part_sizes: dict[str, int] = {}
         self.robot_size: int | None = None
         self.rejected: Counter[str] = Counter()
-        self.control: Delivery = "LATEST"  # how CONTROL streams travel: STEP in lockstep
+        self.control: Delivery = "LATEST"  # delivery class of CONTROL streams: STEP in lockstep
         self._reported: dict[str, float] = {}
         self._events: Publisher[Event] = self.publisher(Event, who)
 
     def publisher(self, cls: type[_M], name: str = "", delivery: Delivery | None = None) -> Publisher[_M]:
-        """A stream to write.
+        """Return a publisher of a stream.
 
         Args:
-            cls: the message, which says where and how it is published (`Message.stream`).
+            cls: type of the messages; its `stream` holds key and delivery class.
             name: the variable in its key, such as the part.
             delivery: another delivery class than the message's own.
         """
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
 
     def latest(self, cls: type[_M], name: str = "*") -> Latest[_M]:
-        """A stream to poll for its newest message; `name`: the variable in its key, by default any."""
+        """Return an object that holds the newest message of a stream; `name`: the variable in its key, by default any."""
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """The message in a sample; None if it was refused, which is counted and reported.
+        """Return the message in a sample; None if it is refused, which is counted and reported.
 
-        Before the first clock message the run is not known: then it is None too, and nothing is counted.
+        Before the first clock message the run is not known: the result is None then, and nothing is counted.
         """
         if self.run == NO_RUN and not any_run:
             return None
@@ -164,6 +164,6 @@ class Bus:
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
 
     def event(self, level: str, code: str, text: str, **values: float) -> None:
-        """Report to a person: on the bus and in the log."""
+        """Report an event to the user: on the bus and in the log."""
         self.log.log({"info": 20, "warning": 30, "error": 40}[level], "%s: %s", code, text)
         self._events.put(level=level, code=code, text=text[:2000], values=values)

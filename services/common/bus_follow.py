@@ -35,7 +35,7 @@ class BusFollower(BusPlant):
 
     @property
     def q(self) -> Array:
-        """Positions of all motors by the encoders, (n,) rad; raises MobeeError if there is no robot."""
+        """The newest encoder values of all motors, (n,) rad; raises MobeeError if no tick of the robot arrives."""
         self._service.spin(time.monotonic() + TAKE_TIMEOUT, lambda: bool(self._seen))
         if not self._seen:
             raise MobeeError("no tick of the robot was received: `mobee status` shows whether robot_sim runs")
@@ -53,10 +53,10 @@ class BusFollower(BusPlant):
             self._wait(lambda: self._has(parts))
 
     def follow(self, parts: Sequence[str], attractors: Sequence[Array], period: float) -> dict[str, Outcome]:
-        """Move the attractor (n,) rad of parts that were taken, one row per period [s of the robot's clock], until all rest.
+        """Set the attractors of taken parts to one row (n,) rad of `attractors` per period [s of the robot's clock]; wait until all rest.
 
-        A row that is too late is left out, except the last.  Raises ActionInterrupted if a part is in hold or was lost to another
-        service, or the robot's clock stands still: call `let_go` then.
+        A row that is too late is left out, except the last.  Raises ActionInterrupted if a part is in hold or was taken by another
+        service, or if the robot's clock stands still; call `let_go` afterwards.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()
@@ -78,12 +78,12 @@ class BusFollower(BusPlant):
         return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:
-        """The encoders (T, n) of the ticks that came since `follow` began, and their times (T,) s since the first."""
+        """Return the encoder values (T, n) rad of all ticks since `follow` began, and their times (T,) s since the first."""
         times = np.array([time_ for time_, _ in self._seen])
         return times - times[:1], np.array([q for _, q in self._seen])
 
     def let_go(self) -> None:
-        """Release all goals, of which some may be lost already: the parts then stay where they are."""
+        """Release all goals; the parts then stay where they are. Goals that were lost before are ignored."""
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller: then the part holds
                 self.release(part)
@@ -99,7 +99,7 @@ class BusFollower(BusPlant):
         return all(self._owns(part) and self._is_free(part) for part in parts)
 
     def _aim(self, part: str, target: Array) -> tuple[str, int]:
-        """Set a part's attractor (n_part,) rad; returns the action's id, and the tick at which it began."""
+        """Set a part's attractor (n_part,) rad; return the id of the action, and the tick at which it began."""
         action_id = uuid.uuid4().hex
         return action_id, self._ask(part, "goal", Goal, action_id=action_id, q=[float(x) for x in target])
 

@@ -24,7 +24,7 @@ from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
-TRIES = 3  # of a call, each of half a second: whether it happened must be known
+TRIES = 3  # of a call, each of half a second: the caller must know whether the call had its effect
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 
@@ -66,7 +66,7 @@ class ReachClient:
         return self._target
 
     def asked(self) -> dict[str, object]:
-        """The fields of a ReachFor that describe the target; raises InvalidValue if none is presented."""
+        """Return the fields of a ReachFor that describe the target; raises InvalidValue if none is presented."""
         target = self._target
         if target is None:
             raise InvalidValue("no target is presented: call present(ReachTarget(position)) first")
@@ -87,7 +87,7 @@ class ReachClient:
         return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
 
     def outcome(self, part: str, motion: Motion, after: Outcome, tick: float) -> ReachOutcome:
-        """The outcome of a reach that has ended; `after`: the outcome of its action, `tick`: in s."""
+        """Return the outcome of a reach that has ended; `motion`: its last message; `after`: outcome of the second phase; `tick` [s]."""
         reach = self._reaches[part]
         if reach.phase == "interrupted":
             raise ActionInterrupted(f"{part}: the reach was interrupted")
@@ -139,7 +139,7 @@ class ReachClient:
 
 
 def _inner_radius(shape: Geometry) -> float:
-    """Radius [m] of the largest sphere about the centre that fits into the shape."""
+    """Return the radius [m] of the largest sphere about the centre that fits into the shape."""
     if shape.kind == "box":
         return 0.5 * min(shape.size)
     return min(shape.size[0], 0.5 * shape.size[1]) if shape.kind == "cylinder" else shape.size[0]
@@ -152,8 +152,8 @@ OWNED_PATIENCE = 3.0  # s for which a goal may belong to another service: the to
 class BusPlant:
     """A ReachPlant on the bus for some parts.  While it waits, the service answers calls.
 
-    In lockstep it takes part for its service: a tick of which the controller says that this service may have something to decide is
-    answered when the service waits again, so what it decides falls into that tick however long it takes.
+    In lockstep it answers ticks for its service: a tick that waits for a decision of this service is answered when the service waits
+    again, so that the decision is made within that tick however long it takes.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
@@ -162,7 +162,7 @@ class BusPlant:
         self._refused_since: dict[str, float] = {}  # monotonic clock
         self._motion: dict[str, Motion] = {}
         self._tick = 0.0  # s
-        self._q: Array | None = None  # of all motors, from the first use of `q` on
+        self._q: Array | None = None  # (n,) rad; None before the first use of `q`
         self._reads_all = False
         self._runs = 0
         self._participant = Participant(service)
@@ -180,7 +180,7 @@ class BusPlant:
 
     @property
     def q(self) -> Array:
-        """Positions of all motors by the encoders, (n,) rad, of the newest tick; the first use waits for one."""
+        """The encoder values of all motors at the newest tick, (n,) rad; the first use waits for a tick."""
         if not self._reads_all:
             self._service.on_newest(Tick, self._note_q)
             self._reads_all = True
@@ -190,7 +190,7 @@ class BusPlant:
         return self._q.copy()
 
     def measure(self, part: str) -> Array:
-        """The part's motor positions, (n_part,) rad; waits until the part is under control and its goal belongs to this service."""
+        """Return the part's motor positions, (n_part,) rad, once the part is under control and its goal belongs to this service."""
         self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
             self._service.check_router()
@@ -210,7 +210,7 @@ class BusPlant:
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
         """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
-        Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted as `present`.
+        Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted while the model does not answer.
         """
         return self._reaches.present_object(name, aim, normal)
 
@@ -222,7 +222,7 @@ class BusPlant:
         return self._reaches.outcome(part, self._motion[part], after, self._tick)
 
     def _perform(self, part: str, verb: str, request: type[Request], **fields: object) -> str:
-        """Start an action and wait for its end; returns its id.  Raises ActionInterrupted, or InvalidValue if it is refused."""
+        """Start an action and wait for its end; return its id.  Raises ActionInterrupted, or InvalidValue if it is refused."""
         if part not in self._epochs:
             self.measure(part)
         elif part in self._motion and not self._owns(part):
@@ -272,7 +272,7 @@ class BusPlant:
         self._service.spin(time.monotonic() + RETRY_PERIOD, may_go_on)
 
     def _answer(self) -> None:
-        """Answer the tick that waits; tick 0, which is repeated, only when all goals that can be owned are owned."""
+        """Answer the tick that waits for this service; tick 0, which is repeated, only after all goals were taken."""
         if self._to_answer is None:
             return
         if self._to_answer > 0 or all(self._owns(part) or self._is_held(part) for part in self._wanted):
@@ -284,7 +284,7 @@ class BusPlant:
         self._to_answer = turn.k
 
     def _ask(self, part: str, verb: str, request: type[Request], **fields: Any) -> int:
-        """Start the action; returns the tick at which it began."""
+        """Start an action; return the tick at which it began."""
         try:
             reply = self._service.call(keys.goal(part, verb), request, Started, tries=TRIES, epoch=self._epochs[part], **fields)
         except CallFailed as error:
@@ -339,7 +339,7 @@ class BusPlant:
         self._epochs[part] = reply.epoch
 
     def _wait_for_owner(self, part: str, refusal: str) -> None:
-        """Wait if the goal belongs to another service that may have just ended; raise MobeeError if it still does after a while."""
+        """Wait while the goal belongs to another service, which may have just ended; after OWNED_PATIENCE, raise MobeeError."""
         now = time.monotonic()
         if now - self._refused_since.setdefault(part, now) > OWNED_PATIENCE:
             raise MobeeError(refusal)

@@ -26,7 +26,7 @@ _KEY = re.compile("[a-z0-9_]+")
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be used; the message has file, line, field and the nearest valid name."""
+    """Raised for a configuration that cannot be used; the message has file, line, field and the nearest valid name."""
 
 
 class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,18 +39,18 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
     seed: int = 0
-    """Seed of everything random in this service."""
+    """Seed of all random numbers in this service."""
     mode: Literal["free", "lock"] = "free"
     """free: in real time; lock: in lockstep, where every tick waits for all participants and time runs as fast as they answer."""
     patience: Annotated[float, Meta(ge=2, le=60)] = 2.0
-    """Lockstep: s of real time after which a participant without answer is dropped; more if others use the machine too."""
+    """Lockstep: s of real time after which a participant without an answer is dropped; raise it on a busy machine."""
 
     def packages(self) -> Mapping[str, str]:
         """The packages that these settings need beside those of the service, by import name, each with the extra that brings it."""
         return {}
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the service cannot serve the robot with these settings; the message says why and what to do instead.
+        """Raise MobeeError if the service cannot serve the robot with these settings; the message has the reason and a remedy.
 
         The launcher calls this before it starts any service, and each service before it is ready. Services add their own conditions.
         """
@@ -69,12 +69,12 @@ class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
     """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
 
     def load_world(self) -> World:
-        """A new world as it is at the start; raises MobeeError for a name or file that cannot be read."""
+        """Return a new world in its initial state; raises MobeeError for a name or file that cannot be read."""
         return world_around(self.world, self.robot)
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
-    """The struct from its defaults, then `--config FILE` (TOML), then the other flags; exits with 2 on a mistake."""
+    """Return the settings: defaults, replaced by `--config FILE` (TOML), replaced by the other flags; exits with code 2 on an error."""
     given = sys.argv[1:] if argv is None else argv
     arguments = [piece for word in given for piece in (word.split("=", 1) if word.startswith("--config=") else [word])]
     default = cls()
@@ -99,7 +99,7 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
 
 
 def read_toml(path: Path, cls: type[_C]) -> _C:
-    """The struct that a TOML file describes; raises ConfigError in one line."""
+    """Return the settings in a TOML file as a `cls`; raises ConfigError in one line."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -119,7 +119,7 @@ def read_toml(path: Path, cls: type[_C]) -> _C:
 
 
 def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], prefix: str = "") -> _C:
-    """The struct that the data describe; raises ConfigError, which names the field and, by `where(field)`, its place."""
+    """Return data as a `cls`; raises ConfigError with the field; `where` returns the place of a field, such as "file:line"."""
     check_names(data, cls, where, prefix)
     try:
         return msgspec.convert(data, cls)
@@ -130,7 +130,7 @@ def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], pr
 
 
 def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], str], prefix: str = "") -> None:
-    """Raise ConfigError at the first name that the struct, or a struct in it, does not have."""
+    """Raise ConfigError for the first name in the data that is not a field of the struct or of a struct in it."""
     hints = get_type_hints(cls)
     for name, value in data.items():
         if name not in hints:
@@ -140,14 +140,14 @@ def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], 
 
 
 def nearest(given: str, valid: Iterable[str]) -> str:
-    """End of a message about an unknown name: the most similar valid name, and all valid names."""
+    """Return the end of a message about an unknown name: the most similar valid name, and all valid names."""
     names = list(valid)
     near = difflib.get_close_matches(given, names, n=1)
     return f"{f' Did you mean {near[0]!r}?' if near else ''} Valid: {', '.join(names) or 'none'}."
 
 
 def line_of(text: str, field: str) -> int | None:
-    """The line of a TOML text that sets a field, given with its tables' names; else of the innermost table around it."""
+    """Return the line of a TOML text that sets a field, given as "table.field", or else that of the innermost table around it."""
     field = field.partition("[")[0]  # msgspec does not say which entry of a table or list
     table, closest, found = "", -1, None
     for number, line in enumerate(text.splitlines(), start=1):
@@ -163,7 +163,7 @@ def line_of(text: str, field: str) -> int | None:
 
 
 def _check_table(table: dict[str, Any], hint: Any, where: Callable[[str], str], prefix: str) -> None:
-    """Descend into a struct, or into each value of a dict of structs."""
+    """Check the names in a table that is a struct, or in each value of a dict of structs."""
     if isinstance(hint, type) and issubclass(hint, Struct):
         check_names(table, hint, where, prefix)
         return
@@ -175,7 +175,7 @@ def _check_table(table: dict[str, Any], hint: Any, where: Callable[[str], str], 
 
 
 def _nearest_choice(data: dict[str, Any], cls: type[Struct], field: str) -> str:
-    """The nearest valid word for a field that takes one of a few words."""
+    """Return the nearest valid word for a field that accepts only a few words."""
     hint, given = get_type_hints(cls).get(field), data.get(field)
     if get_origin(hint) is Literal and isinstance(given, str):
         return nearest(given, map(str, get_args(hint)))

@@ -21,7 +21,7 @@ HELD = "MOBEE_HELD"  # environment variable; if set, standard input is a pipe th
 
 
 def wait_until_released() -> None:
-    """Wait until the services that this one needs are ready, if the launcher has started it before them."""
+    """Wait until the services on which this one depends are ready, if the launcher has started it before them."""
     if os.environ.pop(HELD, None) is not None:
         os.read(sys.stdin.fileno(), 1)  # returns at the end of the file
 
@@ -47,13 +47,13 @@ class _LogFile(logging.FileHandler):
     """A log file."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Drop a line for which the disk has no room, without logging's traceback, which would cover the status screen."""
+        """Drop a line if the disk is full, without the traceback of `logging`, which would cover the status screen."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handleError(record)
 
 
 def set_up_log(who: str, file: Path | None = None) -> logging.Logger:
-    """The logger of a service; it writes to standard error, which the launcher redirects to a file, or to `file`."""
+    """Return the logger of a service; it writes to `file`, or to standard error, which the launcher redirects to a file."""
     logging.basicConfig(
         handlers=[logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)],
         level=logging.INFO,

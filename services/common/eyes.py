@@ -17,7 +17,7 @@ UP = np.array([0.0, 0.0, 1.0])  # at zero pose the pictures stand upright
 
 
 def require_eyes(robot: Robot) -> None:
-    """Raise InvalidValue if the robot has no usable eyes; the message names what is missing and what to do."""
+    """Raise InvalidValue if the robot has no usable eyes; the message names the missing elements and the remedy."""
     instead = "Leave renderer and vision out of the scenario, or add what is missing to the robot's file."
     if missing := [name for name in EYES if name not in robot.markers]:
         raise InvalidValue(
@@ -38,10 +38,10 @@ def require_eyes(robot: Robot) -> None:
 
 
 def eye_frame(robot: Robot, transforms: Array, eye: str) -> tuple[Array, Array]:
-    """Optical centre (3,) m and rotation (3, 3) of the eye "left" or "right", root frame.
+    """Return optical centre (3,) m and rotation (3, 3) of the eye "left" or "right", root frame.
 
     The columns of the rotation are the picture's right, its down, and the direction of view (the marker's normal).
-    `transforms`: (L, 4, 4), from link_transforms.
+    `transforms`: (L, 4, 4), see `mobee.model.kinematics.link_transforms`.
     """
     marker = robot.marker(f"{eye}_eye")
     right = np.cross(marker.normal, UP)
@@ -52,7 +52,7 @@ def eye_frame(robot: Robot, transforms: Array, eye: str) -> tuple[Array, Array]:
 
 
 def frame_at_capture(robot: Robot, eye: str, q_head: Array, q_torso: Array) -> tuple[Array, Array]:
-    """The eye's frame, as eye_frame gives it, from the postures that came with a picture, in [rad]."""
+    """Return the frame of an eye, see eye_frame, from the postures [rad] of head and torso that were sent with a picture."""
     q = robot.home.copy()
     for name, posture in (("head", q_head), ("torso", q_torso)):
         part = robot.part(name)

@@ -16,14 +16,14 @@ EQUAL_DISTANCE = 1e-3  # m; palms whose distances differ by less count as equall
 
 
 def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
-    """The markers that a part moves, in the order of the file; raises UnknownName for a part that the robot does not have."""
+    """Return the markers that a part moves, in the order of the file; raises UnknownName for a part that the robot does not have."""
     robot.part(part)
     moved = links_moved(robot)[part]
     return tuple(name for name, marker in robot.markers.items() if marker.link in moved)
 
 
 def hand_of(robot: Robot, part: str) -> str:
-    """The marker that a part reaches with: the palm on its side (the right one for a torso), else the first of its end markers.
+    """Return the marker with which a part reaches: the palm on its side (the right one for a torso), else its first end marker.
 
     Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
     """
@@ -37,9 +37,9 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """The markers on moving links at the ends of the tree, or all moving markers if no end has one.
+    """Return the markers on moving links at the ends of the tree, or all moving markers if no end has one.
 
-    Those with the most motors before them come first, so a hand is before a wheel.
+    Markers that more motors move come first, so that a hand is before a wheel.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -49,7 +49,7 @@ def end_markers(robot: Robot) -> tuple[str, ...]:
 
 
 def part_of(robot: Robot, marker: str) -> str:
-    """The part with the most motors that move a marker; of equal ones the nearest to it.
+    """Return the part with the most motors that move a marker; among equals, the part nearest to the marker in the tree.
 
     Raises UnknownName for a marker that the robot does not have, InvalidValue for one that no motor moves.
     """
@@ -61,9 +61,9 @@ def part_of(robot: Robot, marker: str) -> str:
 
 
 def hand_for(robot: Robot, place: Array | None) -> str:
-    """Choose the marker that reaches a place: of the palms, or of the end markers with the most motors, the nearest one at home.
+    """Return the marker with which to reach for a place: the nearest, at home, of the palms or of the end markers with most motors.
 
-    `place`: (3,) m, or None if it is not known. Of equally near ones, or without a place, it is the right palm, or the first end marker.
+    `place`: (3,) m, or None if it is not known. Among equally near ones, or without a place: the right palm, or the first end marker.
     Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
@@ -81,7 +81,7 @@ def hand_for(robot: Robot, place: Array | None) -> str:
 
 
 def _motors_before(robot: Robot, marker: str) -> list[int]:
-    """The motors that move a marker, the nearest to it first."""
+    """Return the motors that move a marker, the nearest one in the tree first."""
     link = robot.marker(marker).link
     chain: list[int] = []
     while link > 0:

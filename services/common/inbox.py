@@ -15,20 +15,20 @@ from typing import Any, NoReturn
 
 Handler = Callable[[], None]
 CROWDED = 1000  # waiting messages and calls at which further messages are dropped
-CROWDED_WITH_CALLS = 2 * CROWDED  # at which further calls are dropped: a service must answer calls during a flood of messages
-CROWDED_WITH_STOPS = 2 * CROWDED_WITH_CALLS  # at which emergency stops are dropped: only a flood of stops gets this far
+CROWDED_WITH_CALLS = 2 * CROWDED  # the same for calls: a service must answer calls during a flood of messages
+CROWDED_WITH_STOPS = 2 * CROWDED_WITH_CALLS  # the same for emergency stops: only a flood of stops reaches this number
 GRACE = 0.002  # s for which `spin` handles waiting messages after its time is over
 
 
 class Newest:
-    """A slot that holds the newest sample of a stream and stands in the inbox at most once."""
+    """A slot for the newest sample of a stream; the inbox holds at most one handler of it."""
 
     def __init__(self, inbox: Inbox, handle: Callable[[Any], None]) -> None:
         self._inbox, self._handle, self._lock = inbox, handle, Lock()
         self._sample: Any = None
 
     def offer(self, sample: Any) -> None:
-        """Called by Zenoh's thread."""
+        """Store a sample and queue the handler if it is not queued; Zenoh's thread calls this."""
         with self._lock:
             waiting, self._sample = self._sample is not None, sample
         if not waiting:
@@ -41,13 +41,13 @@ class Newest:
 
 
 class Timer:
-    """A handler that is called at some time, unless it is cancelled before."""
+    """A handler that will be called at a given time unless it is cancelled before."""
 
     def __init__(self, handle: Handler) -> None:
         self.handle: Handler | None = handle
 
     def cancel(self) -> None:
-        """Do not call the handler, and do not wake the process for it; in a handler only."""
+        """Cancel the call, so that it does not wake the process either; call this only from a handler."""
         self.handle = None
 
 
@@ -67,7 +67,7 @@ class Inbox:
         self.handled = 0  # number of messages, calls and timers whose handler has run
 
     def put(self, handler: Handler) -> None:
-        """Let the main thread run the handler; any thread may call this."""
+        """Queue a handler for the main thread; any thread may call this."""
         self._queue.put(handler)
         if self._serves:
             self._calls.put(None)
@@ -97,7 +97,7 @@ class Inbox:
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
         """Queue the handler as `put` does; while `crowd` handlers are waiting, drop and count it, and return False.
 
-        So a flood of messages does not fill the memory.
+        This limits the memory that a flood of messages takes.
         """
         if self._queue.qsize() >= crowd:
             self.dropped += 1
@@ -114,24 +114,24 @@ class Inbox:
         return True
 
     def at(self, when: float, handler: Handler) -> Timer:
-        """Call the handler at a time of the monotonic clock; in the main thread or in a handler only."""
+        """Schedule a handler at a time of the monotonic clock; call this only in the main thread or in a handler."""
         timer = Timer(handler)
         heapq.heappush(self._timers, (when, next(self._order), timer))
         if self._serves:
-            self._calls.put(None)  # it may wait for a later time
+            self._calls.put(None)  # the main thread may be waiting for a later time
         return timer
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
         """Run handlers until that time of the monotonic clock, or until `enough` returns True.
 
-        Handlers that wait at that time still run, but only for the time GRACE, so that a flood does not block the caller.
+        Handlers that are queued at that time still run, but for at most GRACE s, so that a flood does not block the caller.
         """
         self._spin(until, enough, self._awaited)
 
     def serve(self, until: float) -> None:
-        """Run handlers as `spin` does; other threads may run handlers by `handle` while this thread waits.
+        """Run handlers as `spin` does; while this thread waits, other threads may run handlers themselves (`handle`).
 
-        The thread that has received a message then also answers it, which saves two changes of threads.
+        The thread that has received a message then also handles it, which saves two thread switches.
         """
         self._serves = True
         try:
@@ -160,11 +160,11 @@ class Inbox:
             self._run(handler)
 
     def _awaited(self, seconds: float) -> Handler:
-        """Wait for the next handler in the queue; raises Empty."""
+        """Wait for the next handler in the queue and return it; raises Empty after `seconds`."""
         return self._queue.get(timeout=seconds) if seconds > 0 else self._queue.get_nowait()
 
     def _called(self, seconds: float) -> Handler:
-        """Wait for a handler while other threads may run handlers.
+        """Wait for a handler and return it; other threads may run handlers meanwhile. Raises Empty after `seconds`.
 
         A handler stays in the queue until this thread continues, which keeps the order.
         """

@@ -30,7 +30,7 @@ class Listener:
         self.keeps_step = False  # set by a Participant in lockstep
         self.inject_test_delay: Callable[[], None] = lambda: None  # called before every tick, for tests of lockstep
         bus.control = "STEP" if locked else "LATEST"
-        self._kept: list[Any] = []  # tokens die with their handles
+        self._kept: list[Any] = []  # handles of tokens and subscriptions, which end with them
         self._on_run: list[Callable[[], None]] = []
 
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
@@ -60,7 +60,7 @@ class Listener:
             name: the variable in the message's key, such as the part; by default any.
             history: also messages from before this service joined.
             any_run: also messages of another run of robot_sim.
-            crowd: how many handlers may wait for the main thread before messages of this stream are dropped.
+            crowd: number of waiting handlers at which messages of this stream are dropped.
             later: do not wake the main thread; they are handled just before the next message of another stream.
         """
         key, part = cls.stream.keys(name), part_of(cls, name)
@@ -76,7 +76,7 @@ class Listener:
             self._subscribe(key, enqueue)
 
     def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-        """Handle the newest sample only; in lockstep every sample, because a slot would change the order of two streams."""
+        """Return a callback that handles only the newest sample; in lockstep every sample, since a slot would reorder two streams."""
         slot = Newest(self.inbox, handle)
 
         def offer(sample: zenoh.Sample) -> None:
@@ -88,11 +88,11 @@ class Listener:
         return offer
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
-        """Subscribe; `direct`: without a thread per subscriber, which costs time and could reorder two streams in lockstep."""
+        """Subscribe to a key; `direct`: without a thread per subscriber, which takes time and could reorder two streams in lockstep."""
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(_stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
-        """Handle the newest tick; the handlers of `on_run` are called first if it is of a new run."""
+        """Handle the newest tick; at the first tick of a run, the handlers of `on_run` are called before."""
         self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
@@ -107,7 +107,7 @@ class Listener:
         self._on_time(Tick, whole)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
-        """Lockstep, instead of `on_clock`: handle only those ticks that wait for this service."""
+        """Handle only those ticks that wait for this service; in lockstep, instead of `on_clock`."""
         self._on_time(Turn, handler, self.bus.who)
 
     def _on_time(self, cls: type[_T], handler: Callable[[_T], None], name: str = "*") -> None:

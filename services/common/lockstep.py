@@ -15,11 +15,11 @@ from collections.abc import Callable, Iterable, Sequence
 from bus_schema.messages import Answer, StepDone, Turn
 from services.common.service import Service
 
-TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep of a participant, at every tick and again before it answers
+TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep [ms] of a participant, at every tick and before its answer
 
 
 class Participant:
-    """A service that answers every tick, or every tick in which it has something to decide."""
+    """The side of a service that answers every tick, or every tick in which it has something to decide."""
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked
@@ -48,11 +48,11 @@ class Participant:
 
 
 class Barrier:
-    """Which participants must answer a tick, and which have.
+    """The participants that must answer a tick, and their answers.
 
     A participant is present from its first answer until its liveliness token disappears, it is dropped because it is late, or it gives its
-    last answer; when it answers again it is present again.  A participant that the controller's answer names as busy need not answer that
-    tick.  The others get their turn with that answer, so that an agent need not read every tick.
+    last answer; it is present again after its next answer.  A participant that the controller's answer lists as busy need not answer that
+    tick.  The others get a `Turn` message after that answer, so that an agent need not read every tick.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Barrier:
         referee: str = "controller",
         patience: float = 2.0,
     ) -> None:
-        """`report` is called with (participant, reason) when the run is not repeatable any more; `referee` names the busy participants.
+        """`report`: called with (participant, reason) when the run is no longer repeatable; `referee`: its answers list busy participants.
 
         `patience`: s of real time for one tick; a participant that has not answered by then is dropped.
         """
@@ -77,23 +77,23 @@ class Barrier:
         service.on_alive(self._note_alive)
 
     def begin(self) -> None:
-        """A new run: no participant is present yet."""
+        """Start a new run, in which no participant is present yet."""
         self._present.clear()
         self._answered.clear()
 
     def absent(self) -> list[str]:
-        """Expected participants that are not present."""
+        """Return the expected participants that are not present."""
         return sorted(self._expected - self._present)
 
     def missing(self, k: int) -> list[str]:
-        """Return the names of the present participants that have not answered tick k yet and must."""
+        """Return the names of the present participants whose answer to tick k is still to come."""
         waiting = {who for who in self._present if self._answered.get(who, -1) < k}
         if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
             waiting.difference_update(self._busy)
         return sorted(waiting)
 
     def wait(self, k: int) -> list[str]:
-        """Handle messages until all have answered tick k, or the time is over; returns the late participants, which are dropped."""
+        """Handle messages until all have answered tick k or the patience is over; drop the late participants and return their names."""
         if self._referee not in self._present:
             self._give_turns(())
         self._service.spin(time.monotonic() + self._patience, lambda: not self.missing(k))

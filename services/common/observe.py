@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observes a running system from outside, for tools: services present, messages published."""
+"""Functions for tools that observe a running system: services that are present, messages that are published."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Heard:
 
     @property
     def type(self) -> str:
-        """Name of the message's type; the whole encoding if it is no message of this project."""
+        """The name of the message's type, or the whole encoding string if it is not a message of this project."""
         return self.encoding.removeprefix("application/msgpack;icub/").partition("/")[0]
 
     def content(self) -> Any:
-        """The message as dicts, lists and values, unchecked; raises ValueError if it is not msgpack."""
+        """Return the message as dicts, lists and values, unchecked; raises ValueError if it is not msgpack."""
         try:
             return msgspec.msgpack.decode(self.payload)
         except (msgspec.MsgspecError, RecursionError) as error:
@@ -54,7 +54,7 @@ def listen(session: zenoh.Session, key: str, handle: Callable[[Heard], None]) ->
 
 
 def alive(session: zenoh.Session) -> dict[str, list[str]]:
-    """The running instances of each service, by their liveliness tokens."""
+    """Return the running instances of each service, from their liveliness tokens."""
     found: dict[str, list[str]] = {}
     for answer in session.liveliness().get(keys.ALL_ALIVE, timeout=1.0):
         if answer.ok is not None:
@@ -64,7 +64,7 @@ def alive(session: zenoh.Session) -> dict[str, list[str]]:
 
 
 def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
-    """The status of the services, all asked at once; those that do not answer in time are left out."""
+    """Return the status of services, all requested at once; services that do not answer within `timeout` s are left out."""
     answers: dict[str, Stat | rpc.CallFailed] = {}
 
     def ask(who: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps a rate by absolute deadlines; percentiles of measured times."""
+"""A fixed rate by absolute deadlines, and percentiles of measured times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Rate:
         self.missed = 0  # ticks that were skipped
 
     def next(self) -> float:
-        """The deadline to wait for; call it once per tick, after the tick's work."""
+        """Return the next deadline; call it once per tick, after the tick's work."""
         late = time.monotonic() - self.deadline
         if late > self.period:
             skipped = int(late / self.period)
@@ -42,7 +42,7 @@ class Percentiles:
         self._values.append(value)
 
     def clear(self) -> None:
-        """Forget all values: a measurement begins."""
+        """Drop all values, at the start of a measurement."""
         self._values.clear()
 
     def at(self, percent: float) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls with a time limit, client and server: a repeated call happens once."""
+"""Calls with a time limit, client and server; a repeated call has its effect only once."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOCKED_TIMEOUT = 1.5  # s, in lockstep: shorter than its patience, so that the l
 
 
 class CallFailed(Exception):
-    """A call that got no valid reply; `code` is the server's, or no_answer, or bad_answer."""
+    """Raised for a call without a valid reply; `code`: that of the server, or no_answer or bad_answer."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -41,7 +41,7 @@ def call(
 ) -> _R:
     """Call the service that answers `key` and wait for the reply; raises CallFailed.
 
-    `tries`: how often a call without answer is sent, always with one id, so that it happens at most once.
+    `tries`: how many times the call is sent while there is no answer; the id stays the same, so that it has its effect at most once.
     """
     payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
     for left in reversed(range(tries)):
@@ -65,7 +65,7 @@ def ask(
     timeout: float = TIMEOUT,
     **fields: object,
 ) -> None:
-    """Call without waiting: `done` gets the reply or the failure, once, on a thread of Zenoh."""
+    """Call without waiting; a thread of Zenoh calls `done` once with the reply or the failure."""
     message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
     answers: list[zenoh.Reply] = []
 
@@ -111,7 +111,7 @@ REMEMBERED = 256  # replies kept for repeated calls
 
 
 class CallRefused(Exception):
-    """Raised by the handler of a request: the caller gets code and text."""
+    """Raised by the handler of a request to refuse it; the caller receives code and text."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -126,7 +126,7 @@ class Answering:
         self._replies: OrderedDict[tuple[str, str], tuple[type[Reply], bytes]] = OrderedDict()
 
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
-        """Reply to a query on the `declared` key: handler(request, key) -> reply, or CallRefused."""
+        """Reply to a query on the `declared` key with the result of handler(request, key), or with the CallRefused that it raises."""
         key = str(query.key_expr) if "*" in declared else declared  # answers to one call with a wildcard must differ by key
         with query:
             try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The life cycle of a service: it opens the session, answers calls, shows that it is alive, and ends quickly in every state."""
+"""The life cycle of a service: opens the session, answers calls, declares a liveliness token, ends quickly in every state."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ ORPHANED = 10.0  # s without a router after which a service ends
 class Service(Listener):
     """A process on the bus.  All handlers run one after the other, in the main thread, inside `spin` or `run`.
 
-    In lockstep the handlers of a `prompt` service that is in `run` run in Zenoh's thread, which must not wait: they must not use `call`.
+    In lockstep, while a `prompt` service is in `run`, its handlers run in Zenoh's thread, which must not wait: they must not use `call`.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Service(Listener):
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
         self.words: Callable[[], Mapping[str, str]] = dict  # of `stat`: values that are not numbers
-        self.mark: Callable[[], None] = lambda: None  # called when a measurement begins: sets the counters of `describe` to 0
+        self.mark: Callable[[], None] = lambda: None  # called at the start of a measurement: sets the counters of `describe` to 0
         self.end: Callable[[], None] = _leave  # called after a shutdown call
         self._answering = Answering(self.bus)
         self._on_alive: list[Callable[[str, str, bool], None]] = []
@@ -127,7 +127,7 @@ class Service(Listener):
                 self.log.error("ended by %s", error, exc_info=error)
 
     def _is_explained(self, error: BaseException) -> bool:
-        """Whether the text of the error is enough for a user (entry.py prints it); an InvalidValue after the start is a defect."""
+        """Return whether the error's text without a traceback is enough for a user; an InvalidValue after the start is a defect."""
         return type(error) is MobeeError or (isinstance(error, MobeeError) and not self._is_ready)
 
     def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
@@ -135,7 +135,7 @@ class Service(Listener):
         self._on_alive.append(handler)
 
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
-        """Answer calls by handler(request, key) -> reply, or CallRefused.  `part_of_key`: the key begins with the part's name."""
+        """Answer calls with the result of handler(request, key), which may raise CallRefused; `part_of_key`: the key begins with a part."""
 
         def enqueue(query: zenoh.Query) -> None:
             self.inbox.offer(lambda: self._answering.answer(query, key, cls, handler, part_of_key), CROWDED_WITH_CALLS)
@@ -158,7 +158,7 @@ class Service(Listener):
         timeout: float = rpc.TIMEOUT,
         **fields: object,
     ) -> None:
-        """Call without waiting: `done` handles the answer or the failure in the main thread."""
+        """Call without waiting; `done` is called with the answer or the failure in the main thread."""
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
             self.inbox.put(lambda: done(answer))
@@ -213,7 +213,7 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """Note the router; end if it is another one, because a service must not join a system that is started later."""
+        """Store the router's id; end the process if it is another router, since a service must not join a system that was started later."""
         if self._router not in ("", router):
             self.log.error("another router came to %s, of a new system: this service ends", self.config.endpoint)
             raise SystemExit(ENVIRONMENT)
@@ -251,7 +251,7 @@ class Service(Listener):
 
     def _shutdown(self, request: Empty, key: str) -> Done:
         self.log.info("%s requested the end", request.who)
-        self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply is out
+        self.inbox.at(time.monotonic() + 0.05, self.end)  # after the reply was sent
         return Done(v=VERSION)
 
 
@@ -263,7 +263,7 @@ def _measured(value: float) -> int | float | None:
 
 
 def _return_free_memory() -> None:
-    """Return freed memory of the start to the system, if the C library can: 23 MB if meshes were read."""
+    """Return memory that was freed after the start to the system, if the C library can: 23 MB if meshes were read."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc
     if trim is not None:
         trim(0)

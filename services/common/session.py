@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens Zenoh sessions: client of the launcher's router, or that router."""
+"""Opens Zenoh sessions, as a client of the launcher's router or as that router."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _ONE_THREAD = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx)
 
 
 class BusUnreachable(Exception):
-    """There is no router at the endpoint; the message names it and what to do."""
+    """Raised if there is no router at the endpoint; the message has the endpoint and the remedy."""
 
 
 def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.Config:
@@ -43,16 +43,16 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 
 
 def spare_threads() -> None:
-    """Let Zenoh use one thread of this process; call it before the first session.
+    """Restrict Zenoh to one thread in this process; call it before the first session.
 
-    In lockstep services wait for one message after the other, and passing each from thread to thread takes a fifth of the time.
+    In lockstep services wait for one message after the other, and handing each from thread to thread takes a fifth of the time.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 
 
 @contextmanager
 def local_endpoint() -> Iterator[str]:
-    """A second address of a router for processes on the same machine: a Unix socket in a private folder; empty if that is not possible.
+    """Yield a second address of a router for processes on this machine: a Unix socket in a private folder; empty if that is not possible.
 
     It is faster than TCP on the loopback interface.
     """
@@ -62,9 +62,9 @@ def local_endpoint() -> Iterator[str]:
 
 
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
-    """A session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
+    """Open a session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: prefix of all keys: the robot, or the filter in front of it.  `lease`: s without a sign of life after which this process
+    `namespace`: prefix of all keys, of the robot or of the filter in front of it.  `lease`: s without a message after which this process
     counts as dead.
     """
     settings: dict[str, object] = {
@@ -98,7 +98,7 @@ def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -
 
 
 def _reason(error: zenoh.ZError) -> str:
-    """Zenoh's message without the lines of its own source files."""
+    """Return Zenoh's error message without the positions in its source files."""
     text = re.sub(r" at /\S+\.rs:\d+\.?", "", str(error)).strip(" .")
     text = re.sub(r'^Json5Err\(Message \{ msg: "(.*?)", location:.*', r"\1", text)
     return re.sub(r"Unable to connect to any of \[.*\]!", "no answer", text)

@@ -18,11 +18,11 @@ AT_TABLE = ("icub", "icub_2014", "icub_katana")  # shipped robots whose experime
 
 
 def effective_world(given: str | None, robot: str | Path) -> str:
-    """The name or path of the world to load, or NO_WORLD.
+    """Return the name or path of the world to load, or NO_WORLD.
 
     Args:
         given: a shipped world, a path, NO_WORLD, or nothing ("" or None).
-        robot: the shipped name or the path that the robot is loaded from. A path is an own robot, also where its file has the
+        robot: the shipped name or the path from which the robot is loaded. A path is a user's robot, even if the file has the
             name icub: only the shipped names imply the table.
     """
     if given:
@@ -31,18 +31,18 @@ def effective_world(given: str | None, robot: str | Path) -> str:
 
 
 def is_path(name_or_path: object) -> bool:
-    """Whether a setting is the path of a file, and not a shipped name, as load_robot and load_world read it."""
+    """Return whether load_robot and load_world read a setting as the path of a file, not as a shipped name."""
     return isinstance(name_or_path, str) and (bool(Path(name_or_path).suffix) or Path(name_or_path).name != name_or_path)
 
 
 def world_around(given: str | None, robot: str | Path) -> World:
-    """A new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
+    """Return a new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
     name = effective_world(given, robot)
     return World() if name == NO_WORLD else load_world(name)
 
 
 def robot_hash(robot: Robot) -> str:
-    """Hash of names, tree and motors; the shapes do not matter to who drives it."""
+    """Return a hash of the robot's names, tree and motors; shapes are not included, since commands do not depend on them."""
     digest = hashlib.sha256(repr((robot.name, robot.links, robot.motors)).encode())
     for joint in robot.joints:
         digest.update(repr((joint.name, joint.parent, joint.kind)).encode())

@@ -13,7 +13,7 @@ from mobee.control import Settle, SettleTest
 
 @dataclass
 class Owner:
-    """The process that owns a part's goal, as long as its liveliness token exists."""
+    """The process that owns a part's goal while its liveliness token exists."""
 
     who: str
     instance: str
@@ -32,7 +32,7 @@ class Action:
         self.since_k = self.start_k = 0
 
     def start(self, action_id: str, k: int, t: float) -> None:
-        """A goal was set at tick k."""
+        """Start an action whose goal was set at tick k, time t [s]."""
         self.id, self.start_k = action_id, k
         self.settle_again(k, t)
 
@@ -48,17 +48,17 @@ class Action:
             self._set_status("moving" if verdict == "settled" and continues() else verdict, k)
 
     def hold(self, k: int) -> None:
-        """The part is not under control: its action has ended without an outcome."""
+        """End the action without an outcome, because the part is not under control."""
         self._test = None
         self._set_status("held", k)
 
     def resume(self, k: int) -> None:
-        """Under control again, at rest, without an action."""
+        """Set the status of a part that is under control again: at rest, without an action."""
         self.id = ""
         self._set_status("idle", k)
 
     def lose_owner(self, k: int) -> None:
-        """The owner is gone: its action ends."""
+        """End the action and the ownership, because the owner has ended."""
         self.owner, self._test = None, None
         if self.status != "held":
             self.resume(k)
@@ -69,7 +69,7 @@ class Action:
 
 
 def busy_owners(actions: Iterable[Action]) -> list[str]:
-    """Return the names of the services all of whose parts are moving, so that they have nothing to decide in this tick."""
+    """Return the names of the services that have nothing to decide in this tick, because all their parts are moving."""
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:

@@ -17,13 +17,13 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The controller's settings."""
 
     gains: Literal["default", "published_2014"] = "published_2014"
-    """Which set of gains; the model must use the same."""
+    """Name of the set of gains; the model must use the same."""
     modality: Literal["position", "velocity", "torque"] = "velocity"
-    """What the motors are commanded."""
+    """Kind of command to the motors."""
     speed_scale: Annotated[float, Meta(gt=0, le=1)] = 1.0
-    """Share of the motors' top speed that is used."""
+    """Share of the motors' largest speed that is used."""
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
-    """Milliseconds after which robot_sim holds a part that it hears nothing for."""
+    """Milliseconds without a command after which robot_sim holds a part."""
     terms: list[str] = []
     """Further forces of the law, each an importable `module:name` of a Term or its function; the model needs the same setting."""
     posture: dict[str, list[float]] = {}

@@ -19,7 +19,7 @@ CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was a
 
 
 class Drives:
-    """The drive epoch of each part, and whether robot_sim follows this controller's commands.
+    """The drive epoch of each part, and the knowledge whether robot_sim follows this controller's commands.
 
     No method waits for an answer: while one part is being armed, the others need their commands.  Times are of the monotonic clock, in
     lockstep of the bus clock.
@@ -50,7 +50,7 @@ class Drives:
         return self._service.bus.t * 1e-9 if self._service.locked else time.monotonic()
 
     def is_armed(self, part: str, state: PartStatus) -> bool:
-        """Whether the part follows this controller's commands, by its newest state, or because it was armed just now."""
+        """Return whether the part follows this controller's commands, by its newest state, or because it was armed just now."""
         if self.epochs[part] == 0:
             return False
         if state.epoch == self.epochs[part] and state.gate == "armed":
@@ -59,7 +59,7 @@ class Drives:
         return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """A new run of robot_sim: all epochs, and answers that are still to come, are void."""
+        """Drop all epochs and pending answers, at the start of a new run of robot_sim."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()

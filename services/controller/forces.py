@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces that the law receives: those of the model, checked, and user-defined terms."""
+"""The law's inputs from outside: the forces of the model, checked, and user-defined terms."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from mobee.model.snapshot import Hands, Snapshot
 from mobee.robot.robot import Robot
 from mobee.settings import imported
 
-MAX_TICKS = 3  # age of forces beyond which the robot holds, and ticks that the law catches up at most
+MAX_TICKS = 3  # largest age of forces, beyond which the robot holds; largest number of ticks in one step of the law
 MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under control
 
 
 class ModelForces:
-    """The newest forces of the model, as they were published and as vectors."""
+    """The newest forces of the model, as the published message and as vectors."""
 
     def __init__(self, robot: Robot, needs_contacts: bool) -> None:
         """`needs_contacts`: messages without contacts are refused, because the terms of the law may depend on them."""
@@ -33,34 +33,34 @@ class ModelForces:
         self.vectors: Forces  # each term (n,) rad/s^2, of `message`
 
     def take(self, message: ForcesMessage) -> str:
-        """Replace the forces; returns why they were refused instead, or an empty text."""
+        """Replace the forces if the message is valid; return the reason why it was refused, else an empty text."""
         why = self._refusal(message)
         if not why:
             self.message, self.vectors = message, Forces(**{name: np.array(row) for name, row in message.terms.items()})
         return why
 
     def forget(self) -> None:
-        """Drop the forces: a new run, or the model is gone."""
+        """Drop the forces, at the start of a new run or when the model has ended."""
         self.message = None
 
     def answer(self, k: int) -> bool:
-        """Whether they are of tick k or later."""
+        """Return whether the forces are of tick k or later."""
         return self.message is not None and self.message.re_k >= k
 
     def are_fresh(self, k: int) -> bool:
-        """Whether they are of a tick near k, and computed from recent states of all parts; a contact concerns several parts."""
+        """Return whether the forces are of a tick near k and computed from recent states of all parts, since contacts involve several."""
         if self.message is None:
             return False
         ages = (self.message.part_age.get(part, MAX_STATE_AGE + 1) for part in self._robot.parts)
         return abs(k - self.message.re_k) <= MAX_TICKS and all(age <= MAX_STATE_AGE for age in ages)
 
     def touched(self, part: str) -> list[str]:
-        """World objects in contact with a part."""
+        """Return the world objects in contact with a part."""
         return self.message.touched.get(part, []) if self.message is not None else []
 
     @property
     def contacts(self) -> Sequence[ContactItem]:
-        """All contacts, if the model publishes them."""
+        """Return all contacts, if the model publishes them."""
         return self.message.contacts or () if self.message is not None else ()
 
     def _refusal(self, message: ForcesMessage) -> str:
@@ -91,13 +91,13 @@ def _term(path: str) -> Term:
 
 
 class PublishedContacts:
-    """The contacts that the model published, in the form that a pose uses instead of its own (`Pose.feel`)."""
+    """The contacts that the model published, in the form in which a pose takes them from outside (`Pose.compute_contacts`)."""
 
     def __init__(self, pose: Pose, contacts: Sequence[ContactItem]) -> None:
         self._pose, self._contacts = pose, contacts
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """The contact table, and the sum of J^T (depth * normal) over the contacts of fields, (1, n)."""
+        """Return the contact table, and the sum of J^T (depth * normal) over the contacts of fields, (1, n)."""
         felt, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):
             numbers.append((0, KINDS.index(contact.kind), 2 * at, 2 * at + 1, contact.first_link, contact.second_link))

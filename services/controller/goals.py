@@ -80,7 +80,7 @@ class GoalServer:
         except MobeeError as error:
             raise CallRefused("reach", str(error)) from None
         started = self._start(part, request.action_id)
-        self._commands.send_again(part)  # do not wait for the next tick
+        self._commands.send_again(part)  # before the next tick
         return started
 
     def _start(self, part: str, action_id: str) -> Started:
@@ -100,7 +100,7 @@ class GoalServer:
     def _apply(self, part: str, request: Force) -> None:
         if (request.marker is None) != (request.push is None):
             raise InvalidValue("a push needs both: the marker and the force (marker, push)")
-        largest = LARGEST_FORCE / len(self._robot.parts)  # so that the law takes their sum, whatever other clients push with
+        largest = LARGEST_FORCE / len(self._robot.parts)  # so that the law accepts the sum of all clients' forces
         for number in (*(request.f or ()), *(request.push or ())):
             if abs(number) > largest:
                 raise InvalidValue(f"a force of {number:.3g}: its absolute value must be at most {largest:.3g}")

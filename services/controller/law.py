@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The control law of the whole robot as the controller runs it: the one owner of the law's state."""
+"""The control law of the whole robot in the controller; this file alone changes the law's state."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RobotLaw:
     """
 
     def __init__(self, bus: Bus, config: Config, robot: Robot) -> None:
-        """At rest at home; every code path of a reach has run once, so that the first real one is not late."""
+        """Start at rest at home, and run every code path of a reach once, so that the first real reach is not delayed."""
         self._bus, self._config, self._robot = bus, config, robot
         model = Model(robot)  # without a world: contacts come from the model service
         gains = Gains.named(config.gains)
@@ -55,23 +55,23 @@ class RobotLaw:
     # Ticks
 
     def reset(self) -> None:
-        """A new run: at rest at home, without forces of the model."""
+        """Reset the law at the start of a run: at rest at home, without forces of the model."""
         self.forces.forget()
         self._last_k, self._last_tick = -1, None
         self._law.reset(self._robot.home)
 
     def measure(self, q: Array) -> None:
-        """A tick begins, in which the motors are at q (n,) rad."""
+        """Store the measured positions q (n,) rad at the start of a tick."""
         self.q, self._last_tick = q, None
 
     def count_ticks(self, k: int) -> int:
-        """Ticks since the last call in this run, at least 1."""
+        """Return the number of ticks since the last call in this run, at least 1."""
         ticks = max(k - self._last_k, 1) if self._last_k >= 0 else 1
         self._last_k = k
         return ticks
 
     def step(self, tick: Tick, ticks: int) -> Array:
-        """Advance the law over `ticks` ticks; returns the reference (n,) in the unit of the modality."""
+        """Advance the law over `ticks` ticks; return the reference (n,): rad, rad/s or N m by the modality."""
         for _ in range(ticks):
             self._state_before = self._law.state.copy()
             command = self._step(tick)
@@ -79,14 +79,14 @@ class RobotLaw:
         return self._reference(command)
 
     def repeat_step(self) -> Array | None:
-        """Compute the last step again, with what clients have asked for since; None if it cannot be repeated."""
+        """Compute the last step again, with the requests of clients since then; return the reference, None if it cannot be repeated."""
         if self._last_tick is None:
             return None
         self._law.state[:] = self._state_before
         return self._reference(self._step(self._last_tick))
 
     def _step(self, tick: Tick) -> Command:
-        """One step under the forces of the model; user-defined terms are evaluated at its contacts."""
+        """Advance the law by one step under the forces of the model; user-defined terms get the model's contacts."""
         dt, forces = tick.dt / 1e9, self.forces.vectors
         if not self._needs_contacts:
             return self._law.step(self.q, dt, forces)
@@ -113,7 +113,7 @@ class RobotLaw:
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:
-        """Nobody owns the part any more: it brakes and stays, or goes to the posture that its settings give."""
+        """Stop a part without an owner: it brakes and stays, or moves to the posture in the settings."""
         if self._last_k >= 0:
             self._law.hold(part, self.q[self._where[part]])
             self._last_tick = None
@@ -125,16 +125,16 @@ class RobotLaw:
             self._law.set_attractor(part, np.array(self._config.posture[part]))
 
     def set_attractor(self, part: str, target: Array) -> None:
-        """Draw the part to `target` (n_part,) rad."""
+        """Set the attractor of the part to `target` (n_part,) rad."""
         self._law.set_attractor(part, target)
 
     def motion(self, part: str) -> tuple[Array, Array, Array]:
-        """Velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
+        """Return velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
         where = self._where[part]
         return self._law.velocity[where], self._law.acceleration[where], self._law.attractor[where]
 
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
-        """Velocity and acceleration of the part's motors, each in the motor's fine unit, for the test of settling."""
+        """Return velocity and acceleration of the part's motors, (n_part,) each, in the fine unit of each motor, for the settle test."""
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
 
@@ -149,20 +149,20 @@ class RobotLaw:
         self._law.end_reach(part)
 
     def is_approaching(self, part: str) -> bool:
-        """Whether the marker of the part's reach still comes nearer to its target."""
+        """Return whether the marker of the part's reach still comes nearer to its target."""
         return self._law.is_approaching(part)
 
     def marker_position(self, marker: str) -> Array:
-        """Where the marker is at the measured positions, (3,) m."""
+        """Return the position of a marker at the measured motor positions, (3,) m, root frame."""
         return self._law.model.evaluate(self.q).position(marker)
 
     def set_client_force(self, part: str, force: Array) -> None:
-        """A client's joint-space force on a part, (n_part,) rad/s^2 (thesis eq. 5.9)."""
+        """Set a client's joint-space force on a part, (n_part,) rad/s^2 (thesis eq. 5.9)."""
         self._client_forces[self._where[part]] = force
         self._apply_client_forces()
 
     def set_push(self, part: str, marker: str, push: Array) -> None:
-        """A client's force at a marker of a part, (3,) m/s^2 (thesis eq. 5.10); several clients may push at one marker."""
+        """Set a client's force at a marker of a part, (3,) m/s^2 (thesis eq. 5.10); several clients may push at one marker."""
         self._pushes.setdefault(part, {})[marker] = push
         self._apply_client_forces()
 

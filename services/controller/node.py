@@ -89,7 +89,7 @@ class ControllerNode:
             self._step()
 
     def _step_without_model(self) -> None:
-        """In lockstep, take the pending step without the model's forces if no model is running; otherwise the step waits for them."""
+        """In lockstep, make the pending step without the model's forces if no model is running; otherwise it waits for the forces."""
         if self._tick is not None and not self._service.alive.get("model"):
             self._law.forces.forget()
             self._step()
@@ -103,7 +103,7 @@ class ControllerNode:
     def _step(self) -> None:
         tick, self._tick = self._tick, None
         if self._timer is not None:
-            self._timer.cancel()  # else it would wake the process half a tick later
+            self._timer.cancel()  # otherwise it would wake the process half a tick later
             self._timer = None
         if tick is None:
             return
@@ -139,7 +139,7 @@ class ControllerNode:
                 action.resume(tick.k)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
-        """Orders to the parts, and their reference (n,); without fresh forces every part that follows gets the order to hold."""
+        """Return the orders to the parts, and their reference (n,); without fresh forces, every part that follows is ordered to hold."""
         ticks = self._law.count_ticks(tick.k)
         self._counters.ticks += 1
         self._counters.long_gaps += ticks > MAX_TICKS
@@ -178,7 +178,7 @@ class ControllerNode:
             self._end_requests(part)
 
     def _compare_robots(self, answer: PartMeta | CallFailed) -> None:
-        """End the process if robot_sim moves another robot, before any part is armed: it might have as many motors."""
+        """End the process, before any part is armed, if robot_sim moves another robot, which may have the same number of motors."""
         if isinstance(answer, CallFailed):
             self._service.log.info("robot_sim did not answer which robot it moves: %s", answer)
         elif answer.robot_hash != robot_hash(self._robot):

@@ -30,13 +30,13 @@ class Counters:
         self._jitter = Percentiles()  # ms, of the time between two steps
 
     def note_step(self, period: float) -> None:
-        """Once a step: how far its time after the last one is from `period` [s]."""
+        """Record the difference between the time since the last step and `period` [s]; call it once per step."""
         before, self._stepped_at = self._stepped_at, time.monotonic()
         if before > 0.0:
             self._jitter.add(abs(self._stepped_at - before - period) * 1e3)
 
     def numbers(self) -> Mapping[str, float]:
-        """For `stat`."""
+        """Return the counts for `stat`."""
         return {
             "ticks": self.ticks,
             "late_forces": self.late_forces,
@@ -78,7 +78,7 @@ class MotionPublisher:
             )
 
     def _is_redundant(self, part: str, tick: Tick) -> bool:
-        """Whether action, owner and status are as in the last message, and no regular message is due."""
+        """Return whether action, owner and status are as in the last message, and no regular message is due."""
         action, k = self._actions[part], tick.k
         known, self._published[part] = self._published.get(part), (action.id, action.owner)
         if known != self._published[part] or action.since_k >= k:
@@ -100,7 +100,7 @@ class CommandPublisher:
         drives.on_attempt_end(self._answer)
 
     def begin_tick(self) -> None:
-        """A new tick, or a new run: nothing of the one before is sent any more."""
+        """Discard the unsent messages of the last tick, at the start of a tick or a run."""
         self._sent = self._to_answer = None
 
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
@@ -110,7 +110,7 @@ class CommandPublisher:
             self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._ttl, answer=answer)
 
     def send_again(self, part: str) -> None:
-        """Free mode: let a request for a part take effect before the next tick, by computing and publishing the last step again."""
+        """In free mode, apply a request for a part before the next tick: compute and publish the last step again."""
         if self._service.locked or self._sent is None or part not in self._sent[1]:
             return
         reference = self._law.repeat_step()
@@ -118,7 +118,7 @@ class CommandPublisher:
             self.send(*self._sent, reference)
 
     def send_and_answer(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
-        """Lockstep: publish, and answer the tick in the same message unless a part is being armed; tick 0 when all parts are ready."""
+        """In lockstep, publish and answer the tick in one message, unless a part is being armed; tick 0 only when all parts are ready."""
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return
         forces = self._law.forces.message
@@ -134,12 +134,12 @@ class CommandPublisher:
         self._to_answer = None
 
     def _is_ready(self, tick: Tick) -> bool:
-        """Tick 0: whether every part that can be armed is armed, and the commands have a subscriber."""
+        """Return whether tick 0 may be answered: every part that can be armed is armed, and the commands have a subscriber."""
         ready = (self._drives.is_armed(part, state) or not self._drives.can_arm(state) for part, state in tick.parts.items())
         return all(ready) and self._commands.heard
 
     def _answer(self) -> None:
-        """Send the answer to the tick of lockstep; it is delayed while a part is being armed."""
+        """In lockstep, send the answer to the tick, which is delayed while a part is being armed."""
         if self._to_answer is not None and not self._drives.is_arming:
             (k, answer), self._to_answer = self._to_answer, None
             busy = busy_owners(self._actions.values())

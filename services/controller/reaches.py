@@ -50,7 +50,7 @@ class Reaches:
         self._streams = {part: bus.publisher(ReachMessage, part) for part in robot.parts}
 
     def begin(self, part: str, asked: ReachFor) -> None:
-        """Draw the part's marker to its target from now on; raises InvalidValue or UnknownName if it cannot reach for that."""
+        """Start to draw the part's marker to its target; raises InvalidValue or UnknownName if the part cannot reach for it."""
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
         if len(others) >= MAX_HANDS:
@@ -61,7 +61,7 @@ class Reaches:
         self._publish(part)
 
     def follow_targets(self, targets: Targets) -> None:
-        """Take the targets' new positions; a target that has none, or an invalid one, stays where it was."""
+        """Set the targets to their new positions; a target without a valid position keeps the last one."""
         for part, reach in self._last.items():
             position = targets.positions.get(reach.object)
             if reach.phase == "reaching" and position is not None and position != reach.target.position.tolist():
@@ -73,7 +73,7 @@ class Reaches:
                 self._law.reach(part, reach.marker, reach.target)
 
     def update(self, part: str, tick: Tick) -> None:
-        """When the part has settled or timed out, end the force; the part is drawn back and must settle again, unless it is to stay."""
+        """End the force when the part has settled or timed out; the part is then drawn back and settles again, unless it is to stay."""
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):
             return
@@ -99,7 +99,7 @@ class Reaches:
             self._publish(part)
 
     def publish_regularly(self, tick: Tick) -> None:
-        """Free mode: publish all reaches again from time to time."""
+        """In free mode, publish all reaches again at regular intervals."""
         period = max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt))
         for part, reach in self._last.items():
             if tick.k % (period if reach.phase in ("reaching", "returning") else ENDED_PERIODS * period) == 0:

@@ -22,7 +22,7 @@ class Entry:
     participates: bool = True  # lockstep: every tick waits for it
     real_time: bool = False  # its results depend on real time, so that it is left out in lockstep
     needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
-    given: Mapping[str, str] = field(default_factory=dict)  # settings that make it this service
+    given: Mapping[str, str] = field(default_factory=dict)  # settings that the name of the service implies
 
 
 _NICE_PICTURES = 10  # niceness of services that may be late
@@ -69,7 +69,7 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 
 
 def entry_of(who: str, module: str | None) -> Entry | None:
-    """The entry of a service; None if it is unknown.  `module`: another program in its place, or one that is not shipped."""
+    """Return the entry of a service; None if it is unknown.  `module`: a program that replaces it, or one that is not shipped."""
     entry = _ENTRIES.get(who)
     if who.startswith(AGENT):
         entry = Entry(

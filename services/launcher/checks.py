@@ -26,11 +26,11 @@ _CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at
 
 
 class MissingExtra(Exception):
-    """A package that a service needs is not installed; the message holds the remedy."""
+    """Raised if a package that a service needs is not installed; the message holds the remedy."""
 
 
 class PortInUse(Exception):
-    """A port on which a service wants to listen is taken; the message holds the remedy."""
+    """Raised if a port on which a service should listen is in use; the message holds the remedy."""
 
 
 class SystemRuns(Exception):
@@ -116,7 +116,7 @@ def _is_free(port: int) -> bool:
 
 
 def check_gains(scenario: Scenario) -> None:
-    """Raise ConfigError if services would use different gains or terms of the law, which nothing would report later."""
+    """Raise ConfigError if services would use different gains or terms of the law, since no later check would find this."""
     for what in ("gains", "terms"):
         named = {part.who: str(getattr(part.config, what)) for part in scenario.parts if hasattr(part.config, what)}
         if len(set(named.values())) > 1:
@@ -161,7 +161,7 @@ def check_lockstep(scenario: Scenario) -> None:
 
 
 def check_robots(scenario: Scenario) -> dict[str, Robot]:
-    """The robots by the name or path that services give for them.
+    """Return the robots, by the name or path in the settings of the services.
 
     Raises ConfigError in one line if a robot or world cannot be read, or its file has elements that would be ignored.
     """
@@ -200,7 +200,7 @@ def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)  # such as a misspelt name
+            warnings.simplefilter("error", UserWarning)  # for example a misspelt name
             warnings.simplefilter("default", OlderVersion)  # such a file is read completely
             return read(getattr(part.config, field))
     except UserWarning as warning:

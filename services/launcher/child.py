@@ -35,8 +35,8 @@ class Program:
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
-    patience: float = 0.0  # s without answer before it counts as frozen, at least
-    environment: Mapping[str, str] = field(default_factory=dict)  # beside the launcher's own
+    patience: float = 0.0  # least time [s] without an answer after which it counts as frozen
+    environment: Mapping[str, str] = field(default_factory=dict)  # added to the launcher's own
 
 
 @dataclass
@@ -123,11 +123,11 @@ class Child:
         self.enter("starting")
 
     def exit_code(self) -> int | None:
-        """The code with which the process ended; None while it runs."""
+        """Return the code with which the process ended; None while it runs."""
         return None if self.process is None else self.process.poll()
 
     def running(self) -> bool:
-        """Whether there is a process."""
+        """Return whether the process is running."""
         return self.process is not None and self.process.poll() is None
 
     def terminate(self) -> None:
@@ -142,14 +142,14 @@ class Child:
         try:
             os.killpg(self.process.pid, signal.SIGKILL)
         except ProcessLookupError:
-            pass  # all of them are gone
+            pass  # all of them have ended
         self.process.wait()
         if self.process.stdin is not None:
             self.process.stdin.close()
         self.process = None  # its number may now name another process
 
     def last_log_line(self) -> str:
-        """The last line of its log."""
+        """Return the last line of the service's log."""
         with self.program.log.open("rb") as log:
             log.seek(max(0, self.program.log.stat().st_size - 4000))
             lines = log.read().decode(errors="replace").split("\n")

@@ -129,7 +129,7 @@ class _Run:
         self._stop_requested, self._starting = False, True
 
     def execute(self, started: float) -> int:
-        """Start, watch, stop, summarise; `started`: monotonic time from which readiness is counted."""
+        """Start, supervise and stop the services, and report; return the exit code; `started`: monotonic time of the launch [s]."""
         self._handle_signals()
         with self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance)):
             self._service.describe = self._describe
@@ -140,7 +140,7 @@ class _Run:
         return self._report(ready, duration)
 
     def _live(self, started: float) -> tuple[float | None, float]:
-        """Start, run and stop the services; returns the time [s] until all were ready (None: never), and from then to the end."""
+        """Start, run and stop the services; return the time [s] until all were ready (None: never), and from then to the end."""
         ready = begun = None
         try:
             self._draw()
@@ -153,7 +153,7 @@ class _Run:
                 self._announce(
                     "running without the services that were given up" if self._supervisor.faults else f"all ready after {ready:.1f} s"
                 )
-                if not self._scenario.is_locked:  # in lockstep all count from tick 1 on, so that real time changes no number
+                if not self._scenario.is_locked:  # in lockstep all services count from tick 1 on, so that no number depends on real time
                     self._mark()
                 else:
                     self._service.inbox.at(time.monotonic() + _START_NOTICE, self._announce_start)
@@ -169,7 +169,7 @@ class _Run:
         return ready, duration
 
     def _over(self) -> bool:
-        """Whether the end was requested, or the robot is stopped for good in a run that no user watches."""
+        """Return whether to end: on request, or because the robot is stopped permanently in a run without a user."""
         lost = self._supervisor.stopped_robot and (self._options.duration is not None or self._starting)
         return self._stop_requested or lost
 
@@ -177,7 +177,7 @@ class _Run:
         self._service.spin(time.monotonic() + seconds, lambda: self._over() or enough())
 
     def _mark(self) -> None:
-        """Let every service begin its measurement now."""
+        """Start the measurement of every service now."""
         waiting: set[str] = set()
         for child in self._children:
             if child.phase == "ready":
@@ -195,7 +195,7 @@ class _Run:
         self._service.spin(asked + 2.0, lambda: not any(child.asking for child in self._children))
 
     def _handle_signals(self) -> None:
-        """One signal stops everything in order, a second one kills."""
+        """Handle signals: the first one stops the services in order, a second one kills them."""
         self._service.end = self._request_stop
 
         def on_signal(signum: int, frame: FrameType | None) -> None:

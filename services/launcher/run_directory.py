@@ -34,7 +34,7 @@ def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:
 
 
 def _new_folder(runs: Path, name: str) -> Path:
-    """Two runs in one second get two folders."""
+    """Make a folder for a run and return it; a second run in the same second gets a folder with a number."""
     runs.mkdir(parents=True, exist_ok=True)
     for number in range(1, 100):
         folder = runs / (name if number == 1 else f"{name}-{number}")
@@ -69,7 +69,7 @@ def _versions() -> Mapping[str, object]:
 
 
 def to_toml(tables: Mapping[str, Any], prefix: str = "") -> str:
-    """The text that `tomllib` reads back as these tables; a value of None is left out."""
+    """Return tables as TOML text, which `tomllib` reads as the same tables; values of None are left out."""
     plain = {key: value for key, value in tables.items() if value is not None and not isinstance(value, Mapping)}
     nested = {key: value for key, value in tables.items() if isinstance(value, Mapping)}
     lines = [f"{_key(key)} = {_value(value)}\n" for key, value in plain.items()]

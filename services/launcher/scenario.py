@@ -54,7 +54,7 @@ class Scenario:
         return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
 
     def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
-        """The scenario as tables of a TOML file, with every setting of every service."""
+        """Return the scenario as tables of a TOML file, with every setting of every service."""
         services = {}
         for part in self.parts:
             module = {} if part.entry == entry_of(part.who, None) else {"module": part.entry.module}
@@ -63,7 +63,7 @@ class Scenario:
 
 
 def shipped() -> dict[str, Path]:
-    """The scenarios that come with the package."""
+    """Return the files of the scenarios that come with the package, by name."""
     return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
 
 
@@ -109,7 +109,7 @@ def _find(name_or_path: str) -> Path:
 
 
 def _override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, str]:
-    """Put the settings into the data; returns which field came from which setting."""
+    """Write the settings into the data; return, for each field that was set, the setting."""
     origins = {}
     for setting in settings:
         field, equals, value = setting.partition("=")
@@ -133,7 +133,7 @@ def _tables(table: Mapping[str, Any]) -> list[str]:
 
 
 def _value(text: str) -> Any:
-    """A value as TOML writes it; a word without quotes is a string."""
+    """Return a value from its TOML text; a word without quotes is a string."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -141,7 +141,7 @@ def _value(text: str) -> Any:
 
 
 def _where_or_shared(file: _File, where: Callable[[str], str]) -> Callable[[str], str]:
-    """`where`, but for a service's field that is set in [shared] it gives that place."""
+    """Return a function like `where` that returns the place in [shared] for a service's field that is set there."""
 
     def find(field: str) -> str:
         match field.split(".", 3):
@@ -166,14 +166,14 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
 
 
 def _with_world(config: ServiceConfig) -> ServiceConfig:
-    """The settings with the world that will be loaded, so that the record of a run shows it if the scenario names none."""
+    """Return the settings with the world that will be loaded, so that a run's record has it even if the scenario names none."""
     if not isinstance(config, WorldConfig):
         return config
     return structs.replace(config, world=effective_world(config.world, config.robot))
 
 
 def _for_lockstep(parts: list[Part]) -> list[Part]:
-    """In lockstep: name robot_sim's participants, and leave out services whose results depend on real time."""
+    """Return the services for lockstep: robot_sim gets the list of participants; services that depend on real time are left out."""
     if all(part.who != "robot_sim" or part.config.mode == "free" for part in parts):
         return parts
     kept = [part for part in parts if not part.entry.real_time]

@@ -59,12 +59,12 @@ def _row(child: Child) -> str:
 
 
 def _pages(children: Collection[Child]) -> list[str]:
-    """Addresses of pages in the status lines of services."""
+    """Return the addresses of pages in the status lines of services."""
     return [page for child in children if child.stat for page in re.findall(r"https?://\S+", child.stat.text)]
 
 
 def _paint(line: str) -> str:
-    """Colour the state, after the line was cut to the width of the terminal."""
+    """Return the line with its state in colour; call it after the line was cut to the width of the terminal."""
     state = line[16:26].strip()
     return f"{line[:16]}\x1b[{_COLOURS[state]}m{line[16:26]}\x1b[0m{line[26:]}" if state in _COLOURS else line
 

@@ -12,7 +12,7 @@ from services.launcher.child import Child
 
 
 def summarise(children: Iterable[Child]) -> dict[str, Any]:
-    """The numbers of a run; None where nothing was measured.
+    """Return the numbers of a run; None for a number that was not measured.
 
     Lengths in m, times in s; ages in ticks; counters since every service was ready, or since the service's last restart.
     """
@@ -70,7 +70,7 @@ def _agent(numbers: _Numbers) -> dict[str, Any]:
 
 
 def as_text(summary: dict[str, Any]) -> str:
-    """The summary as a small table."""
+    """Return the summary as a small table in text."""
     ready = summary["seconds_to_ready"]
     course = "never ready" if ready is None else f"ready after {ready:.1f} s, then ran for {summary['duration_s']:.1f} s"
     lines = [

@@ -21,7 +21,7 @@ STAT_TIMEOUT = 1.0  # s within which a service answers
 LATE_ANSWER = 0.2  # s after which an answer is late: from then on the time is measured that the processes wait for a processor
 MAX_UNANSWERED = 2  # stat calls in a row; then a service can count as frozen
 FROZEN_TIME, FROZEN_TIME_NICE = 2.0, 10.0  # s without an answer; the latter for a service that yields to all others
-NICE_SERVICE = 10  # niceness from which that is so
+NICE_SERVICE = 10  # niceness from which the longer time applies
 READY_TIMEOUT = 60.0  # s from its start until a service is ready
 FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before a restart, doubled with every failure
 MAX_RESTARTS, RESTART_WINDOW = 5, 60.0  # restarts within so many s; then a service is given up
@@ -29,7 +29,7 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 
 
 class Supervisor:
-    """The children of the launcher; everything happens in the inbox of its service."""
+    """Starts and supervises the launcher's child processes; all work is done by handlers in the inbox of `service`."""
 
     def __init__(self, service: Service, programs: Sequence[Program], stops: EmergencyStops, announce: Callable[[str], None]) -> None:
         """`stops` stops the robot when a vital service is given up; `announce` is called with each line that a user should see."""
@@ -48,11 +48,11 @@ class Supervisor:
         self._check_all()
 
     def settled(self) -> bool:
-        """Whether every service is ready, has ended by itself, or was given up."""
+        """Return whether every service is ready, has ended by itself, or was given up."""
         return all(child.phase in ("ready", "ended", "fault") for child in self.children.values())
 
     def has_arrived(self) -> bool:
-        """Whether robot_sim has reached its last tick."""
+        """Return whether robot_sim has reached its last tick."""
         sim = self.children.get("robot_sim")
         return sim is not None and sim.stat is not None and (sim.stat.numbers.get("arrived") or 0) > 0
 
@@ -123,7 +123,7 @@ class Supervisor:
         return child.unanswered >= MAX_UNANSWERED and now - child.answered_at >= limit and child.silence(now) >= limit
 
     def ask(self, child: Child) -> None:
-        """Ask a service for its status."""
+        """Request the status of a service."""
         pid, child.asking, child.asked_at = child.pid, True, time.monotonic()
 
         def note(answer: Stat | CallFailed) -> None:

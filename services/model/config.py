@@ -9,13 +9,13 @@ from services.common.config import WorldConfig
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The model's settings; objects of its world with the role target are not loaded, vision perceives them."""
+    """The model's settings; world objects with the role target are not loaded, because vision perceives them."""
 
     gains: Literal["default", "published_2014"] = "published_2014"
-    """Which set shapes the constraint forces; the controller must use the same."""
+    """Name of the set of gains for the constraint forces; the controller must use the same."""
     propagate: Literal["tree", "part"] = "tree"
     """Motors on which a contact acts: all between the body's root and the contact, or those of the touched part only."""
     contact_forces: bool = True
-    """False: contacts are published but exert no force, for control experiments."""
+    """False: contacts are published but exert no force, for experiments without that force."""
     terms: list[str] = []
     """User-defined terms of the controller; if there are any, contacts are published with the forces, because terms may depend on them."""

@@ -81,7 +81,7 @@ class ModelNode:
         self._reaching = None
 
     def _note_reach(self, part: str, reach: Reach) -> None:
-        """Targets exert no force on links that are reaching."""
+        """Store which markers reach, so that targets exert no force on their hands."""
         if reach.marker not in self._robot.markers:
             self._service.bus.reject("value", f"a reach of {part} with the marker {reach.marker!r}, which this robot does not have")
             return
@@ -113,7 +113,7 @@ class ModelNode:
         self._count(tick.k)
 
     def _publish_for_viewers(self, k: int, pose: ModelPose) -> None:
-        """Publish pose and contacts if there are subscribers; in lockstep after this handler, which first sends the forces."""
+        """Publish pose and contacts if there are subscribers; in lockstep this is queued, so that the forces are sent first."""
         if self._pose.heard or self._contacts.heard:
             if self._service.locked:
                 self._service.inbox.put(partial(self._publish_pose, k, pose))
@@ -133,7 +133,7 @@ class ModelNode:
             self._contacts.put(re_k=k, contacts=[_item(contact) for contact in pose.contacts])
 
     def _note_contacts(self, pose: ModelPose) -> None:
-        """Find which objects the parts touch, if the contacts are not those of the last tick."""
+        """Update the objects that the parts touch, if the contacts differ from those of the last tick."""
         table = pose.table
         contacts = table.numbers.tobytes(), table.objects
         if contacts != self._last_contacts:

@@ -55,7 +55,7 @@ class WorldServer:
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 
     def forget(self) -> None:
-        """A new run: remove the perceived objects of the last one."""
+        """Remove the perceived objects of the last run, at the start of a new one."""
         for name in list(self._expiry):
             self._remove(self._model.world, name)
 
@@ -84,7 +84,7 @@ class WorldServer:
         self._expiry.pop(request.name, None)  # the client that added it removes it
 
     def _require_presenter(self, who: str) -> None:
-        """Refuse a second service that presents a target: both would move the same object."""
+        """Refuse a second service that presents a target, since both would move the same object; raises CallRefused."""
         other = self._presenter
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
             raise InvalidValue(
@@ -152,7 +152,7 @@ class WorldServer:
 
 
 def _shape(given: Geometry) -> geometry.Geometry:
-    """The library's shape; raises InvalidValue for a wrong number of sizes."""
+    """Return a shape of the bus as the library's Geometry; raises InvalidValue for a wrong number of sizes."""
     expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[given.kind]
     if len(given.size) != expected:
         raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
@@ -166,7 +166,7 @@ def _geometry(thing: Thing) -> Geometry:
 
 
 def _rotation(quaternion: list[float]) -> Array:
-    """The matrix (3, 3) of a quaternion wxyz; raises InvalidValue if its length is far from 1."""
+    """Return the rotation matrix (3, 3) of a quaternion wxyz; raises InvalidValue if its length is far from 1."""
     if not 0.5 < np.linalg.norm(quaternion) < 2.0:
         raise InvalidValue(f"quaternion {quaternion}: must be of length 1")
     return matrix_from_quaternion(np.array(quaternion))

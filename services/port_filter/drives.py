@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of the filter's clients: lends them the drives, forwards metadata, emergency stops and liveliness."""
+"""Answers the calls of the filter's clients: forwards drive calls, metadata, emergency stops and liveliness."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from services.common.service import CallRefused, Service
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """A client, as long as its liveliness token exists."""
+    """The client that owns a part's drive while its liveliness token exists."""
 
     who: str
     instance: str
@@ -29,7 +29,7 @@ class DriveServer:
     """Forwards drive calls to robot_sim, unless the reflex is active; the clients use robot_sim's epochs."""
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:
-        """`refusal` returns why no client may drive now, or ""; `on_arm` is called when a client has armed a part."""
+        """`refusal`: returns the reason why no client may drive now, or ""; `on_arm`: called when a client has armed a part."""
         self._service, self._twin, self._refusal, self._on_arm = service, twin, refusal, on_arm
         self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
@@ -39,12 +39,12 @@ class DriveServer:
         twin.on_alive(self._note_alive)
 
     def forget(self) -> None:
-        """A new run: no part has an owner."""
+        """Drop all owners, at the start of a new run."""
         self._owners = dict.fromkeys(self._owners)
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
     def hold(self, part: str) -> None:
-        """Let robot_sim hold the part: its owner must arm it again; without an owner any client may take it.
+        """Put a part in hold at robot_sim; its owner must arm it again, or without an owner any client may take it.
 
         If robot_sim is gone, nothing is done: it starts again in hold, without owners.
         """
@@ -103,7 +103,7 @@ class DriveServer:
 
 @contextmanager
 def _forwarded() -> Iterator[None]:
-    """Refuse to the client what robot_sim refuses, with the same code and text."""
+    """Refuse a client's call inside the `with` block if robot_sim refuses it, with the same code and text."""
     try:
         yield
     except CallFailed as failed:
@@ -140,7 +140,7 @@ class Forwarder:
             self._up.put(set=stop.set, source=stop.source, reason=stop.reason)
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
-        """Declare the router in the clients' namespace: a client without a router ends."""
+        """Declare the router's token in the clients' namespace, since a client without a router ends."""
         if who != "router":
             return
         if up:

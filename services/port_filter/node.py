@@ -40,14 +40,14 @@ class Switch:
         self.reflex = Reflex(self._settings, dt, self._max_velocity)
 
     def tick(self, q: Array) -> Array | None:
-        """The target (n,) rad of the reflex at the measured pose q (n,) rad; None while the clients command."""
+        """Return the target (n,) rad of the reflex at the measured pose q (n,) rad; None while the clients command."""
         self.q = q
         self.violations = self._watch.check(self._track.evaluate(q))
         return self.reflex.tick(q, self.violations)
 
 
 class FilterNode:
-    """The port filter: `service` is a client of the robot, `twin` plays the robot for the filter's clients."""
+    """The port filter: `service` is a client of the robot, `twin` acts as the robot for the filter's clients."""
 
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
         self._service, self._twin, self._config, self._robot = service, twin, config, robot
@@ -79,7 +79,7 @@ class FilterNode:
         service.on_tick(self._tick)
 
     def _refusal(self) -> str:
-        """Why clients may not command now; "" if they may."""
+        """Return the reason why clients may not command now; "" if they may."""
         state = self._switch.reflex.state
         if state == "stuck":
             accept = "if this pose is safe, accept it by the call rpc/waypoint of any part"
@@ -160,7 +160,7 @@ class FilterNode:
         self._driven = []
 
     def _where(self) -> str:
-        """The worst violation, in a few words."""
+        """Return a short description of the worst violation."""
         recovery = self._switch.reflex.recovery
         worst = next(iter(self._switch.violations or (recovery.cause if recovery else ())), None)
         if worst is None:
@@ -188,7 +188,7 @@ class FilterNode:
         return Done(v=VERSION)
 
     def _answer(self, k: int) -> None:
-        """Lockstep: the clients first, as robot_sim waits for its own."""
+        """In lockstep, answer robot_sim after all clients of the filter have answered."""
         self._complete = self._complete or not self._barrier.absent()
         if self._complete:
             self._is_waiting = True

@@ -47,7 +47,7 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Publishes the commands of one part to robot_sim, from a client or from the reflex, in one sequence of numbers.
+    """Publishes the commands of one part to robot_sim, from a client or from the reflex, with one sequence of numbers.
 
     It remembers the number that the client gave to each of its commands.
     """
@@ -83,13 +83,13 @@ class Streams:
     def __init__(
         self, service: Service, twin: Service, robot: Robot, epochs: dict[str, int], refusal: Callable[[], str], mark: Callable[[], object]
     ) -> None:
-        """`epochs`: the drive epoch of each part; `refusal` as for DriveServer; `mark` is called when a position move begins."""
+        """`epochs`: the drive epoch of each part; `refusal`: see DriveServer; `mark`: called when a position move begins."""
         self._service, self._twin, self._robot = service, twin, robot
         self._epochs, self._refusal, self._mark = epochs, refusal, mark
         self._parts: dict[str, PartStatus] = {}
         self._q: Array = robot.home
         self.answered: Callable[[Commands, Answer], None] = lambda commands, answer: None  # lockstep: a tick was, along with commands
-        self.is_stale = False  # the states are too old to be judged, so that no command may follow them
+        self.is_stale = False  # the states are too old to be checked, so that commands are refused
         self.commands = {part: CommandStream(service.bus, part) for part in robot.parts}
         self._moves = {part: MoveDetector() for part in robot.parts}
         self._newest = dict.fromkeys(robot.parts, (0, -1))  # epoch and number of the newest command of a client
@@ -115,24 +115,24 @@ class Streams:
         return self._q
 
     def follows(self, part: str) -> bool:
-        """Whether the part follows this filter's commands, by the newest tick."""
+        """Return whether the part follows this filter's commands, according to the newest tick."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 
     def forget_moves(self) -> None:
-        """The clients lose control: their next commands are a new motion."""
+        """Forget the clients' motions when they lose control; their next commands begin a new motion."""
         for moves in self._moves.values():
             moves.forget()
 
     def forget(self) -> None:
-        """A new run."""
+        """Drop all states and commands, at the start of a new run."""
         self._parts = {}
         self.is_stale = False
         self._newest = dict.fromkeys(self._newest, (0, -1))
         self.forget_moves()
 
     def _take_command(self, part: str, command: Command) -> None:
-        """A client's command."""
+        """Forward or refuse a client's command to one part."""
         epoch, seq = self._newest[part]
         if why := self._refusal():
             self._twin.bus.reject("reflex", f"{part}: {why}")
@@ -149,7 +149,7 @@ class Streams:
             self.commands[part].forward(command)
 
     def _take_commands(self, commands: Commands) -> None:
-        """A client's commands to several parts."""
+        """Forward or refuse a client's commands to several parts."""
         for part, order in commands.parts.items():
             if part not in self._robot.parts:
                 self._twin.bus.reject("part", f"Commands to the part {part}; this robot has {', '.join(self._robot.parts)}")
@@ -179,7 +179,7 @@ class Streams:
         )
 
     def _for_clients(self, part: str, state: State | PartStatus) -> PartStatus:
-        """The status of a part as the clients should see it: in hold while the reflex is active."""
+        """Return the status of a part for the clients: in hold while the reflex is active."""
         is_cut = state.gate == "armed" and bool(self._refusal())
         seq = -1 if is_cut else self.commands[part].client_seq(state.cmd_seq)
         return PartStatus(

@@ -17,9 +17,9 @@ Picture = NDArray[np.uint8]
 
 MAX_HUE, MIN_SATURATION, MIN_VALUE = 16.0, 0.51, 50  # degrees from red; of 1; of 255
 MIN_AREA = 40.0  # px
-INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: still on it; certainly not of the ball
-MIN_ARC = 0.6  # of the outline must be seen
-MAX_OUTSIDE = 0.1  # of the blob's border may stick out
+INLIER, OUTSIDE = 1.0, 2.0  # px from the outline: largest distance of an inlier; smallest distance of a point that is not on the ball
+MIN_ARC = 0.6  # share of the outline that must be visible
+MAX_OUTSIDE = 0.1  # share of the blob's border that may be outside of the outline
 FIT_ROUNDS = 8
 SECTORS = 36
 BORDER_INSET = 0.5  # px: the centres of border pixels lie half a pixel inside the outline
@@ -31,10 +31,10 @@ class Sighting:
 
     direction: Array  # (3,) unit vector to the ball's centre
     half_angle: float  # rad, of the cone that touches the ball
-    arc: float  # how much of the outline is seen, 0..1
+    arc: float  # share of the outline that is visible, 0..1
 
     def distance(self, radius: float) -> float:
-        """Distance [m] of a ball of this radius [m], by its size in the picture."""
+        """Return the distance [m] of a ball of this radius [m], from its size in the picture."""
         return radius / math.sin(self.half_angle)
 
 
@@ -42,7 +42,7 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
     """Find every round red object in a picture (height, width, 3) of bytes red, green, blue; the largest first.
 
     A sphere's outline is an ellipse that is not centred on its centre, but its rays form a circular cone about the
-    ray to its centre: the cone is fitted, so perspective leaves no bias.  Points hidden by something are trimmed.
+    ray to its centre. The cone is fitted, so perspective causes no bias.  Points where another object hides the ball are left out.
     """
     height, width = picture.shape[:2]
     found = []
@@ -76,7 +76,7 @@ def _red_blobs(picture: Picture) -> list[tuple[Array, float]]:
 
 
 def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
-    """Which pixels (height, width) are red, by hue, saturation and value."""
+    """Return whether each pixel (height, width) is red, by hue, saturation and value."""
     red, green, blue = np.ascontiguousarray(picture.transpose(2, 0, 1))
     is_red = (red >= MIN_VALUE) & (red > green) & (red > blue)  # on bytes: most pixels fail here
     value, green, blue = (channel[is_red].astype(np.float64) for channel in (red, green, blue))
@@ -86,14 +86,14 @@ def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
 
 
 def _rays(points: Array, intrinsics: Array) -> Array:
-    """Unit vectors (m, 3) through pixels (m, 2)."""
+    """Return unit vectors (m, 3) from the camera through pixels (m, 2)."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
     rays = np.linalg.solve(intrinsics, homogeneous.T).T
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _fit(rays: Array, focal: float) -> Sighting | None:
-    """Fit a cone to the border; None if the border is not that of a ball."""
+    """Return the ball whose cone fits the rays (m, 3) through a border; None if the border is not that of a ball."""
     keep = np.ones(len(rays), dtype=bool)
     for _ in range(FIT_ROUNDS):
         direction, half_angle = _cone(rays[keep])
@@ -109,14 +109,14 @@ def _fit(rays: Array, focal: float) -> Sighting | None:
 
 
 def _cone(rays: Array) -> tuple[Array, float]:
-    """Axis and half angle of the cone nearest to unit rays: they lie in the plane w.r = 1 with w = axis / cos(angle)."""
+    """Return axis (3,) and half angle [rad] of the cone nearest to unit rays r (m, 3): w.r = 1 with w = axis / cos(angle)."""
     w = np.linalg.lstsq(rays, np.ones(len(rays)), rcond=None)[0]
     length = float(np.linalg.norm(w))
     return np.asarray(w / length, dtype=np.float64), math.acos(min(1.0, 1.0 / length))
 
 
 def _arc(rays: Array, direction: Array) -> float:
-    """Share of the sectors around the axis that contain a ray."""
+    """Return the share of the sectors around the axis that contain a ray."""
     side = np.cross(direction, (0.0, 1.0, 0.0))
     up = np.cross(direction, side)
     around = np.arctan2(rays @ up, rays @ side)
@@ -141,16 +141,16 @@ class Fix:
 
 
 def locate(left: Sequence[Sighting], right: Sequence[Sighting], frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """The position by the two sightings that agree best on a ball of this radius [m]; None if no pair agrees."""
+    """Return the position from the two sightings that agree best on a ball of this radius [m]; None if no pair agrees."""
     fixes = [fix for a in left for b in right if (fix := triangulate(a, b, frames, radius)) is not None]
     return min(fixes, key=lambda fix: fix.gap, default=None)
 
 
 def triangulate(left: Sighting, right: Sighting, frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """The ball's position by two sightings; None if their rays do not meet, or the size contradicts the distance."""
+    """Return the ball's position from two sightings; None if their rays do not meet, or the size contradicts the distance."""
     origins = np.array([frame[0] for frame in frames])
     rays = np.array([frame[1] @ seen.direction for frame, seen in zip(frames, (left, right), strict=True)])
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]  # (2, 3, 3): what a ray says nothing about is along it
+    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]  # (2, 3, 3): projections perpendicular to each ray
     normal = across.sum(axis=0)
     if np.linalg.cond(normal) > 1e6:
         return None  # parallel: infinitely far

@@ -18,7 +18,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     radius: Annotated[float, Meta(gt=0, le=0.5)] = 0.03
     """The ball's radius, in m."""
     valid_for: Annotated[float, Meta(gt=0, le=60)] = 5.0
-    """How long a position may be used after the picture was taken, in s of simulated time."""
+    """Time for which a position may be used after the picture was taken, in s of simulated time."""
 
     def check_robot(self, robot: Robot) -> None:
         """Check also that the robot has eyes; raises MobeeError."""

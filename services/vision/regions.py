@@ -11,7 +11,7 @@ Labels = NDArray[np.intp]
 
 
 def label(mask: Mask, diagonal: bool) -> Labels:
-    """The number of the region that each pixel belongs to, shape (height, width): from 1 in the order of their first pixels, 0 outside.
+    """Return the number of each pixel's region, shape (height, width): from 1, in the order of the regions' first pixels; 0 outside.
 
     `diagonal`: pixels that share a corner only are connected too.
     """
@@ -27,13 +27,13 @@ def label(mask: Mask, diagonal: bool) -> Labels:
 
 
 def _connected(starts: Labels, ends: Labels, below: int, gap: int) -> Labels:
-    """The region of each run of pixels, from 0; `below`: from a pixel to that under it, `gap`: how far apart connected runs may be."""
-    first = np.searchsorted(ends - below, starts - gap, side="right")  # of the runs in the next row that each run is connected with
+    """Return the region of each run of pixels, from 0; `below`: pixels in a row; `gap`: 1 if corners connect, else 0."""
+    first = np.searchsorted(ends - below, starts - gap, side="right")  # the first run in the next row that is connected with each run
     count = np.searchsorted(starts - below, ends + gap, side="left") - first
     upper = np.repeat(np.arange(len(starts)), count)
     lower = np.arange(len(upper)) - np.repeat(np.cumsum(count) - count, count) + first[upper]
     region = np.arange(len(starts))
-    while True:  # the smallest number of a region spreads, and what has it takes over its own number's
+    while True:  # the smallest number spreads through each region
         smallest = region.copy()
         np.minimum.at(smallest, lower, region[upper])
         np.minimum.at(smallest, upper, region[lower])
@@ -47,7 +47,7 @@ def _connected(starts: Labels, ends: Labels, below: int, gap: int) -> Labels:
 
 
 def boxes(labels: Labels) -> list[tuple[slice, slice]]:
-    """The rows and columns that each region takes, the first region's first."""
+    """Return the rows and columns that each region occupies, region by region."""
     rows, columns = np.nonzero(labels)
     of = labels[rows, columns] - 1
     count = int(of.max(initial=-1)) + 1
@@ -59,13 +59,13 @@ def boxes(labels: Labels) -> list[tuple[slice, slice]]:
 
 
 def without_holes(mask: Mask) -> Mask:
-    """The mask with everything in it that no path of pixels, from side to side, connects with the outside."""
+    """Return the mask with its holes filled: pixels that no path, from side to side, connects with the picture's border."""
     outside = label(~np.pad(mask, 1), diagonal=False)
     filled: Mask = (outside != 1)[1:-1, 1:-1]
     return filled
 
 
 def border(mask: Mask) -> Mask:
-    """Its pixels with a side towards a pixel that is outside."""
+    """Return the mask of the pixels that share a side with a pixel outside of the mask."""
     wide = np.pad(mask, 1)
     return mask & ~(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])

@@ -137,7 +137,7 @@ class Failures:
 
 
 def has_failed(values: Array, state: int, following: int) -> bool:
-    """Whether a transition did not lead to a state of higher value (S,) in its plan (thesis 8.1)."""
+    """Return whether a transition failed: it led to no state of higher value, by the values (S,) of its plan (thesis 8.1)."""
     return bool(values[following] <= values[state])
 
 

@@ -141,7 +141,7 @@ class ReachLearner:
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
-        """Whether a transition did not lead to a state of higher value in the plan under way."""
+        """Return whether a transition failed: it led to no state of higher value in the plan of the problem-try under way."""
         return has_failed(self.planned()[0], state, following)
 
     def expected(self, state: int) -> float:

@@ -54,7 +54,7 @@ class Kernel(Independent):
             self._refit()
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """The deviation is that of mean rewards from the prior, reduced by the weight of near reaches."""
+        """See Independent; the deviation is that of mean rewards from the prior, reduced by the weight of near reaches."""
         known, (by_joints, by_place) = self._reached, self._scales
         near = np.exp(-0.5 * ((known.places - target) ** 2).sum(axis=1) / by_place**2)[known.target] * known.count
         residual = known.mean - self._at_places(known)

@@ -42,7 +42,7 @@ class Nearest(Independent):
         return {"name": "nearest"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """The deviation is that of all mean rewards, reduced the nearer the neighbours are."""
+        """See Independent; the deviation is that of all mean rewards, and smaller for nearer neighbours."""
         middle, variance = around(self._reached)
         far, which = self._neighbours(target)
         weight = 1.0 / (far + HALF_WEIGHT)
