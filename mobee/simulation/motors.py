@@ -127,18 +127,14 @@ class Motors:
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-            raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
+        self.seed = _checked_seed(seed)
         self._robot = robot
         self.parameters = parameters
-        self.seed = int(seed) % 2**64
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
         """Indices of the active motors, ascending."""
         self.state: Table = np.zeros(n, dtype=core.STATE)
         """A row for each motor, see `mobee._core.plant.STATE`: always the same array, changed by the ticks of a plant."""
-        for name in ("q", "motor_q", "pulled_q", "hold_q"):
-            self.state[name] = q
-        self.state["mode"], self.state["holding"] = _HOLD, 1
+        self._rest(q)
         self.constants = _constants(robot, parameters)
         """Constants of each motor for the current substep, see `mobee._core.plant.CONSTANTS`."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
@@ -161,6 +157,19 @@ class Motors:
         self._noise = 0.0, np.zeros(n)
         self._dt = 0.0
         self.begin_substeps(parameters.substep)
+
+    def restart(self, seed: int, q: Array) -> None:
+        """Start again as new motors of that seed would: at rest at q (n,) rad, in hold, with no command in the delay line."""
+        self.seed = _checked_seed(seed)
+        self._rest(q)
+        self._line[:] = 0.0
+        self.struct.seed, self.struct.noise_tick, self.struct.newest = self.seed, -1, len(self._line) - 1
+
+    def _rest(self, q: Array) -> None:
+        self.state[:] = 0
+        for name in ("q", "motor_q", "pulled_q", "hold_q"):
+            self.state[name] = q
+        self.state["mode"], self.state["holding"] = _HOLD, 1
 
     @property
     def q(self) -> Array:
@@ -276,6 +285,13 @@ class Motors:
         self.constants["delay"] = delay
         self._line = line
         self.struct.line, self.struct.rows, self.struct.newest = address(line), rows, rows - 1
+
+
+def _checked_seed(seed: int) -> int:
+    """Return the seed as the core reads it, 64 bits; raises InvalidValue."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
+    return int(seed) % 2**64
 
 
 def _constants(robot: Robot, parameters: MotorParameters) -> Table:

@@ -76,8 +76,6 @@ class Runner:
         substeps = motors.parameters.substeps(dt)
         self._substep = dt / substeps
         self._commands = np.zeros((command_age, n))
-        if controller.modality == "position":
-            self._commands[:] = controller.state["reference"]
         self._noise = motors.noise(dt)
         self._client, self._torque, self._total = np.zeros(n), np.zeros(n), np.zeros(n)
         self._forces = np.zeros((len(controller.force_names), n))
@@ -94,6 +92,14 @@ class Runner:
         self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
         self._address = ctypes.addressof(self._struct)
+        self.restart(self.q)
+
+    def restart(self, q: Array) -> None:
+        """Start again from rest at q (n,) rad, without commands and forces under way."""
+        self.q[:] = q
+        self._commands[:] = self._controller.state["reference"] if self._controller.modality == "position" else 0.0
+        for forces in (self._client, self._torque, self._total, self._forces):
+            forces[:] = 0.0
 
     def prepare(self, ticks: int, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
         """Prepare up to `most` ticks after `ticks` ticks; returns the address of the structure that the core runs.

@@ -10,6 +10,7 @@ import pytest
 
 from mobee.arrays import Array
 from mobee.control import Controller, Gains
+from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
@@ -136,3 +137,34 @@ def test_a_late_command_moves_nothing_before_its_time() -> None:
     plant.begin("torso", np.array([0.0, 0.0, 0.4]))
     moved = np.abs(plant.run(8).q - ICUB.home).max(axis=1) > 0.0
     assert moved.tolist() == [False] * 4 + [True] * 4
+
+
+@pytest.mark.parametrize(("gains", "modality"), [(Gains.default(), "velocity"), (Gains.published_2014(), "position"), (None, "torque")])
+def test_a_plant_that_starts_again_is_a_new_one_to_the_last_bit(gains: Gains | None, modality: Any) -> None:
+    def plant(seed: int) -> OfflinePlant:
+        return OfflinePlant(Model(ICUB, load_world("table")), seed, gains, dt=0.02, modality=modality, hashed=True, command_age=2)
+
+    def pressed(plant: OfflinePlant) -> tuple[str, float]:
+        pressing(plant)
+        plant.run(60)
+        return plant.hash, plant.time
+
+    used, new = plant(3), plant(5)
+    pressed(used)
+    used.controller.push("left_palm", np.array([5.0, 0.0, 0.0]))
+    used.restart(5)
+    assert used.acting == () and np.array_equal(used.q, ICUB.home)
+    assert pressed(used) == pressed(new)
+
+
+def test_a_plant_starts_again_at_a_pose_and_only_with_motors_that_are_active() -> None:
+    plant = OfflinePlant(Model(ICUB), dt=0.02, active=["left_arm"])
+    start = ICUB.home.copy()
+    start[ICUB.motor_index("l_wrist_prosup")] += 0.3
+    plant.restart(0, start)
+    assert np.abs(plant.run(1).encoders[0] - start).max() < 0.02
+    for wrong, message in ((start[:3], "a position for every motor"), (ICUB.home + 0.1, "not active"), (ICUB.home + 9.0, "must be")):
+        with pytest.raises(InvalidValue, match=message):
+            plant.restart(0, wrong)
+    with pytest.raises(InvalidValue, match="seed -1"):
+        plant.restart(-1)
