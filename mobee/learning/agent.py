@@ -82,7 +82,7 @@ class CuriousAgent(CuriousLearner):
     def target(self, action: int) -> Array:
         """Return the goal pose of the action just decided, shape (n_part,), in [rad]."""
         state, _ = self._decided()
-        return self.space.target(self.space.goal(state, action))
+        return self.space.aim(state, action)
 
     def observe(self, outcome: Outcome) -> float:
         """Learn from the outcome of the action just decided; returns the reward in nats.

@@ -116,6 +116,10 @@ class Space:
         pose: Array = self._targets[self._checked_state(state)].copy()
         return pose
 
+    def aim(self, state: int, action: int) -> Array:
+        """Return what a plant is given as the target of an action, shape (n_part,): the sample of its goal, in [rad]."""
+        return self.target(self.goal(state, action))
+
     @property
     def settings(self) -> dict[str, Any]:
         """The constructor's arguments and a digest of the resulting space, as plain JSON values: `space_from` makes it again."""

@@ -7,13 +7,14 @@ import hashlib
 from collections.abc import Sequence
 from itertools import product
 from math import erf, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
+from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.lattice import Lattice
 from mobee.learning.neighbours import NO_ACTION, lattice_strides
 from mobee.learning.space import Space
@@ -34,7 +35,7 @@ class TabularPlant:
         space: the states and actions.
         outcomes: states reached, shape (S, A, B).
         probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state with the same goal
-            cannot be distinguished, and must have the same outcomes.
+            cannot be distinguished, and must have the same outcomes; those of a DiscreteSpace can.
         seed: of the draws.
         start: the first state.
 
@@ -88,16 +89,23 @@ class TabularPlant:
     def act(self, part: str, target: Array) -> Outcome:
         """Draw the outcome of the action from the part's state towards `target` (n_part,) rad; each takes 1 s."""
         self._checked_part(part)
-        goal = self.space.state_of(target)
-        action = self._action[self.state].get(goal)
-        if action is None:
-            raise InvalidValue(
-                f"state {self.state} of {part} has no action to {goal}: valid are {self.space.actions(self.state).tolist()}."
-            )
+        action = self._action_to(target)
         chosen = self._cumulative[self.state, action].searchsorted(self._draw(), side="right")
         self.state = self._outcomes.item(self.state, action, chosen)
         self.actions += 1
         return Outcome(self.space.target(self.state), settled=True, duration=1.0)
+
+    def _action_to(self, target: Array) -> int:
+        """Return the number of the action towards a target; raises InvalidValue if the state has none."""
+        if isinstance(self.space, DiscreteSpace):
+            return self.space.action_of(target)
+        goal = self.space.state_of(target)
+        action = self._action[self.state].get(goal)
+        if action is None:
+            raise InvalidValue(
+                f"state {self.state} of {self.space.part} has no action to {goal}: valid are {self.space.actions(self.state).tolist()}."
+            )
+        return action
 
     def begin(self, part: str, target: Array) -> None:
         """Start an action of the part; target (n_part,) rad."""
@@ -129,6 +137,54 @@ def ideal(space: Space) -> tuple[Ints, Array]:
     exists = space.goals != NO_ACTION
     outcomes: Ints = np.where(exists, space.goals, 0)[:, :, None]
     return outcomes, exists[:, :, None].astype(np.float64)
+
+
+class TabularWorld(NamedTuple):
+    """A world as tables, each (S, A, B): the states that an action may reach, their probabilities, and the rewards there."""
+
+    outcomes: Ints
+    probabilities: Array
+    rewards: Array
+
+    @property
+    def mean_reward(self) -> Array:
+        """The expected reward of each action, shape (S, A)."""
+        mean: Array = (self.probabilities * self.rewards).sum(axis=-1)
+        return mean
+
+
+def river_swim(length: int = 6) -> TabularWorld:
+    """Return the row of states with a current to the left (Strehl and Littman 2008).
+
+    Left (0) always succeeds, right (1) mostly does not.  Right in the last state has the reward 1, left in the first 0.005; a run starts
+    in the first state.  Random directions need a number of steps that grows with 2^length to reach the right end.
+    """
+    states = np.arange(length)
+    left, right = np.maximum(states - 1, 0), np.minimum(states + 1, length - 1)
+    outcomes = np.stack([np.stack([left, left, left], axis=1), np.stack([left, states, right], axis=1)], axis=1)
+    probabilities = np.tile([[1.0, 0.0, 0.0], [0.05, 0.6, 0.35]], (length, 1, 1))
+    probabilities[0, 1] = 0.0, 0.4, 0.6
+    probabilities[-1, 1] = 0.4, 0.0, 0.6
+    rewards = np.zeros(outcomes.shape)
+    rewards[0, 0], rewards[-1, 1] = 0.005, 1.0
+    return TabularWorld(outcomes, probabilities, rewards)
+
+
+def deep_sea(depth: int = 10) -> TabularWorld:
+    """Return the triangle in which each action dives a row, to the left (0) or to the right (1) (Osband 2019).
+
+    State r (r + 1) / 2 + c in row r and column c <= r; certain outcomes; from the last row one is at the top again.  Each dive to the right
+    costs 0.01 / depth; to the right in the last row's last column there is the reward 1, which one of 2^depth sequences of actions finds.
+    """
+    goals = []
+    for row in range(depth):
+        below = (row + 1) * (row + 2) // 2
+        goals += [[0, 0] if row == depth - 1 else [below + max(column - 1, 0), below + column + 1] for column in range(row + 1)]
+    outcomes = np.array(goals)[:, :, None]
+    rewards = np.zeros(outcomes.shape)
+    rewards[:, 1] = -0.01 / depth
+    rewards[-1, 1] += 1.0
+    return TabularWorld(outcomes, np.ones(outcomes.shape), rewards)
 
 
 def half_space(

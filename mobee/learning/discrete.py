@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A space of numbered states and actions, for decision problems that have no robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.learning.space import MAX_STATES, Space
+from mobee.robot.robot import Motor, Part, Robot
+
+MOTORS = ("state", "action")
+"""The motors of the robot that stands for a decision problem; its q is the number of the state and that of the action, no angles."""
+
+
+class DiscreteSpace(Space):
+    """Numbered states, each with the same numbered actions, of a decision problem without a robot.
+
+    It is a Space of a robot whose two motors are the number of the state and of the action, so that agents and plants of this library
+    work on it.  Where an action leads is not known in advance, so its goal, which is the outcome that a model imagines
+    before the first try, is the state itself: no change.  Plan with `beliefs="debiased"`, where this counts little.
+
+    Args:
+        states: their number, at least 2.
+        actions: of each state, at least 1.
+        goals: (S, A) the state to which each action is expected to lead, where this is known; None: the state itself.
+        name: of the robot's only part.
+
+    Raises:
+        InvalidValue: with what is valid.
+    """
+
+    def __init__(self, states: int, actions: int, goals: ArrayLike | None = None, name: str = "environment") -> None:
+        if not 2 <= states <= MAX_STATES or actions < 1:
+            raise InvalidValue(f"{states} states and {actions} actions: give 2 to {MAX_STATES} states, and 1 or more actions.")
+        expected = np.tile(np.arange(states)[:, None], (1, actions)) if goals is None else np.array(goals, dtype=np.intp)
+        if expected.shape != (states, actions) or expected.min() < 0:
+            raise InvalidValue(f"goals of shape {expected.shape}: give a state for each state and action, shape {(states, actions)}.")
+        super().__init__(_robot(states, actions, name), MOTORS[:1], np.arange(float(states))[:, None], expected, rest=0.0)
+
+    def __repr__(self) -> str:
+        return f"<DiscreteSpace of {self.part}: {len(self)} states, {self.state_actions} state-actions>"
+
+    def aim(self, state: int, action: int) -> Array:
+        """Return the number of the state that is expected and that of the action, shape (2,): what a plant is given as target."""
+        return np.array([self.goal(state, action), action], dtype=np.float64)
+
+    def action_of(self, target: Array) -> int:
+        """Return the number of the action of a target that `aim` returned; raises InvalidValue for another target."""
+        actions = self.goals.shape[1]
+        if np.shape(target) != (2,) or target[1] not in range(actions):
+            raise InvalidValue(f"target {target!r} of {self.part}: give the state that is expected and an action from 0 to {actions - 1}.")
+        return int(target[1])
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The number of states and actions and a digest, as plain JSON values."""
+        return self._made | {"kind": "discrete", "states": len(self), "actions": self.goals.shape[1]}
+
+    def _cell(self, q: list[float]) -> int:
+        return min(max(round(q[0]), 0), len(self) - 1)
+
+
+def _robot(states: int, actions: int, name: str) -> Robot:
+    """Return a robot of two motors without joints and shapes, whose positions are the number of a state and of an action."""
+    sizes = (states, max(actions, 2))
+    motors = tuple(Motor(motor, name, np.array([0.0, size - 1.0]), 0.0, ()) for motor, size in zip(MOTORS, sizes, strict=True))
+    none = np.empty((0, 2), dtype=np.intp)
+    return Robot(name, ("base",), (), motors, {name: Part(name, MOTORS, 0)}, {}, (), (), none, none)
