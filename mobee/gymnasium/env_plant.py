@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A plant that is a Gymnasium environment, so that the curious agent explores it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import Env
+from gymnasium.spaces import Discrete
+from numpy.typing import ArrayLike
+
+from mobee.arrays import Array
+from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.learning.discrete import DiscreteSpace
+from mobee.plant import Outcome
+
+
+class EnvPlant:
+    """A discrete Gymnasium environment as a plant: observations are states, a step of the environment is an action.
+
+    Use:  `plant = EnvPlant(env); agent = mobee.CuriousAgent(plant.space, plant, beliefs="debiased"); agent.run(1000)`
+
+    An episode that terminates ends in a state like any other; every action there leads to the first observation of the next episode, and
+    the agent learns so.  An episode that is truncated ends without such a state: the next action raises ActionInterrupted, as on a
+    robot that was stopped, the agent measures the first state of the new episode, and nothing false is learned; `agent.run` does this.
+
+    Args:
+        env: its observations and actions must be Discrete; wrap others first, for example by position.
+        seed: of the first reset.
+        goals: (S, A) the state to which each action is expected to lead, if that is known; see `DiscreteSpace`.
+
+    Raises:
+        InvalidValue: spaces that are not Discrete.
+    """
+
+    def __init__(self, env: Env[Any, Any], seed: int = 0, goals: ArrayLike | None = None) -> None:
+        self._first_state, states = _counted(env.observation_space, "observations")
+        self._first_action, actions = _counted(env.action_space, "actions")
+        self.env = env
+        self.space = DiscreteSpace(states, actions, goals)
+        """The states and actions of the environment."""
+        self.robot = self.space.robot
+        self.rewards: Array = np.zeros((states, actions))
+        """The mean of the environment's rewards for each state and action so far, 0 before the first, shape (S, A)."""
+        self.returns: list[float] = []
+        """The sum of the environment's rewards in each episode that has ended."""
+        self.info: dict[str, Any] = {}
+        """The environment's info of the last step or reset."""
+        self._tries = np.zeros((states, actions), dtype=np.intp)
+        self._under_way: Array | None = None
+        self._return = 0.0
+        self._terminated = self._truncated = False
+        self._state = self._reset(seed)
+
+    @property
+    def state(self) -> int:
+        """The number of the state that was observed last."""
+        return self._state
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The id and arguments of the environment, as far as they are known, as plain JSON values."""
+        spec = self.env.spec
+        return {"env": None if spec is None else spec.to_json()}
+
+    @property
+    def q(self) -> Array:
+        """The numbers of the state and of no action, shape (2,)."""
+        return self.space.target(self._state)
+
+    def measure(self, part: str) -> Array:
+        """Return the number of the state, as the position of the part's motors, shape (2,)."""
+        self.robot.part(part)
+        return self.q
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """Do one step of the environment; `target`: (2,), from `space.aim`.  A step counts as 1 s.
+
+        Raises ActionInterrupted where the last step truncated the episode: a new episode has begun.
+        """
+        self.robot.part(part)
+        action = self.space.action_of(target)
+        if self._truncated and not self._terminated:
+            self._state = self._reset()
+            raise ActionInterrupted("the episode was truncated and a new one has begun: measure the state again.")
+        if self._terminated:
+            self._state = self._reset()
+        else:
+            self._state = self._step(action)
+        return Outcome(self.q, settled=True, duration=1.0)
+
+    def begin(self, part: str, target: Array) -> None:
+        """Start an action; `advance` does it."""
+        if self._under_way is not None:
+            raise InvalidValue(f"{part} has an action under way: wait for it with advance().")
+        self._under_way = target
+
+    def advance(self) -> list[tuple[str, Outcome]]:
+        """Do the action that was begun."""
+        if self._under_way is None:
+            raise InvalidValue("no action is under way: begin one first.")
+        target, self._under_way = self._under_way, None
+        return [(self.space.part, self.act(self.space.part, target))]
+
+    def _step(self, action: int) -> int:
+        state = self._state
+        seen, reward, self._terminated, self._truncated, self.info = self.env.step(action + self._first_action)
+        self._tries[state, action] += 1
+        self.rewards[state, action] += (float(reward) - self.rewards[state, action]) / self._tries[state, action]
+        self._return += float(reward)
+        if self._terminated or self._truncated:
+            self.returns.append(self._return)
+        return int(seen) - self._first_state
+
+    def _reset(self, seed: int | None = None) -> int:
+        seen, self.info = self.env.reset(seed=seed)
+        self._return, self._terminated, self._truncated = 0.0, False, False
+        return int(seen) - self._first_state
+
+
+def _counted(space: Any, what: str) -> tuple[int, int]:
+    """Return the first number of a Discrete space and their count; raises InvalidValue for another space."""
+    if not isinstance(space, Discrete):
+        raise InvalidValue(
+            f"{what} of the environment are {space}: they must be Discrete. Wrap the environment so that each has a number, "
+            "for example with gymnasium.wrappers.TransformObservation."
+        )
+    return int(space.start), int(space.n)

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`MoBeE/Lattice-v0`: a part of a robot whose states are the cells of a lattice; a step is a whole action, until the part has settled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from gymnasium import Env
+from gymnasium.spaces import Discrete
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.gymnasium.registration import LATTICE_STEPS
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings, renewed
+from mobee.learning.goal import target_states
+from mobee.learning.lattice import Lattice, Levels
+from mobee.learning.transitions import TransitionModel
+from mobee.model.model import Model
+from mobee.plant import Outcome
+from mobee.rendering.picture import Picture
+from mobee.settings import Settings, accepts
+from mobee.simulation import OfflinePlant, PlantSettings, advance_together
+
+Reward = Callable[[int, int, int, Outcome], float]
+"""A reward: function of the state, the action, the state reached, and the outcome."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatticeTask(Settings):
+    """Settings of `MoBeE/Lattice-v0`.
+
+    Args:
+        robot: a shipped name, the path of an XML or URDF file, or a Robot.
+        joints: motor names, all of one part.
+        levels: fractions of each joint's range, see `mobee.Lattice`.
+        neighbours: number of neighbours to which each state has actions, or "equidistant".
+        tie_seed: seed of the draw among equally near neighbours, which belongs to the space; the noise has the seed of `reset`.
+        world: a shipped name, the path of an XML file, or a World; None: nothing but the robot.
+        plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
+        goal: a state or several: to arrive there ends the episode with the reward 1; None: there is no goal.
+        reward: added to that of the goal: None: nothing; "gain": the information gain of the transition in nats, under a model that
+            counts all episodes of this environment; or a function, see `Reward`.
+    """
+
+    robot: RobotFile = "icub"
+    joints: Sequence[str] = ARM
+    levels: Levels = (0.25, 0.5, 0.75)
+    neighbours: int | Literal["equidistant"] | None = None
+    tie_seed: int = 0
+    world: WorldFile = "table"
+    plant: PlantSettings | None = None
+    goal: int | Sequence[int] | None = None
+    reward: Literal["gain"] | Reward | None = None
+
+
+class _Lattice:
+    """The space of a task and the robot's model, common to the environments of one vector."""
+
+    def __init__(self, task: LatticeTask) -> None:
+        self.model: Model = model_of(task.robot, task.world)
+        self.space = Lattice(self.model.robot, task.joints, task.levels, task.neighbours, task.tie_seed)
+        self.part = self.space.part
+        self.plant_settings = plant_settings(task.plant, [self.part])
+        self.observations, self.actions = Discrete(len(self.space)), Discrete(self.space.goals.shape[1])
+        self.masks: NDArray[np.int8] = (self.space.goals >= 0).astype(np.int8)
+        self.goal: frozenset[int] = frozenset() if task.goal is None else frozenset(target_states(self.space, task.goal).tolist())
+        if not (task.reward in (None, "gain") or callable(task.reward)):
+            raise InvalidValue(f'reward={task.reward!r}: give None, "gain", or a function of state, action, state reached and outcome.')
+        self.reward = task.reward
+
+
+class _Arm:
+    """One robot on the lattice: its plant, its state, and the action under way."""
+
+    def __init__(self, lattice: _Lattice) -> None:
+        self._lattice = lattice
+        self.plant = OfflinePlant(lattice.model, settings=lattice.plant_settings)
+        self.learned = TransitionModel(lattice.space) if lattice.reward == "gain" else None
+        self.state = self._measured()
+
+    def restart(self, rng: np.random.Generator, options: dict[str, Any] | None) -> dict[str, Any]:
+        """Put the robot at home, and move it to the state of the options, if there is one; returns the info."""
+        lattice = self._lattice
+        self.plant.restart(int(rng.integers(SEEDS)))
+        start = (options or {}).get("state")
+        if start is not None:
+            (state,) = target_states(lattice.space, [start]).tolist()
+            self.plant.act(lattice.part, lattice.space.target(state))
+        self.state = self._measured()
+        return {"action_mask": lattice.masks[self.state].copy(), "q": self.plant.measure(lattice.part)}
+
+    def begin(self, action: int) -> bool:
+        """Start an action; returns False, and starts nothing, if the state has no such action."""
+        space, part = self._lattice.space, self._lattice.part
+        if not 0 <= action < len(space.actions(self.state)):
+            return False
+        self.plant.begin(part, space.aim(self.state, action))
+        return True
+
+    def end(self, action: int, outcome: Outcome | None) -> tuple[int, float, bool, dict[str, Any]]:
+        """Return the state reached, the reward, whether the episode is over, and the info; `outcome`: None if nothing was started."""
+        lattice, before = self._lattice, self.state
+        info: dict[str, Any] = {"valid": outcome is not None}
+        if outcome is None:
+            outcome = Outcome(self.plant.measure(lattice.part), settled=True, duration=0.0)
+            reward = 0.0
+        else:
+            self.state = lattice.space.state_of(outcome.q)
+            reward = self._reward(before, action, outcome)
+        over = info["valid"] and self.state in lattice.goal
+        info |= {name: getattr(outcome, name) for name in ("q", "settled", "duration", "touched")}
+        info["action_mask"] = lattice.masks[self.state].copy()
+        return self.state, reward + float(over), over, info
+
+    def _reward(self, before: int, action: int, outcome: Outcome) -> float:
+        if self.learned is not None:
+            return self.learned.observe(before, action, self.state)
+        own = self._lattice.reward
+        return float(own(before, action, self.state, outcome)) if callable(own) else 0.0
+
+    def _measured(self) -> int:
+        return self._lattice.space.state_of(self.plant.measure(self._lattice.part))
+
+
+class LatticeEnv(Env[Any, Any]):
+    """A part of a robot on a lattice; a step is a whole action: the controller moves the part until it has settled or timed out.
+
+    Observation: the state, a cell of the lattice.  Action a aims at the sample of the a-th neighbour of the state, in ascending order; an
+    action that the state does not have moves nothing and takes no time, `info["action_mask"]` lists those that it has.  A contact, a
+    cable or a limit may stop the part elsewhere: that is the outcome, and `info` holds it: `q` (n_part,) rad by the encoders, `settled`,
+    `duration` in s, `touched`, names of world objects.
+
+    `reset` puts the robot at home; with `options={"state": s}` it moves to that state first, and may end elsewhere.
+
+    Args:
+        render_mode: "rgb_array", or None.
+        settings: None: the defaults.
+        **changes: fields of `LatticeTask` by keyword, in place of those in `settings`.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
+
+    @accepts(LatticeTask)
+    def __init__(self, render_mode: str | None = None, *, settings: LatticeTask | None = None, **changes: Any) -> None:
+        self.task = LatticeTask.made(settings, changes)
+        self.render_mode = render_mode
+        self._lattice = _Lattice(self.task)
+        self.observation_space, self.action_space = self._lattice.observations, self._lattice.actions
+        self._arm = _Arm(self._lattice)
+        self._portrait: Portrait | None = None
+
+    @property
+    def space(self) -> Lattice:
+        """The states and actions."""
+        return self._lattice.space
+
+    @property
+    def plant(self) -> OfflinePlant:
+        """The simulated robot."""
+        return self._arm.plant
+
+    @property
+    def learned(self) -> TransitionModel | None:
+        """The transition model under which the reward "gain" is computed; None with another reward."""
+        return self._arm.learned
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
+        """Put the robot at home; `seed` determines the noise of this and all later episodes."""
+        super().reset(seed=seed)
+        info = self._arm.restart(self.np_random, options)
+        return self._arm.state, info
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Do a whole action of the part."""
+        outcome = self._arm.plant.advance()[0][1] if self._arm.begin(int(action)) else None
+        state, reward, over, info = self._arm.end(int(action), outcome)
+        return state, reward, over, False, info
+
+    def render(self) -> Picture | None:
+        """Return a picture (H, W, 3) of the robot in its world, in "rgb_array" mode."""
+        if self.render_mode is None:
+            return None
+        if self._portrait is None:
+            self._portrait = Portrait(self._lattice.model)
+        return self._portrait.picture(self._lattice.model.evaluate(self.plant.q), [self._lattice.part])
+
+
+class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
+    """Several robots on one lattice, whose actions are simulated together; each is a `LatticeEnv` of its own, to the last bit.
+
+    An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
+
+    Args:
+        num_envs: how many robots.
+        max_episode_steps: after which an episode is truncated.
+        threads: of the simulation.
+        settings: None: the defaults.
+        **changes: fields of `LatticeTask` by keyword.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    @accepts(LatticeTask)
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int = LATTICE_STEPS,
+        threads: int = 1,
+        render_mode: None = None,
+        *,
+        settings: LatticeTask | None = None,
+        **changes: Any,
+    ) -> None:
+        self.task = LatticeTask.made(settings, changes)
+        self._lattice = _Lattice(self.task)
+        self.num_envs, self.render_mode, self._most, self._threads = num_envs, render_mode, max_episode_steps, threads
+        self.single_observation_space, self.single_action_space = self._lattice.observations, self._lattice.actions
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._arms = [_Arm(self._lattice) for _ in range(num_envs)]
+        self._rngs = [np.random.default_rng(number) for number in range(num_envs)]
+        self._steps = np.zeros(num_envs, dtype=np.intp)
+        self._over = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Ints, dict[str, Any]]:
+        """Put all robots at home; `seed`: one for each, or the first of consecutive ones."""
+        self._rngs = renewed(self._rngs, seed)
+        infos: dict[str, Any] = {}
+        for number, (arm, rng) in enumerate(zip(self._arms, self._rngs, strict=True)):
+            infos = self._add_info(infos, arm.restart(rng, options), number)
+        self._steps[:], self._over[:] = 0, False
+        return self._states(), infos
+
+    def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Do a whole action of each robot whose episode goes on; the others begin a new episode."""
+        chosen, over = np.asarray(actions).tolist(), self._over.copy()
+        moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
+        plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]
+        outcomes = iter(advance_together(plants, self._threads) if plants else [])
+        infos: dict[str, Any] = {}
+        rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
+        for number, arm in enumerate(self._arms):
+            if over[number]:
+                info = arm.restart(self._rngs[number], None)
+            else:
+                outcome = next(outcomes)[0][1] if moving[number] else None
+                _, rewards[number], terminated[number], info = arm.end(chosen[number], outcome)
+            infos = self._add_info(infos, info, number)
+        self._steps = np.where(over, 0, self._steps + 1)
+        truncated = self._steps >= self._most
+        self._over = terminated | truncated
+        return self._states(), rewards, terminated, truncated, infos
+
+    def _states(self) -> Ints:
+        return np.array([arm.state for arm in self._arms], dtype=self.observation_space.dtype)

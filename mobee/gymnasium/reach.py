@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`MoBeE/Reach-v0`: a hand is to reach places; actions move the attractor of an arm, which the controller keeps from collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from gymnasium import Env
+from gymnasium.spaces import Box, Dict
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+from mobee.arrays import Array
+from mobee.errors import MobeeError
+from mobee.gymnasium.registration import REACH_STEPS
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, guarded, model_of, plant_settings, renewed
+from mobee.learning.space import checked_joints
+from mobee.model.model import Model
+from mobee.rendering.picture import Picture
+from mobee.rendering.solid import ball
+from mobee.robot.robot import Robot
+from mobee.settings import Range, Settings, accepts
+from mobee.simulation import OfflinePlant, PlantSettings, Trace, run_together
+
+GOAL_DRAWS = 2000  # postures that are drawn for a goal before it is given up
+NOISE = 0.1  # rad, by which encoders may read more than the limits
+GOAL_COLOR = (0.86, 0.20, 0.16)
+
+Observation = dict[str, Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachTask(Settings):
+    """Settings of `MoBeE/Reach-v0`.
+
+    Args:
+        robot: a shipped name, the path of an XML or URDF file, or a Robot.
+        joints: motor names, all of one part; the part's other motors keep their attractors at home.
+        marker: the robot's marker that is to reach the goals.
+        world: a shipped name, the path of an XML file, or a World; None: nothing but the robot.
+        plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
+        period: s, of a step; a whole number of ticks.
+        step: rad, how far an action of 1 moves the attractor of a joint.
+        tolerance: m, distance at which a goal counts as reached.
+        reward: "sparse": 0 at the goal and -1 elsewhere; "dense": the negative distance in m.
+    """
+
+    robot: RobotFile = "icub"
+    joints: Sequence[str] = ARM
+    marker: str = "left_palm"
+    world: WorldFile = "table"
+    plant: PlantSettings | None = None
+    period: Annotated[float, Range(gt=0)] = 0.2
+    step: Annotated[float, Range(gt=0)] = 0.2
+    tolerance: Annotated[float, Range(gt=0)] = 0.05
+    reward: Literal["sparse", "dense"] = "sparse"
+
+
+class _Reaching:
+    """What the environments of one vector have in common: the model, the spaces, the rewards."""
+
+    def __init__(self, task: ReachTask) -> None:
+        given = model_of(task.robot, task.world)
+        robot = guarded(given.robot)
+        self.model = Model(robot, given.world)
+        part, self.joints = checked_joints(robot, task.joints)
+        self.part, self.marker = part.name, robot.marker(task.marker).name
+        self.low, self.high = robot.limits[self.joints].T
+        self.plant_settings = plant_settings(task.plant, [self.part])
+        self.ticks = max(1, round(task.period / self.plant_settings.dt))
+        self.step, self.tolerance, self.sparse = task.step, task.tolerance, task.reward == "sparse"
+        count = len(self.joints)
+        self.actions = Box(-1.0, 1.0, (count,), np.float64)
+        place = Box(-(far := extent(robot, self.marker)), far, (3,), np.float64)
+        fastest = np.array([robot.motor_table[motor].max_velocity for motor in self.joints])
+        least, most = np.concatenate([self.low - NOISE, self.low, -fastest]), np.concatenate([self.high + NOISE, self.high, fastest])
+        self.observations = Dict(observation=Box(least, most, dtype=np.float64), achieved_goal=place, desired_goal=place)
+
+    def draw_goal(self, rng: np.random.Generator, plant: OfflinePlant) -> Array:
+        """Return the marker's place (3,) m in a random posture in which no force acts on the joints: the arm can rest there."""
+        q = self.model.robot.home.copy()
+        for _ in range(GOAL_DRAWS):
+            q[self.joints] = rng.uniform(self.low, self.high)
+            pose = self.model.evaluate(q)
+            if not plant.controller.forces(pose).total[self.joints].any():
+                return pose.position(self.marker)
+        raise MobeeError(
+            f"no goal found: in {GOAL_DRAWS} random postures of {self.part} some force of contacts, limits or constraints acts on "
+            "its joints. Take other joints, or a world with more room."
+        )
+
+    def aim(self, plants: Sequence[OfflinePlant], actions: Array) -> None:
+        """Move the attractors of several robots by actions (k, d), within the joints' limits."""
+        attractors = [plant.controller.goal for plant in plants]
+        moved = np.array([attractor[self.joints] for attractor in attractors]) + self.step * np.clip(actions, -1.0, 1.0)
+        for attractor, row in zip(attractors, np.clip(moved, self.low, self.high), strict=True):
+            attractor[self.joints] = row
+
+    def observe(self, plants: Sequence[OfflinePlant], goals: Array) -> Observation:
+        """Return the observations of several robots with goals (k, 3) m: each entry is (k, ...)."""
+        q = np.array([plant.q for plant in plants])
+        own = [(plant.controller.goal[self.joints], plant.controller.state["velocity"][self.joints]) for plant in plants]
+        seen = np.concatenate([q[:, self.joints], np.array(own).reshape(len(plants), -1)], axis=1)
+        return {"observation": seen, "achieved_goal": self.model.evaluate(q).position(self.marker), "desired_goal": goals.copy()}
+
+    def judge(self, achieved: Array, desired: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return rewards (...) and whether the goals are reached (...) for places (..., 3) m."""
+        distance = np.linalg.norm(achieved - desired, axis=-1)
+        reached = distance <= self.tolerance
+        return (reached - 1.0 if self.sparse else -distance), reached
+
+
+def extent(robot: Robot, marker: str) -> float:
+    """Return a distance from the origin that the marker cannot exceed, in m: the sum of the lengths and strokes of the chain to it."""
+    point, link, total = robot.markers[marker].position, robot.markers[marker].link, 0.0
+    while link > 0:
+        joint = robot.joints[link - 1]
+        total += float(np.linalg.norm(point - joint.point))
+        total += float(np.abs(joint.limits).max()) if joint.kind == "prismatic" else 0.0
+        point, link = joint.point, joint.parent
+    return total + float(np.linalg.norm(point))
+
+
+def _contacts(trace: Trace) -> dict[str, float]:
+    """Return the deepest contacts of a step, in m: of solids, which would be collisions, and of the fields around them."""
+    return {"solid_depth": float(trace.solid.max()), "field_depth": float(trace.field.max())}
+
+
+class ReachEnv(Env[Any, Any]):
+    """A hand is to reach places; the controller of MoBeE moves the arm to an attractor and keeps it from collisions on the way.
+
+    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  So whatever an
+    agent tries while it explores, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest
+    contacts of the step, in m: `solid_depth`, 0 if nothing collided, and `field_depth`.  Solids are tested against the world, and in
+    those pairs of links that have fields against each other.
+
+    The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
+    controller's own velocities [rad/s]; `achieved_goal` (3,): the marker's place, `desired_goal` (3,): where it is to be, in m in the
+    root frame.  A goal is the marker's place in a random posture in which no force acts on the joints.  An episode never
+    terminates, its id truncates it after 50 steps; `info["is_success"]` says whether the marker is at the goal now.
+
+    `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`.
+
+    Args:
+        render_mode: "rgb_array", or None.
+        settings: None: the defaults.
+        **changes: fields of `ReachTask` by keyword, in place of those in `settings`.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
+
+    @accepts(ReachTask)
+    def __init__(self, render_mode: str | None = None, *, settings: ReachTask | None = None, **changes: Any) -> None:
+        self.task = ReachTask.made(settings, changes)
+        self.render_mode = render_mode
+        self._reaching = _Reaching(self.task)
+        self.observation_space, self.action_space = self._reaching.observations, self._reaching.actions
+        self.plant = OfflinePlant(self._reaching.model, settings=self._reaching.plant_settings)
+        """The simulated robot."""
+        self._goal: Array = np.zeros(3)
+        self._portrait: Portrait | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
+        """Put the robot at home and draw a goal; `seed` determines the noise and the goals of this and all later episodes."""
+        super().reset(seed=seed)
+        self.plant.restart(int(self.np_random.integers(SEEDS)))
+        drawn = self._reaching.draw_goal(self.np_random, self.plant)
+        given = (options or {}).get("goal")
+        self._goal = drawn if given is None else np.array(given, dtype=np.float64).reshape(3)
+        seen = self._observed()
+        return seen, {"is_success": bool(self._reaching.judge(seen["achieved_goal"], self._goal)[1])}
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Move the attractor by an action (d,), and simulate `period` seconds."""
+        self._reaching.aim([self.plant], np.asarray(action, dtype=np.float64)[None])
+        trace = self.plant.run(self._reaching.ticks)
+        seen = self._observed()
+        reward, reached = self._reaching.judge(seen["achieved_goal"], self._goal)
+        return seen, float(reward), False, False, {"is_success": bool(reached), **_contacts(trace)}
+
+    def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Any:
+        """Return the rewards (...) of achieved and desired places (..., 3) m, as hindsight experience replay needs them."""
+        return self._reaching.judge(np.asarray(achieved_goal), np.asarray(desired_goal))[0]
+
+    def render(self) -> Picture | None:
+        """Return a picture (H, W, 3) of the robot in its world, with the goal as a red ball, in "rgb_array" mode."""
+        if self.render_mode is None:
+            return None
+        if self._portrait is None:
+            self._portrait = Portrait(self._reaching.model)
+        pose = self._reaching.model.evaluate(self.plant.q)
+        return self._portrait.picture(pose, [self._reaching.part], [ball(self._goal, self.task.tolerance / 2.0, GOAL_COLOR, veiled=0.3)])
+
+    def _observed(self) -> Observation:
+        return {name: rows[0] for name, rows in self._reaching.observe([self.plant], self._goal[None]).items()}
+
+
+class ReachVectorEnv(VectorEnv[Any, Any, Any]):
+    """Several robots that reach, simulated together; each is a `ReachEnv` of its own, to the last bit.
+
+    An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
+
+    Args:
+        num_envs: how many robots.
+        max_episode_steps: after which an episode is truncated.
+        threads: of the simulation.
+        settings: None: the defaults.
+        **changes: fields of `ReachTask` by keyword.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    @accepts(ReachTask)
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int = REACH_STEPS,
+        threads: int = 1,
+        render_mode: None = None,
+        *,
+        settings: ReachTask | None = None,
+        **changes: Any,
+    ) -> None:
+        self.task = ReachTask.made(settings, changes)
+        self._reaching = _Reaching(self.task)
+        self.num_envs, self.render_mode, self._most, self._threads = num_envs, render_mode, max_episode_steps, threads
+        self.single_observation_space, self.single_action_space = self._reaching.observations, self._reaching.actions
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.plants = [OfflinePlant(self._reaching.model, settings=self._reaching.plant_settings) for _ in range(num_envs)]
+        """The simulated robots."""
+        self._rngs = [np.random.default_rng(number) for number in range(num_envs)]
+        self._goals = np.zeros((num_envs, 3))
+        self._steps = np.zeros(num_envs, dtype=np.intp)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Put all robots at home and draw a goal for each; `seed`: one for each, or the first of consecutive ones."""
+        self._rngs = renewed(self._rngs, seed)
+        for number in range(self.num_envs):
+            self._begin(number)
+        seen = self._reaching.observe(self.plants, self._goals)
+        return seen, self._infos(self._reaching.judge(seen["achieved_goal"], self._goals)[1])
+
+    def step(self, actions: Array) -> tuple[Observation, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Move the attractors by actions (num_envs, d), and simulate `period` seconds; an episode that was over begins again."""
+        going = np.flatnonzero(self._steps < self._most)
+        plants = [self.plants[number] for number in going.tolist()]
+        traces: list[Trace] = []
+        if plants:
+            self._reaching.aim(plants, np.asarray(actions, dtype=np.float64)[going])
+            traces = run_together(plants, self._reaching.ticks, self._threads)
+        for number in np.flatnonzero(self._steps >= self._most).tolist():
+            self._begin(number)
+        self._steps[going] += 1
+        seen = self._reaching.observe(self.plants, self._goals)
+        rewards, reached = self._reaching.judge(seen["achieved_goal"], self._goals)
+        begun = np.ones(self.num_envs, dtype=bool)
+        begun[going] = False
+        infos = self._infos(reached)
+        depths = np.zeros((2, self.num_envs))
+        depths[:, going] = np.array([(trace.solid.max(), trace.field.max()) for trace in traces]).reshape(-1, 2).T
+        infos |= {"solid_depth": depths[0], "_solid_depth": ~begun, "field_depth": depths[1], "_field_depth": ~begun}
+        return seen, np.where(begun, 0.0, rewards), np.zeros(self.num_envs, dtype=bool), self._steps >= self._most, infos
+
+    def _begin(self, number: int) -> None:
+        plant, rng = self.plants[number], self._rngs[number]
+        plant.restart(int(rng.integers(SEEDS)))
+        self._goals[number] = self._reaching.draw_goal(rng, plant)
+        self._steps[number] = 0
+
+    def _infos(self, reached: NDArray[np.bool_]) -> dict[str, Any]:
+        return {"is_success": reached, "_is_success": np.ones(self.num_envs, dtype=bool)}

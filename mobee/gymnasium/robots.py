@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots, worlds, plants and seeds of the environments, and their pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from gymnasium.utils.seeding import np_random
+
+from mobee.model.model import Model
+from mobee.model.pose import Pose
+from mobee.model.world import World
+from mobee.model.world_file import load_world
+from mobee.rendering.camera import Camera, camera_axes, framing
+from mobee.rendering.picture import Picture, draw
+from mobee.rendering.sheet import View
+from mobee.rendering.solid import Solid, focus, lowest, object_solids, robot_solids
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot, per_robot
+from mobee.simulation import PlantSettings
+
+ARM = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")  # of the iCub: the joints of the published arm
+TICK = 0.02  # s, of the plants unless their settings are given
+VIEW: View = "oblique"
+PICTURE_HEIGHT = 360  # pixels
+RAYS = 2  # a pixel, in each direction
+MARGIN = 0.15  # m, around the robot at home
+SEEDS = 2**31  # seeds of plants are drawn below it
+FRAMES_PER_S = 5  # of films of steps that take 0.2 s
+
+RobotFile = Robot | str | Path
+WorldFile = World | str | Path | None
+
+
+@lru_cache(maxsize=16)
+def _loaded(name: str | Path) -> Robot:
+    return load_robot(name)
+
+
+def model_of(robot: RobotFile, world: WorldFile) -> Model:
+    """Return the model of a robot in a world, each given as an object, a shipped name, or a path; the world may be None, empty.
+
+    Environments of one robot file share the robot, which is never changed; each has a world of its own.
+    """
+    found = robot if isinstance(robot, Robot) else _loaded(robot)
+    return Model(found, load_world(world) if isinstance(world, str | Path) else world)
+
+
+@per_robot
+def guarded(robot: Robot) -> Robot:
+    """Return the robot with those pairs of solids alone that its contact fields keep apart.
+
+    A link without fields, such as a finger, belongs to the next one towards the base that has some.  Pairs of links whose fields
+    are not tested against each other, such as upper arm and pelvis of the iCub, whose hulls overlap beside the body, are left out.
+    """
+    with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
+    guard = list(range(len(robot.links)))
+    for number, joint in enumerate(robot.joints):
+        if number + 1 not in with_field:
+            guard[number + 1] = guard[joint.parent]
+    of_shape = np.array(guard)[[shape.link for shape in robot.shapes]]
+    solid, fields = (np.sort(of_shape[pairs], axis=1) @ [len(guard), 1] for pairs in (robot.solid_pairs, robot.field_pairs))
+    return replace(robot, solid_pairs=robot.solid_pairs[np.isin(solid, fields)])
+
+
+def plant_settings(given: PlantSettings | None, parts: Sequence[str]) -> PlantSettings:
+    """Return the settings of a plant, in which only these parts are active unless others are named."""
+    settings = PlantSettings(dt=TICK) if given is None else given
+    return settings if settings.active is not None else replace(settings, active=tuple(parts))
+
+
+class Portrait:
+    """Draws the robot of a model in its world, always in the same frame."""
+
+    def __init__(self, model: Model) -> None:
+        at_home = robot_solids(model.evaluate(model.robot.home))
+        self._floor = lowest([*at_home, *object_solids(model.world.objects)])
+        self._camera: Camera = framing(camera_axes(VIEW), focus(at_home), np.empty((0, 3)), PICTURE_HEIGHT, MARGIN)
+
+    def picture(self, pose: Pose, bright: Sequence[str], added: Sequence[Solid] = ()) -> Picture:
+        """Return the picture (H, W, 3) of a pose, in which the parts that are not `bright` are pale; `added`: further solids."""
+        return draw([*robot_solids(pose, bright), *object_solids(pose.objects), *added], self._camera, self._floor, RAYS)
+
+
+def renewed(rngs: Sequence[np.random.Generator], seed: int | Sequence[int | None] | None) -> list[np.random.Generator]:
+    """Return the generators of a vector after `reset(seed=seed)`: those with a seed are new, as in environments of their own."""
+    seeds = [seed + number for number in range(len(rngs))] if isinstance(seed, int) else seed or [None] * len(rngs)
+    return [rng if one is None else np_random(one)[0] for rng, one in zip(rngs, seeds, strict=True)]

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MoBeE/Reach-v0, alone and several at once."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import mobee
+from mobee.errors import MobeeError
+from mobee.gymnasium import ReachEnv, ReachTask
+from mobee.gymnasium.reach import extent
+from mobee.gymnasium.robots import guarded
+
+
+def test_gymnasium_finds_nothing_wrong() -> None:
+    env = gymnasium.make("MoBeE/Reach-v0", render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped)
+
+
+def wander(env: ReachEnv, episodes: int) -> np.ndarray:
+    """The deepest contacts of solids in each step of random actions, in m."""
+    env.action_space.seed(0)
+    depths = []
+    for episode in range(episodes):
+        env.reset(seed=episode)
+        depths += [env.step(env.action_space.sample())[4]["solid_depth"] for _ in range(50)]
+    return np.array(depths)
+
+
+def test_random_actions_collide_with_nothing_unless_the_contact_forces_are_off() -> None:
+    assert wander(ReachEnv(), 12).max() == 0.0
+    unguarded = mobee.PlantSettings(dt=0.02, contact_forces=False)
+    assert wander(ReachEnv(plant=unguarded), 12).max() > 0.02
+
+
+def test_a_goal_is_a_place_where_the_arm_can_rest() -> None:
+    env = ReachEnv(reward="dense")
+    for seed in range(3):
+        seen, info = env.reset(seed=seed)
+        assert not info["is_success"] and env.observation_space.contains(seen)
+    for name, place in seen.items():
+        assert seen[name] is not env.reset(seed=2)[0][name] and np.array_equal(env.reset(seed=2)[0][name], place)
+    seen, _ = env.reset(seed=2, options={"goal": seen["achieved_goal"] + [0.0, 0.0, 0.03]})
+    _, reward, over, _, info = env.step(np.zeros(4))
+    assert info["is_success"] and not over
+    assert reward == pytest.approx(-0.03, abs=0.01)
+
+
+def test_rewards_of_many_goals_at_once_are_those_of_each() -> None:
+    rng = np.random.default_rng(0)
+    achieved, desired = rng.normal(scale=0.04, size=(2, 30, 3))
+    for kind in ("sparse", "dense"):
+        env = ReachEnv(reward=kind)
+        every = env.compute_reward(achieved, desired, [{}] * 30)
+        assert every.tolist() == [float(env.compute_reward(a, d, {})) for a, d in zip(achieved, desired, strict=True)]
+        distance = np.linalg.norm(achieved - desired, axis=1)
+        assert np.array_equal(every, np.where(distance <= 0.05, 0.0, -1.0) if kind == "sparse" else -distance)
+    seen, _ = env.reset(seed=0)
+    seen, reward, *_ = env.step(np.ones(4))
+    assert reward == env.compute_reward(seen["achieved_goal"], seen["desired_goal"], {})
+
+
+def test_each_robot_of_a_vector_is_an_environment_of_its_own() -> None:
+    vector = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=3, max_episode_steps=4, threads=2, period=0.1)
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, size=(11, 3, 4))
+    seen, infos = vector.reset(seed=[3, 4, 5])
+    found = [(seen, np.zeros(3), np.zeros(3, dtype=bool), infos)]
+    for chosen in actions:
+        seen, rewards, _, cut, infos = vector.step(chosen)
+        assert vector.observation_space.contains(seen)
+        found.append((seen, rewards, cut, infos))
+    for number in range(3):
+        alone, over = gymnasium.make("MoBeE/Reach-v0", max_episode_steps=4, period=0.1), False
+        alone_seen, info = alone.reset(seed=3 + number)
+        for step, (seen, rewards, cut, infos) in enumerate(found):
+            if step and over:
+                (alone_seen, info), reward, over = alone.reset(), 0.0, False
+            elif step:
+                alone_seen, reward, _, over, info = alone.step(actions[step - 1, number])
+                assert infos["field_depth"][number] == info["field_depth"] and infos["_field_depth"][number]
+                assert (rewards[number], cut[number]) == (reward, over)
+            assert all(np.array_equal(seen[name][number], alone_seen[name]) for name in alone_seen)
+            assert infos["is_success"][number] == info["is_success"]
+
+
+def test_episodes_of_one_step_begin_again_all_at_once() -> None:
+    vector = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=2, max_episode_steps=1, period=0.02)
+    vector.reset(seed=0)
+    cuts = [vector.step(np.zeros((2, 4)))[3].tolist() for _ in range(4)]
+    assert cuts == [[True, True], [False, False], [True, True], [False, False]]
+
+
+def test_only_pairs_that_fields_keep_apart_are_tested() -> None:
+    robot = mobee.load_robot("icub")
+    kept = guarded(robot)
+    assert guarded(robot) is kept
+    names = {frozenset((robot.shapes[a].name, robot.shapes[b].name)) for a, b in kept.solid_pairs}
+    assert frozenset(("root_link_3", "l_hand_index_3_0")) in names
+    assert frozenset(("root_link_3", "l_upper_arm_0")) not in names
+
+
+def test_no_pose_is_farther_than_the_extent() -> None:
+    robot = mobee.load_robot("icub")
+    q = np.random.default_rng(0).uniform(*robot.limits.T, size=(500, len(robot.motors)))
+    far = np.abs(mobee.Model(robot).evaluate(q).position("left_palm")).max()
+    assert far < extent(robot, "left_palm") < 3.0 * far
+
+
+def test_a_task_without_a_place_to_rest_and_a_wrong_setting_are_refused() -> None:
+    world = mobee.load_world("table")
+    world.add("wall", mobee.box(3.0, 3.0, 3.0), position=(0.0, 0.0, 0.0))
+    with pytest.raises(MobeeError, match="no goal found"):
+        ReachEnv(world=world).reset(seed=0)
+    wrong: dict[str, Any]
+    for wrong in ({"period": 0.0}, {"reward": "large"}, {"marker": "left_plam"}, {"tolerance": -1.0}):
+        with pytest.raises(MobeeError):
+            ReachEnv(**wrong)
+    assert ReachTask().reward == "sparse"
