@@ -56,9 +56,9 @@ class Clock(Message, frozen=True, kw_only=True):
 
     stream: ClassVar[Stream] = Stream("clock", "CONTROL", writer="robot_sim, every tick up to 100 per second", readers="all others")
 
-    dt: Annotated[int, Meta(gt=0)]  # ns per tick
+    dt: Annotated[int, Meta(gt=0, le=10_000_000_000)]  # ns per tick
     mode: Literal["free", "lock", "paused"]
-    rate: Annotated[float, Meta(gt=0)]  # simulated seconds per second of real time, as configured
+    rate: Annotated[float, Meta(gt=0, le=1000)]  # simulated seconds per second of real time, as configured
 
 
 class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):

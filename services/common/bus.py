@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -16,6 +17,7 @@ from zenoh.handlers import Callback, RingChannel
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
 from bus_schema.messages import Event, Message
 from bus_schema.stream import Delivery
+from mobee.errors import MobeeError
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +164,25 @@ class Bus:
         if now - self._reported.get(reason, -1.0) >= 1.0:
             self._reported[reason] = now
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
+
+    def guarded(self, what: str, handle: Callable[[], object]) -> None:
+        """Run a handler; a defect that a message brings to light is counted, reported and logged, and the process goes on.
+
+        `what`: the stream or call, for the report.  Errors of the project that a handler does not handle end the process as before.
+        """
+        try:
+            handle()
+        except MobeeError:
+            raise
+        except Exception as error:  # any: no message may end a process, and the report names what was raised
+            self.report_defect(what, error)
+
+    def report_defect(self, what: str, error: Exception) -> str:
+        """Count, report and log that the handler of a stream or call has failed; returns the text of the report."""
+        text = f"the handler of {what} failed: {type(error).__name__}: {error}"
+        self.log.error("%s", text, exc_info=error)
+        self.reject("handler", text)
+        return text
 
     def event(self, level: str, code: str, text: str, **values: float) -> None:
         """Report an event to the user: on the bus and in the log."""

@@ -123,7 +123,7 @@ class Listener:
                     self.bus.event("warning", "new_run", f"robot_sim started run {time.run} after {known}")
                 for announce in self._on_run:
                     announce()
-            handler(time)
+            self.bus.guarded(cls.__name__, lambda: handler(time))
 
         self._subscribe(cls.stream.keys(name), self._newest(handle))
 
@@ -134,7 +134,7 @@ class Listener:
     def _deliver(self, cls: type[_M], sample: zenoh.Sample, handler: Callable[[_M], None], part: str | None, any_run: bool = False) -> None:
         message = self.bus.receive(cls, sample, part, any_run=any_run)
         if message is not None:
-            handler(message)
+            self.bus.guarded(cls.__name__, lambda: handler(message))
 
 
 def _stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:

@@ -13,6 +13,7 @@ from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
 from bus_schema.rpc import Empty, Failure, Reply, Request
+from mobee.errors import MobeeError
 from services.common.bus import Bus
 
 _R = TypeVar("_R", bound=Reply)
@@ -134,7 +135,12 @@ class Answering:
             except (Refused, CallRefused) as refused:
                 code = refused.reason if isinstance(refused, Refused) else refused.code
                 self.bus.reject(code, f"{key}: {refused}")
-                query.reply_err(encode(Failure(v=VERSION, code=code, text=str(refused)[:2000])), encoding=encoding_of(Failure))
+                _reply_failure(query, code, str(refused))
+                return
+            except MobeeError:
+                raise
+            except Exception as error:  # as in Bus.guarded
+                _reply_failure(query, "handler", self.bus.report_defect(key, error))
                 return
             query.reply(key, payload, encoding=encoding_of(reply_type))
 
@@ -157,3 +163,7 @@ class Answering:
             if len(self._replies) > REMEMBERED:
                 self._replies.popitem(last=False)
         return self._replies[call]
+
+
+def _reply_failure(query: zenoh.Query, code: str, text: str) -> None:
+    query.reply_err(encode(Failure(v=VERSION, code=code, text=text[:2000])), encoding=encoding_of(Failure))

@@ -12,6 +12,7 @@ import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from numbers import Integral
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
@@ -161,7 +162,7 @@ class Service(Listener):
         """Call without waiting; `done` is called with the answer or the failure in the main thread."""
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
-            self.inbox.put(lambda: done(answer))
+            self.inbox.put(lambda: self.bus.guarded(f"the answer to {key}", lambda: done(answer)))
 
         rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, **fields)
 
@@ -213,11 +214,19 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """Store the router's id; end the process if it is another router, since a service must not join a system that was started later."""
-        if self._router not in ("", router):
-            self.log.error("another router came to %s, of a new system: this service ends", self.config.endpoint)
+        """Note the router; of a second token, ask which router answers: a service must not join a system that is started later."""
+        if not self._router:
+            self._router = router
+        elif router != self._router:
+            self.bus.event("warning", "two_routers", f"a second token of a router, {router}, is on the bus beside {self._router}")
+            for who in ("launcher", "router"):
+                self.ask(keys.service_rpc(who, "stat"), Stat, partial(self._check_system, who))
+
+    def _check_system(self, who: str, answer: Stat | rpc.CallFailed) -> None:
+        """End if a launcher or router answers that is not the one of this service's system."""
+        if isinstance(answer, Stat) and answer.instance != self._router and self.who != who:
+            self.log.error("another %s answers at %s, of a new system: this service ends", who, self.config.endpoint)
             raise SystemExit(ENVIRONMENT)
-        self._router = router
 
     def _stat(self, request: Empty, key: str) -> Stat:
         text, numbers = self.describe()

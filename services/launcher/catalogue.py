@@ -20,6 +20,7 @@ class Entry:
     nice: int = 0
     vital: bool = True  # the robot is stopped if it is given up
     participates: bool = True  # lockstep: every tick waits for it
+    may_end: bool = False  # it can finish by itself; any other service that ends without the launcher's request has failed
     real_time: bool = False  # its results depend on real time, so that it is left out in lockstep
     needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
     given: Mapping[str, str] = field(default_factory=dict)  # settings that the name of the service implies
@@ -83,4 +84,4 @@ def entry_of(who: str, module: str | None) -> Entry | None:
     if module is None:
         return entry
     place = entry or Entry("", "", 3, after=("controller",))
-    return replace(place, module=module, config=f"{module}.config:Config", needs={})
+    return replace(place, module=module, config=f"{module}.config:Config", needs={}, may_end=entry is None or who.startswith(AGENT))

@@ -35,6 +35,7 @@ class Program:
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
+    may_end: bool = False  # by itself, with code 0
     patience: float = 0.0  # least time [s] without an answer after which it counts as frozen
     environment: Mapping[str, str] = field(default_factory=dict)  # added to the launcher's own
 

@@ -272,6 +272,7 @@ def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
             after=part.entry.after,
             nice=part.entry.nice,
             vital=part.entry.vital,
+            may_end=part.entry.may_end,
             patience=part.config.patience if scenario.is_locked else 0.0,
             environment={LOCAL_ENDPOINT: local} if local else {},
         )

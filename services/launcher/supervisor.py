@@ -162,7 +162,7 @@ class Supervisor:
             child.has_token = up
 
     def _note_end(self, child: Child, code: int) -> None:
-        if code == 0:
+        if code == 0 and child.program.may_end:
             self._announce(f"{child.who} has ended")
             child.kill()
             child.enter("ended")
@@ -172,6 +172,8 @@ class Supervisor:
             self._give_up(child, f"cannot use its settings: {child.last_log_line()}")
         elif code < 0:
             self._fail(child, f"was killed by {signal.Signals(-code).name}")
+        elif code == 0:
+            self._fail(child, "ended, and the launcher had not asked for it")
         else:
             self._fail(child, f"ended with code {code}: {child.last_log_line()}")
 

@@ -28,6 +28,7 @@ class Guard:
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._stop: Stop | None = None if record is None else record.read()
+        self._counted = dict.fromkeys(INDISPENSABLE, "")  # instance that was there first: a second token of that name changes nothing
         self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
         self._on_answer: Callable[[str, int, Answer], None] = lambda who, re_k, answer: None
         if not service.locked:
@@ -169,11 +170,14 @@ class Guard:
 
     def _on_alive(self, who: str, instance: str, up: bool) -> None:
         if up:
+            if not self._counted.get(who):
+                self._counted[who] = instance
             return
         for gate in self.gates.values():
             if gate.owner == (who, instance):
                 gate.lose_owner()
-        if who in INDISPENSABLE:
+        if who in INDISPENSABLE and instance == self._counted[who]:
+            self._counted[who] = next(iter(self._service.alive.get(who, ())), "")
             self.hold_all(f"{who} is gone")
 
     def _is_own(self, message: EStop) -> bool:

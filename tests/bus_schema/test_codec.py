@@ -169,7 +169,7 @@ def test_no_number_that_is_not_finite_passes_wherever_it_stands(bad: float) -> N
     assert reason_of(messages.Event, encode(event)) == "value"
 
 
-@pytest.mark.parametrize("rate", [0.0, -1.0])
+@pytest.mark.parametrize("rate", [0.0, -1.0, 1e308])
 def test_a_clock_that_does_not_go_forward_is_refused(rate: float) -> None:
     """Receivers divide by the rate."""
     assert reason_of(Clock, encode(Clock(**HEADER, dt=10, mode="free", rate=rate))) == "decode"

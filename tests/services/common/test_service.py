@@ -47,6 +47,10 @@ def clock(bus: Rig, probe: Program) -> Iterator[Any]:
     yield tick
 
 
+def stat_of(who: str, instance: str) -> Stat:
+    return Stat(v=VERSION, who=who, instance=instance, pid=1, uptime=0.0, ready=True, text="", numbers={}, rejected={})
+
+
 def numbers(bus: Rig) -> dict[str, float]:
     return bus.stat("probe").numbers
 
@@ -344,13 +348,14 @@ def test_two_signals_end_it_as_well_as_one(bus: Rig) -> None:
     assert timed_end(program) == 0
 
 
-def test_an_error_in_a_handler_ends_the_process_with_code_1_and_is_told(tmp_path: Path, bus: Rig) -> None:
+def test_an_error_in_a_handler_is_counted_reported_and_logged_and_the_process_goes_on(tmp_path: Path, bus: Rig) -> None:
     with rig(tmp_path, bus.robot) as alone:
-        program = another(alone)
-        with pytest.raises(CallFailed):
+        program, events = another(alone), alone.record(Event, "probe")
+        with pytest.raises(CallFailed, match="RuntimeError: the probe is broken") as caught:
             alone.call(keys.service_rpc("probe", "fail"), Empty, Done)
-        assert program.wait() == 1
-        assert "ended by the probe is broken" in program.says
+        assert caught.value.code == "handler"
+        assert alone.stat("probe").rejected == {"handler": 1}
+        wait_for(lambda: any("the probe is broken" in event.text for event in events), "the event")
         assert "Traceback" in program.says
 
 
@@ -365,9 +370,20 @@ def test_an_orphan_ends_with_code_3(tmp_path: Path, bus: Rig) -> None:
 def test_another_router_does_not_inherit_a_service(tmp_path: Path, bus: Rig) -> None:
     with rig(tmp_path, bus.robot) as parent:
         program = another(parent)
+        parent.serve(keys.service_rpc("launcher", "stat"), Empty, lambda request, key: stat_of("launcher", "usurper"))
         parent.token("router", "usurper")
         assert program.wait() == 3
-        assert "another router came" in program.says
+        assert "another launcher answers" in program.says
+
+
+def test_a_second_token_of_a_router_alone_ends_nothing(tmp_path: Path, bus: Rig) -> None:
+    with rig(tmp_path, bus.robot) as parent:
+        program, events = another(parent), parent.record(Event, "probe")
+        parent.serve(keys.service_rpc("launcher", "stat"), Empty, lambda request, key: stat_of("launcher", "rig"))
+        parent.token("router", "stray")
+        wait_for(lambda: any(event.code == "two_routers" for event in events), "the event")
+        time.sleep(0.5)
+        assert program.is_running
 
 
 def test_without_a_router_it_gives_up_in_one_line_that_names_the_endpoint_and_the_remedy(bus: Rig) -> None:

@@ -159,6 +159,15 @@ def test_a_service_that_has_done_its_work_is_left_in_peace(launch: Launch) -> No
     assert summary["restarts"]["one"] == 0
 
 
+def test_a_service_of_the_robot_that_ends_unasked_has_failed(launch: Launch) -> None:
+    launched = launch(toys(controller="finish"))
+    launched.wait_for("controller ended, and the launcher had not asked for it; starts again in 0.4 s")
+    launched.process.send_signal(signal.SIGTERM)
+    code, summary = launched.end()
+    assert code == 0
+    assert summary["restarts"]["controller"] >= 1
+
+
 def test_ctrl_c_once_stops_everything(launch: Launch, free_port: int) -> None:
     launched = launch(toys(one="healthy", two="healthy"))
     launched.wait_for("all ready")

@@ -49,6 +49,19 @@ def test_without_new_commands_it_holds_after_the_ttl_within_the_time_that_brakin
     assert bench.next_state("left_arm").q[ELBOW] == pytest.approx(at_rest, abs=0.02)
 
 
+def test_a_second_token_of_the_model_that_comes_and_goes_holds_nothing_and_the_first_one_does(bench: Bench) -> None:
+    bench.rig.token("model", "first")
+    epoch = bench.arm("left_arm")
+    since = bench.now()
+    bench.rig.token("model", "ghost")
+    bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.1))
+    bench.rig.drop_token("model", "ghost")
+    bench.keep("left_arm", epoch, 0.3, lambda: elbow(0.1))
+    assert not [event for event in bench.told(since) if event.code == "hold"]
+    bench.rig.drop_token("model", "first")
+    bench.hears("hold", since, "model is gone")
+
+
 def test_a_command_that_comes_after_the_hold_is_refused_until_the_part_is_armed_again(bench: Bench) -> None:
     epoch = bench.arm("left_arm")
     since = bench.now()
