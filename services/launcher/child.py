@@ -150,8 +150,11 @@ class Child:
         self.process = None  # its number may now name another process
 
     def last_log_line(self) -> str:
-        """Return the last line of the service's log."""
-        with self.program.log.open("rb") as log:
-            log.seek(max(0, self.program.log.stat().st_size - 4000))
-            lines = log.read().decode(errors="replace").split("\n")
+        """Return the last line of the log of the process."""
+        try:
+            with self.program.log.open("rb") as log:
+                log.seek(max(0, os.fstat(log.fileno()).st_size - 4000))
+                lines = log.read().decode(errors="replace").split("\n")
+        except OSError as error:
+            return f"its log cannot be read: {error.strerror}"
         return next((line.strip() for line in reversed(lines) if line.strip()), "its log is empty")

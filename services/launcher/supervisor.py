@@ -44,8 +44,17 @@ class Supervisor:
     def begin(self) -> None:
         """Start all processes; those without dependencies connect at once, the others when their dependencies are ready."""
         for child in self.children.values():
-            child.spawn()
+            self._spawn(child)
         self._check_all()
+
+    def _spawn(self, child: Child) -> bool:
+        """Start a process; one that the system does not let start has failed, and the launcher goes on."""
+        try:
+            child.spawn()
+        except OSError as error:
+            self._fail(child, f"cannot be started: {error}")
+            return False
+        return True
 
     def settled(self) -> bool:
         """Return whether every service is ready, has ended by itself, or was given up."""
@@ -93,8 +102,8 @@ class Supervisor:
                 child.release()
         elif child.phase == "failed" and now >= child.again_at:
             child.restarts += 1
-            child.spawn()
-            child.release()
+            if self._spawn(child):
+                child.release()
         elif child.phase in ("starting", "ready"):
             self._check_process(child, now)
 

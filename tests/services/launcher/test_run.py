@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import socket
 import tomllib
@@ -166,6 +167,20 @@ def test_a_service_of_the_robot_that_ends_unasked_has_failed(launch: Launch) -> 
     code, summary = launched.end()
     assert code == 0
     assert summary["restarts"]["controller"] >= 1
+
+
+def test_the_launcher_survives_that_a_service_cannot_be_started(launch: Launch) -> None:
+    """The folder of the run, in which the service has its log, is gone."""
+    launched = launch(toys(one="healthy", two="healthy"))
+    launched.wait_for("all ready")
+    shutil.rmtree(next((launched.folder / "runs").iterdir()))
+    launched.children()[0].kill()
+    launched.wait_for("cannot be started: [Errno 2] No such file or directory")
+    launched.process.send_signal(signal.SIGTERM)
+    code, summary = launched.end()
+    assert code in (0, 1)
+    assert sum(summary["restarts"].values()) >= 0
+    assert launched.children() == []
 
 
 def test_ctrl_c_once_stops_everything(launch: Launch, free_port: int) -> None:
