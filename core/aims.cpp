@@ -9,12 +9,12 @@ namespace aiming {
 
 inline Vec3 direction_in(const Rotation& frame) { return {frame.m[0], frame.m[1], frame.m[2]}; }
 
-// The shortest turn [rad] from a unit vector to another; returns its angle.
+// Compute the smallest rotation vector [rad] from a unit vector to another; returns its angle.
 double turn_between(Vec3 from, Vec3 to, Vec3& turn) {
     Vec3 axis = cross(from, to);
     double sine = length(axis);
     const double angle = std::atan2(sine, dot(from, to));
-    if (sine < 1e-9 && angle > 1.0) {  // opposite: any axis across will do
+    if (sine < 1e-9 && angle > 1.0) {  // opposite: any perpendicular axis
         axis = std::fabs(from.x) < 0.7 ? Vec3{0.0, from.z, -from.y} : Vec3{-from.z, 0.0, from.x};
         sine = length(axis);
     }
@@ -22,9 +22,9 @@ double turn_between(Vec3 from, Vec3 to, Vec3& turn) {
     return angle;
 }
 
-// The turn [rad] from the first frame to the second; returns its angle.
+// Compute the rotation vector [rad] from the first frame to the second; returns its angle.
 double turn_of_frames(const Goal& goal, const Frame& first, const Frame& second, Vec3& turn_found) {
-    Vec3 x, y, z;  // the rows of the turn, B A^T, summed column by column of the frames
+    Vec3 x, y, z;  // the rows of the rotation B A^T, summed over the columns of the frames
     for (int c = 0; c < 3; ++c) {
         const Vec3 a = turn(first, goal.first_frame.column(c)), b = turn(second, goal.second_frame.column(c));
         x = x + b.x * a;
@@ -48,34 +48,34 @@ double turn_of_frames(const Goal& goal, const Frame& first, const Frame& second,
     return angle;
 }
 
-// What a joint does to what its link carries, for each unit of a motor.
+// The motion of the bodies that a joint carries, for one unit of a motor.
 struct Move {
-    Vec3 turn;  // of frames
-    Vec3 way;   // of the aim's point
+    Vec3 turn;  // rotation of frames
+    Vec3 shift;   // translation of the aim's point
 };
 
-// How an aim comes nearer when a joint moves its first side, sign 1, or its second, sign -1.
+// The decrease of an aim's error when a joint moves its first side (sign 1) or its second (sign -1).
 Vec3 slope_of(AimKind kind, double sign, const Move& move, const Sight& sight) {
     const Vec3 apart = sight.second - sight.first;
     switch (kind) {
         case AimKind::place:
-            return sign * move.way;
+            return sign * move.shift;
         case AimKind::hold:
-            return {sign * dot(apart, move.way) / most(length(apart), 1e-9), 0.0, 0.0};
+            return {sign * dot(apart, move.shift) / most(length(apart), 1e-9), 0.0, 0.0};
         case AimKind::coordinate:
         case AimKind::at_most:
-            return {sign * dot(sight.direction, move.way), 0.0, 0.0};
+            return {sign * dot(sight.direction, move.shift), 0.0, 0.0};
         default:
             break;
     }
     Vec3 turn = sign * move.turn;
     if (kind == AimKind::facing) {
         // The direction to the second point turns by (point to point) x (velocity of the second) / distance^2.
-        const Vec3 swing = (sign / most(dot(apart, apart), 1e-12)) * cross(apart, move.way);
+        const Vec3 swing = (sign / most(dot(apart, apart), 1e-12)) * cross(apart, move.shift);
         turn = sign > 0.0 ? turn + swing : swing;
     }
     if (kind == AimKind::turned) return turn;
-    return turn - dot(turn, sight.direction) * sight.direction;  // what turns about the direction itself does not move it
+    return turn - dot(turn, sight.direction) * sight.direction;  // a rotation about the direction itself does not change it
 }
 
 }  // namespace aiming
@@ -130,8 +130,8 @@ void add_slopes(const Robot& robot, const Aim& aim, const Sight& sight, const Fr
         for (std::int64_t link = is_first ? aim.first : aim.second; link > 0; link = robot.joint[link - 1].parent) {
             const Joint& joint = robot.joint[link - 1];
             const Vec3 axis = turn(frames[link], joint.axis);
-            const Vec3 way = joint.slides ? axis : cross(axis, point - move(frames[link], joint.point));
-            const aiming::Move moved{joint.slides ? Vec3{} : axis, way};
+            const Vec3 shift = joint.slides ? axis : cross(axis, point - move(frames[link], joint.point));
+            const aiming::Move moved{joint.slides ? Vec3{} : axis, shift};
             const Vec3 slope = weight * aiming::slope_of(aim.kind, is_first ? 1.0 : -1.0, moved, sight);
             for (std::int64_t drive = 0; drive < robot.drives; ++drive) {
                 const std::int64_t k = drive * robot.joints + link - 1, column = slopes.column[robot.motor[k]];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What least squares can aim at, and how it changes with the motors.
+// The aims of least squares, and their derivatives by the motor positions.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace mobee {
 
 // Numbered as in mobee/roadmap/ik/terms.py.
 enum class AimKind : std::int64_t {
-    place,       // the two points are one
+    place,       // the two points coincide
     turned,      // the two frames are parallel
-    along,       // the two directions are one
+    along,       // the two directions are equal
     hold,        // the points are a length apart
     facing,      // the first direction points to the second point
-    coordinate,  // the first point is a length further than the second in a direction of the root frame, of any length itself
-    at_most,     // it is no further than that
+    coordinate,  // the first point is `length` further than the second along a direction of the root frame, which may have any length
+    at_most,     // the same, or less
     motor,       // a motor is at a value, the length
 };
 
@@ -28,7 +28,7 @@ struct Aim {
     std::int64_t motor;
 };
 
-// What an aim wants, in the root frame at zero pose.  Of a direction, the first three numbers of its frame count.
+// The goal of an aim, in the root frame at zero pose.  A direction is the first three numbers of its frame.
 struct Goal {
     Vec3 first_point;
     Rotation first_frame;
@@ -39,33 +39,33 @@ struct Goal {
 
 // An aim in one pose.
 struct Sight {
-    Vec3 first, second;      // where the points are
-    Vec3 direction, wanted;  // the directions that are to be made one
-    Vec3 missing;            // [m or rad]: of aims for one number, the first counts
+    Vec3 first, second;      // positions of the points
+    Vec3 direction, wanted;  // the directions that are to become equal
+    Vec3 missing;            // the error [m or rad]; an aim of one row uses the first number only
 };
 
-// How many numbers an aim is for: these stand in so many rows of least squares.
+// The number of rows that an aim has in least squares.
 inline std::int64_t rows_of(AimKind kind) {
     return kind == AimKind::place || kind == AimKind::turned || kind == AimKind::along || kind == AimKind::facing ? 3 : 1;
 }
 
-// Whether what it misses is an angle.
+// Whether the error of an aim is an angle.
 inline bool is_turn(AimKind kind) {
     return kind == AimKind::turned || kind == AimKind::along || kind == AimKind::facing || kind == AimKind::motor;
 }
 
-// Look at an aim where the motors (motors,) are at q and the links (links,) at their frames; returns what is missing of it [m or rad].
+// Evaluate an aim at motor positions q (motors,) and link frames (links,); returns the size of its error [m or rad].
 double see(const Aim& aim, const Goal& goal, const double* q, const Frame* frames, Sight& sight);
 
-// The rows of least squares: how aims come nearer with the motors that may move.
+// The rows of least squares: the derivatives of the errors by the motors that may move.
 struct Slopes {
-    const std::int64_t* column;  // (motors,): which of those that may move, -1: it stays
-    double turn;                 // m/rad: what an error of direction counts beside one of place
-    std::int64_t stride;         // from row to row
+    const std::int64_t* column;  // (motors,): index among the motors that may move; -1: the motor does not move
+    double turn;                 // m/rad: weight of an error of direction relative to one of position
+    std::int64_t stride;         // distance of two rows in memory
     double* rows;
 };
 
-// Add the rows of an aim where it was seen last; they begin at `row`, and hold 0 before.
+// Add the rows of an aim at its last evaluation, from index `row` on; they must hold 0 before.
 void add_slopes(const Robot& robot, const Aim& aim, const Sight& sight, const Frame* frames, std::int64_t row, const Slopes& slopes);
 
 }  // namespace mobee

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays that own their memory, and views of those of others.  The library links no C++ runtime: there is neither `new` nor std::vector.
+// Arrays that own their memory, and views of other arrays.  The library links no C++ runtime: there is neither `new` nor std::vector.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace mobee {
 
-// Elements are plain data: they are neither constructed nor destroyed.  Memory that cannot be had ends the process, as in numpy's core.
+// Elements are plain data: they are neither constructed nor destroyed.  If memory cannot be allocated, the process ends, as in NumPy's core.
 template <class T>
 class Array {
     static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
@@ -42,7 +42,7 @@ public:
     const T* end() const { return data_ + size_; }
     std::size_t size() const { return size_; }
 
-    // What is in front stays; what is new is zero bytes.
+    // The first elements are kept; new elements are zero bytes.
     void resize(std::size_t size) {
         if (size > room_) reserve(size);
         if (size > size_) std::memset(static_cast<void*>(data_ + size_), 0, (size - size_) * sizeof(T));
@@ -56,7 +56,7 @@ public:
 
     void clear() { size_ = 0; }
 
-    // Where up to `count` more elements can be written behind the last; `extend` then says how many were.
+    // The address after the last element, where up to `count` more can be written; `extend` then adds those that were written.
     T* spare(std::size_t count) {
         if (size_ + count > room_) reserve(size_ + count + room_);
         return data_ + size_;
@@ -86,7 +86,7 @@ private:
     std::size_t size_ = 0, room_ = 0;
 };
 
-// Numbers that somebody else owns: what Python passes.
+// A view of numbers that another owner, such as Python, keeps alive.
 template <class T>
 struct View {
     T* data = nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The contacts of one pose, and what they do to the motors.
+// The contacts of one pose, and their projection to the motors.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace mobee {
 
 enum ContactKind : std::int64_t { solid_contact = 0, field_contact = 1 };
 
-// Names are numbers: the robot's own shapes, then the objects of the snapshot.  A link of -1 is that of a free object.
+// Names are indices: of the robot's own shapes, then of the objects of the snapshot.  Link -1 stands for a free object.
 struct Contact {
     std::int64_t kind = solid_contact;
     std::int64_t first = 0, second = 0;

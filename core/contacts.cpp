@@ -25,7 +25,7 @@ void push(Wrench& wrench, Vec3 force, Vec3 point) {
 
 bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
-// Sum in the order of the contacts, so that the result does not depend on the search that found them.
+// Sum in the order of the contacts, so that the result does not depend on the order in which they were found.
 bool push_links(const Array<Contact>& contacts, Array<Wrench>& wrench) {
     bool any = false;
     for (const Contact& contact : contacts) {

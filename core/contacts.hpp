@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finding the contacts of one pose among the pairs that may touch, and what they do to the motors.
+// Finds the contacts of one pose among the pairs that may touch, and projects them to the motors.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +15,28 @@ struct Wrench {
     Vec3 force, moment;
 };
 
-// How deep a pair overlaps, see `overlap`.
+// The depth by which a pair overlaps, see `overlap`.
 double overlap_of(const Scene& scene, Placed& placed, Pair pair, Touch& touch);
 
-// Fill a contact; false if it is with a target, and spared by what reaches.
+// Fill a contact; false if it is a contact of a target with a reaching hand, which is ignored.
 bool name_contact(const Scene& scene, const Hands& hands, Pair pair, double depth, const Touch& touch, Contact& contact);
 
-// Put a contact in `found` for every pair that overlaps.
+// Append a contact to `found` for every pair that overlaps.
 void find_contacts(const Scene& scene, const Hands& hands, Placed& placed, const Array<Pair>& pairs, Array<Contact>& found);
 
-// The contacts of a pose, and what sorting them needs.
+// The contacts of a pose, and buffers for sorting them.
 struct Contacts {
     Array<Contact> found;
     Array<Contact> unsorted;
     Array<std::int32_t> starts, ends;  // of those of one kind and first shape
 };
 
-// By kind, first and second.
+// Sort contacts by kind, first and second.
 void sort_contacts(const Scene& scene, Contacts& contacts);
 
-// Add what contacts of fields do to the motors, the sum of J^T (depth * normal) (thesis eq. 5.11), to `torque` (motors,).
+// Add the sum of J^T (depth * normal) over the contacts of fields (thesis eq. 5.11) to `torque` (motors,).
 //
-// `cut`: a part's motors feel only what happens to its own links, as in the original program.  `wrench` (links,): all 0 before and after.
+// `cut`: a contact acts only on the motors of its own part, as in the original program.  `wrench` (links,): all 0 before and after.
 void project(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, bool cut, Array<Wrench>& wrench, double* torque);
 
 }  // namespace mobee

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether straight motions from pose to pose touch anything: the middle of each first, and no pose more after the first that touches.
+// Checks straight motions between poses for contacts: the middle of each first, and no further pose after the first with a contact.
 //
-// What is found in a pose does not depend on the poses before, so threads change nothing.
+// The result for a pose does not depend on the poses before, so the number of threads changes nothing.
 #include <cstdint>
 
 #include "interface.hpp"
@@ -10,30 +10,30 @@
 
 namespace mobee {
 
-// What Python asks, see mobee/_core/edges.py.
+// The arguments from Python, see mobee/_core/edges.py.
 struct Motions {
-    Neighbours* const* near;      // (threads,): what each remembers, all in one world
+    Neighbours* const* near;      // (threads,): the neighbour list of each, all in one world
     const double* q;              // (vertices, motors)
     const std::int64_t* edges;    // (count, 2): vertices
-    const std::int64_t* between;  // (count,): how many poses there are between the ends, which themselves are not looked at
+    const std::int64_t* between;  // (count,): number of poses to check between the ends, which are not checked
     bool* free;                   // (count,): filled
     std::int64_t count, motors, threads;
 };
 
 namespace sweeping {
 
-constexpr std::int64_t at_once = 16;  // edges that follow each other are near each other, so that a list of neighbours serves them
+constexpr std::int64_t at_once = 16;  // successive edges are near each other, so that one neighbour list serves them
 
 struct Stretch {
     std::int64_t first, last;
 };
 
-// One thread's.
+// The work of one thread.
 struct Sweeper {
     const Motions* motions = nullptr;
     Neighbours* near = nullptr;
-    std::int64_t looked = 0;  // at so many poses
-    Array<Stretch> stretches;  // of poses of which none was looked at, the long ones first
+    std::int64_t checked = 0;  // number of poses
+    Array<Stretch> stretches;  // of poses that are still to be checked, the long ones first
     Array<double> pose;        // (motors,)
 
     bool is_free(std::int64_t edge) {
@@ -46,7 +46,7 @@ struct Sweeper {
             const Stretch here = stretches[done];
             const std::int64_t middle = (here.first + here.last) / 2;
             for (std::int64_t k = 0; k < motors; ++k) pose[k] = a[k] + (b[k] - a[k]) * (share * static_cast<double>(middle));
-            ++looked;
+            ++checked;
             if (find(*near, pose.data()) > 0) return false;
             if (here.first < middle) stretches.push({here.first, middle - 1});
             if (middle < here.last) stretches.push({middle + 1, here.last});
@@ -57,7 +57,7 @@ struct Sweeper {
 
 }  // namespace sweeping
 
-// Find which edges are free; returns how many poses were looked at.
+// Find which edges are free; returns the number of poses that were checked.
 MOBEE_CALL std::int64_t mobee_sweep(const Motions* motions) {
     Array<sweeping::Sweeper*> sweepers;
     for (std::int64_t k = 0; k < motions->threads; ++k) {
@@ -69,12 +69,12 @@ MOBEE_CALL std::int64_t mobee_sweep(const Motions* motions) {
     share(motions->count, sweeping::at_once, motions->threads, [&](std::int64_t thread, std::int64_t begin, std::int64_t end) {
         for (std::int64_t edge = begin; edge < end; ++edge) motions->free[edge] = sweepers[thread]->is_free(edge);
     });
-    std::int64_t looked = 0;
+    std::int64_t checked = 0;
     for (sweeping::Sweeper* one : sweepers) {
-        looked += one->looked;
+        checked += one->checked;
         discard(one);
     }
-    return looked;
+    return checked;
 }
 
 }  // namespace mobee

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The contacts of many poses at once.  One pose is a batch of one, and threads share a batch in blocks: all give the same bits.
+// The contacts of many poses at once.  One pose is a batch of one, and threads share a batch in blocks; the results are bit-equal.
 #include "contacts.hpp"
 #include "interface.hpp"
 #include "rows.hpp"
@@ -7,7 +7,7 @@
 
 namespace mobee {
 
-// What one thread works in; kept for the next evaluation.
+// The buffers of one thread, kept for the next evaluation.
 struct Worker {
     Placed placed;
     Pairs pairs;
@@ -16,7 +16,7 @@ struct Worker {
     Rows rows;
 };
 
-// What one evaluation works in.
+// The buffers of one evaluation.
 struct Room {
     Array<Worker*> workers;
 
@@ -29,7 +29,7 @@ struct Room {
     }
 };
 
-// What Python asks, see mobee/_core/engine.py.
+// The arguments from Python, see mobee/_core/engine.py.
 struct Request {
     const Scene* scene;
     const double* q;  // (poses, motors)
@@ -43,7 +43,7 @@ struct RequestOfOne {
     Room* room;
     const Scene* scene;
     double* torque;  // (motors,), overwritten
-    void* rows;      // room for the most contacts: their numbers, and behind them their reals
+    void* rows;      // buffer for `most` contacts: the integers of all, then the real numbers of all
     std::int64_t most, cut;
     Hands hands;
 };
@@ -55,7 +55,7 @@ void fit(Worker& worker, const Robot& robot) {
     worker.wrench.resize(robot.links);
 }
 
-// The contacts of one pose q (motors,), in order, and what they do to the motors, `torque` (motors,).
+// Find the contacts of one pose q (motors,), sorted, and their projection to the motors, `torque` (motors,).
 const Array<Contact>& contacts_at(const Scene& scene, const double* q, const Hands& hands, bool cut, Worker& worker, double* torque) {
     const Robot& robot = *scene.robot;
     Placed& placed = worker.placed;
@@ -73,7 +73,7 @@ const Array<Contact>& contacts_at(const Scene& scene, const double* q, const Han
     return found;
 }
 
-// The poses from `begin` to before `end`.
+// Evaluate the poses from `begin` to before `end`.
 void run(const Request& request, std::int64_t begin, std::int64_t end, Worker& worker) {
     const Scene& scene = *request.scene;
     const std::int64_t motors = scene.robot->motors;
@@ -90,7 +90,7 @@ MOBEE_CALL Room* mobee_room_new() { return make<Room>(); }
 
 MOBEE_CALL void mobee_room_free(Room* room) { discard(room); }
 
-// Give the rows of the last evaluation away, in the order of the poses: the numbers, and the reals; `mobee_rows_end` ends each.
+// Hand over the rows of the last evaluation, in the order of the poses: integers, and real numbers; `mobee_rows_end` frees each.
 MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
     Rows& all = room->workers[0]->rows;
     for (std::size_t k = 1; k < room->workers.size(); ++k) {
@@ -100,7 +100,7 @@ MOBEE_CALL void mobee_room_rows(Room* room, void** arrays) {
     all.give(arrays);
 }
 
-// Find the contacts of all poses; returns how many there are.  `mobee_room_rows` gives them.
+// Find the contacts of all poses; returns their number.  `mobee_room_rows` hands them over.
 MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     const std::int64_t most_threads = request->poses > 1 ? request->poses : 1;
     const std::int64_t threads = request->threads < most_threads ? request->threads : most_threads;
@@ -114,7 +114,7 @@ MOBEE_CALL std::int64_t mobee_evaluate(Room* room, const Request* request) {
     return static_cast<std::int64_t>(rows);
 }
 
-// The same for the one pose at q (motors,).  Contacts that are more than the most are only counted.
+// The same for one pose q (motors,).  Contacts beyond `most` are only counted.
 MOBEE_CALL std::int64_t mobee_evaluate_one(const RequestOfOne* request, const double* q) {
     Room& room = *request->room;
     room.make_workers(1);

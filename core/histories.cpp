@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums over what happened before, weighted by how near it was.
+// Sums over earlier observations, weighted by distance.
 
 #include <cmath>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// What each action brought on which target, as sums, see mobee/learning/reaching/histories.py.
+// The values of each action on each target, as sums, see mobee/learning/reaching/histories.py.
 struct History {
     struct Key {
         std::int64_t action, target;
@@ -22,16 +22,16 @@ struct History {
     const Sum* sums;        // (used,)
     std::int64_t known, used;
     double scale;  // m: the weight of a target at a distance d is 1 / (1 + d / scale),
-    double near;   // m: none beyond
+    double near;   // m: the weight is 0 beyond this distance
 };
 
 namespace histories {
 
-constexpr double far = 30.0;  // squared distance at which a Gaussian weight, 3e-7, is taken for none
+constexpr double far = 30.0;  // squared distance at which a Gaussian weight, 3e-7, counts as 0
 
 }  // namespace histories
 
-// Add up what each action brought on targets near this one (3,) m, and how much that counts, each (actions,).
+// Sum the weighted values of each action on targets near this one (3,) m, and the weights, each (actions,).
 MOBEE_CALL void mobee_weighted_sums(const History* history, const double* target, double* totals, double* weights) {
     Array<double> weight(history->known);
     for (std::int64_t i = 0; i < history->known; ++i) {
@@ -47,7 +47,7 @@ MOBEE_CALL void mobee_weighted_sums(const History* history, const double* target
     }
 }
 
-// Add to `sums` (2, points), at each point (points, d) asked about, the weights times the values of events, and the weights.
+// Add to `sums` (2, points), for each point (points, d), the weighted sum of the events' values, and the sum of the weights.
 // Events are rows of a point and a value, (events, d + 1).  The weight at a distance r is exp(-r^2 / 2).
 MOBEE_CALL void mobee_gaussian_sums(const double* asked, std::int64_t points, std::int64_t d, const double* events, std::int64_t count, double* sums) {
     for (std::int64_t k = 0; k < count; ++k) {

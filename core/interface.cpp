@@ -5,8 +5,8 @@
 #define MOBEE_SOURCES "unknown"
 #endif
 
-// How Python sees that a library and the functions it declares belong together.
+// Python compares this with the version of its own declarations.
 MOBEE_CALL std::int64_t mobee_abi() { return mobee::abi; }
 
-// The hash of the sources, see core/build.py, which looks for it in the file too.
+// The hash of the sources, which core/build.py also searches in the file.
 MOBEE_CALL const char* mobee_sources() { return "mobee sources " MOBEE_SOURCES; }

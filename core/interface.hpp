@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The C interface: what Python calls, through ctypes.
+// The C interface, which Python calls through ctypes.
 //
-// Every function has C linkage and the prefix mobee_.  It takes and gives numbers, pointers to contiguous arrays of doubles and
-// 64-bit integers, and handles of objects that a function mobee_..._new has made and mobee_..._free ends.  Whoever calls has
-// checked shapes and types (mobee/_core): nothing here can be called with anything else.
+// Every function has C linkage and the prefix mobee_.  Arguments and results are numbers, pointers to contiguous arrays of doubles and
+// 64-bit integers, and handles of objects that a function mobee_..._new makes and mobee_..._free destroys.  The caller must check
+// shapes and types (mobee/_core): the functions do not.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace mobee {
 
-// Raise it when a function changes its arguments or its meaning, and with it ABI in mobee/_core/__init__.py.
+// Increase it, and ABI in mobee/_core/__init__.py, when the arguments or the meaning of a function change.
 constexpr std::int64_t abi = 2;
 
 }  // namespace mobee

@@ -91,7 +91,7 @@ void add_jacobian(const Robot& robot, const Frame* frames, std::int64_t link, Ve
     const std::int64_t n = robot.motors;
     for (std::int64_t here = link; here > 0; here = robot.joint[here - 1].parent) {
         const Joint& joint = robot.joint[here - 1];
-        // A joint leaves its own axis where it is, so the link it moves carries the axis too.
+        // A joint does not move its own axis, so the axis is fixed in the moved link too.
         const Vec3 axis = turn(frames[here], joint.axis);
         const Vec3 linear = joint.slides ? axis : cross(axis, point - move(frames[here], joint.point));
         for (std::int64_t drive = 0; drive < robot.drives; ++drive) {
@@ -110,7 +110,7 @@ MOBEE_CALL void mobee_sines_cosines(const double* angles, std::int64_t count, do
     sines_cosines(angles, count, sines, cosines);
 }
 
-// Every link in the poses q (count, motors): (count, links, 4, 4).
+// Fill the frames of all links in the poses q (count, motors): (count, links, 4, 4).
 MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64_t count, double* out) {
     Links links;
     links.fit(*robot);
@@ -126,7 +126,7 @@ MOBEE_CALL void mobee_link_poses(const Robot* robot, const double* q, std::int64
     }
 }
 
-// How a link's point, root frame at zero pose, moves with each motor in the poses q (count, motors): (count, 6, motors).
+// Fill the Jacobians (count, 6, motors) of a link's point (root frame, zero pose) in the poses q (count, motors).
 MOBEE_CALL void mobee_jacobians(const Robot* robot, const double* q, std::int64_t count, std::int64_t link, const Vec3* point, double* out) {
     Links links;
     links.fit(*robot);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Four or eight numbers in one register, or in several where the processor has none so wide: the results are the same bits.
+// Four or eight numbers in one register, or in several on a processor with narrower registers; the results are bit-equal.
 #pragma once
 
 #include <bit>
@@ -28,7 +28,7 @@ inline V load(const void* from) {
 }
 
 #if defined(__SSE2__) && !defined(__AVX__)
-// Two registers that stand for one twice as wide: compilers would compare such vectors number by number.
+// Two registers in place of one twice as wide, since compilers compare such vectors number by number.
 struct Doubles {
     __m128d low, high;
 };
@@ -41,7 +41,7 @@ inline Doubles halves(Four value) { return load<Doubles>(&value); }
 inline Singles halves(Eight value) { return load<Singles>(&value); }
 #endif
 
-// NaN of a gives b, as of `least` and `most`.
+// If a is NaN the result is b, as in `least` and `most`.
 #if defined(__SSE2__) && !defined(__AVX__)
 inline Four least_of(Four a, Four b) {
     const auto [a_low, a_high] = halves(a);
@@ -69,7 +69,7 @@ inline Eight most_of(Eight a, Eight b) { return a > b ? a : b; }
 inline Four unit_of(Four value) { return least_of(most_of(value, Four{} - 1.0), Four{} + 1.0); }
 inline Four absolute_of(Four value) { return most_of(value, -value); }
 
-// Bit k says whether a[k] < b[k].
+// Bit k is set if a[k] < b[k].
 inline unsigned less(Four a, Four b) {
 #if defined(__AVX__)
     return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(reinterpret_cast<__m256d>(a), reinterpret_cast<__m256d>(b), _CMP_LT_OQ)));
@@ -112,7 +112,7 @@ inline Eight root_of(Eight value) {
 }
 
 #if defined(__AVX2__) && !defined(__AVX512VL__)
-// For each choice of eight which are chosen, one after the other.
+// For each subset of eight lanes: the indices of its lanes, in order.
 struct Choices {
     std::uint8_t of[256][lanes] = {};
 
@@ -126,8 +126,8 @@ struct Choices {
 inline constexpr Choices choices;
 #endif
 
-// Write those of the eight numbers of which the bit is set, one after the other, and up to eight in all; returns where they end.  There is
-// no branch: which volumes are near is hard to guess.
+// Write those of the eight numbers whose bit is set, one after the other; up to eight numbers may be overwritten.  Returns the end.  There
+// is no branch, since the processor could not predict which volumes are near.
 inline std::int32_t* put(std::int32_t* to, EightInts from, unsigned which) {
 #if defined(__AVX512VL__)
     const __m256i chosen = _mm256_maskz_compress_epi32(static_cast<__mmask8>(which), reinterpret_cast<__m256i>(from));
@@ -164,7 +164,7 @@ inline Four root_of(Four value) {
 
 inline void store(double* to, Four value) { std::memcpy(to, &value, sizeof value); }
 
-// Sines, and by how much cosines are less than 1, of angles up to 1e5: reduced to a quarter turn (Cody and Waite), then Taylor to 1e-17.
+// Sine and 1 - cosine of angles up to 1e5: reduced to a quarter turn (Cody and Waite), then a Taylor series to 1e-17.
 inline void sine_cosine(Four angle, Four& sine, Four& cosine) {
     constexpr double pi_2_high = 1.5707963267341256, pi_2_middle = 6.077100506303966e-11, pi_2_low = 2.0222662487959506e-21;
     constexpr double rounder = 6755399441055744.0;  // 1.5 * 2^52: added to a number, it leaves the nearest integer in the last bits
@@ -194,7 +194,7 @@ inline void store_single(float* to, Four value) {
     std::memcpy(to, &single, sizeof single);
 }
 
-// Of four vectors their first, second, third and fourth numbers.
+// Transpose four vectors: return their first, second, third and fourth numbers.
 inline void transpose(Four& a, Four& b, Four& c, Four& d) {
     const Four p = __builtin_shufflevector(a, b, 0, 4, 2, 6), q = __builtin_shufflevector(a, b, 1, 5, 3, 7);
     const Four r = __builtin_shufflevector(c, d, 0, 4, 2, 6), s = __builtin_shufflevector(c, d, 1, 5, 3, 7);
@@ -204,7 +204,7 @@ inline void transpose(Four& a, Four& b, Four& c, Four& d) {
     d = __builtin_shufflevector(q, s, 2, 3, 6, 7);
 }
 
-// The first three numbers of a, and the fourth of b.
+// Return the first three numbers of a and the fourth of b.
 inline Four with_fourth(Four a, Four b) { return __builtin_shufflevector(a, b, 0, 1, 2, 7); }
 
 inline double sum_of_three(Four v) { return v[0] + v[1] + v[2]; }

@@ -57,7 +57,7 @@ void push_along_normal(const Law& law, const ClauseRow& row, double size, double
     for (std::int64_t k = row.entries.first; k < row.entries.end; ++k) force[law.entries[k].motor] += size * law.entries[k].normal;
 }
 
-// Eqs. 5.14 to 5.17.  A clause is satisfied when one of its rows is.  The smallest violation in a clause gives the size of the force of
+// Eqs. 5.14 to 5.17.  A clause is satisfied when one of its rows is.  The smallest violation in a clause sets the size of the force of
 // all its rows, which keeps the force continuous where the minimum passes to another row.  In the published law the size for each row is
 // its own violation.
 void add_clause_forces(const Law& law, const ForceInput& input, double* force) {

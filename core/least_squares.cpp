@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Damped least squares from many starts, for what has a derivative: places, directions and distances of points on links.
+// Damped least squares from many starts, for aims with a derivative: positions, directions and distances of points on links.
 //
 // Levenberg and Marquardt: the damping falls after a step that helped and grows after one that did not; a motor at its limit that would
-// be pushed beyond it is left out.  No start knows of another, so threads change nothing.
+// be pushed beyond it is left out.  The starts are independent, so the number of threads changes nothing.
 #include <cmath>
 #include <cstring>
 
@@ -12,23 +12,23 @@
 
 namespace mobee {
 
-// What Python asks, see mobee/_core/least_squares.py.
+// The arguments from Python, see mobee/_core/least_squares.py.
 struct Search {
     const Robot* robot;
     const Aim* aims;           // (count,)
     const Goal* goals;         // (count,) for all starts, or (starts, count)
     const std::int64_t* free;  // (motors that may move,)
     const double *low, *high;  // (motors that may move,) rad
-    double* q;                 // (starts, motors): moved to where they lead
-    double* residuals;         // (starts, count): what every aim misses there, m or rad
+    double* q;                 // (starts, motors): replaced by the solutions
+    double* residuals;         // (starts, count): error of every aim at the solution, m or rad
     std::int64_t count, frees, starts, one_goal, steps, threads;
 };
 
 namespace descent {
 
-constexpr double turn = 0.2;     // m/rad: what an error of direction counts beside one of place
-constexpr double longest = 0.3;  // of a motor's range, in one step
-constexpr double close = 0.1;    // of every tolerance: there is no need to come nearer
+constexpr double turn = 0.2;     // m/rad: weight of an error of direction relative to one of position
+constexpr double longest = 0.3;  // of a motor's range: longest step
+constexpr double close = 0.1;    // share of every tolerance at which an aim is near enough
 constexpr std::int64_t block = 8;
 constexpr double grow = 6.0, fall = 0.25, first_damping = 1e-3, least_damping = 1e-9, most_damping = 1e6;
 
@@ -40,7 +40,7 @@ inline Four load_four(const double* from) {
     return value;
 }
 
-// The sum of the products of two rows, whose length is a multiple of `block`, in one order on all processors.
+// Return the dot product of two rows, whose length is a multiple of `block`, summed in one order on all processors.
 inline double product(const double* a, const double* b, std::int64_t count) {
     Four even{}, odd{};
     for (std::int64_t c = 0; c < count; c += block) {
@@ -51,14 +51,14 @@ inline double product(const double* a, const double* b, std::int64_t count) {
     return (sums[0] + sums[2]) + (sums[1] + sums[3]);
 }
 
-// Subtract `factor` times a block from another.
+// Subtract `factor` times one block from another.
 inline void subtract(double* from, double factor, const double* what) {
     const Four low = load_four(from) - factor * load_four(what), high = load_four(from + 4) - factor * load_four(what + 4);
     std::memcpy(from, &low, sizeof low);
     std::memcpy(from + 4, &high, sizeof high);
 }
 
-// The links that carry something aimed at, as a robot of their own, and the aims with the numbers that links have there.
+// A robot reduced to the links that aims depend on, and the aims with the indices of these links.
 struct Carriers {
     Robot robot;
     Array<Aim> aims;  // (count,)
@@ -99,16 +99,16 @@ Carriers::Carriers(const Search& search) : aims(search.aims, search.count) {
     }
 }
 
-// One thread's: where it looks, and what it works in.
+// The work of one thread: its position in the search, and its buffers.
 class Descender {
 public:
     void begin(const Search& search, const Carriers& carriers);
     void descend_from(std::int64_t start);
-    std::int64_t looks() const { return looks_; }  // how many poses it has looked at
+    std::int64_t evaluations() const { return evaluations_; }  // number of poses
 
 private:
     void descend(const Goal* goals, double* q, double* residuals);
-    double look(const Goal* goals, const double* q, Array<double>& errors, double* residuals);
+    double evaluate(const Goal* goals, const double* q, Array<double>& errors, double* residuals);
     void find_slopes();
     void find_step(double damping, const double* q);
     void solve(double damping);
@@ -118,17 +118,17 @@ private:
     const Search* search_ = nullptr;
     const Robot* robot_ = nullptr;
     const Aim* aims_ = nullptr;
-    std::int64_t looks_ = 0;
-    std::int64_t rows_ = 0, stride_ = 0;  // of the slopes: the numbers of all aims, and the motors that may move, in whole blocks
+    std::int64_t evaluations_ = 0;
+    std::int64_t rows_ = 0, stride_ = 0;  // of the slopes: number of rows of all aims; number of motors that may move, rounded up to whole blocks
     Links links_;
-    Array<std::int64_t> column_;   // (motors,): which of those that may move, -1: it stays
+    Array<std::int64_t> column_;   // (motors,): index among the motors that may move; -1: the motor does not move
     Array<Sight> sights_;          // (aims,)
     Array<double> errors_, tried_errors_;  // (rows,)
-    Array<double> slopes_, active_;        // (rows, stride): of all motors, and of those that are not held
+    Array<double> slopes_, active_;        // (rows, stride): of all motors; of the motors that are not held
     Array<double> matrix_, right_;         // (rows + 1, rows in whole blocks), (rows,)
     Array<double> column_of_matrix_;       // (rows + 1,)
     Array<double> step_;                   // (stride,)
-    Array<double> trial_, tried_;          // (motors,), (aims,): a pose, and what the aims miss there
+    Array<double> trial_, tried_;          // (motors,), (aims,): a pose, and the errors of the aims there
     Array<bool> held_;                     // (motors that may move,): at a limit
 };
 
@@ -165,7 +165,7 @@ void Descender::descend(const Goal* goals, double* q, double* residuals) {
     const std::size_t pose = trial_.size() * sizeof(double);
     double damping = first_damping;
     bool stale = true;
-    double cost = look(goals, q, errors_, residuals);
+    double cost = evaluate(goals, q, errors_, residuals);
     for (std::int64_t step = 0; step < search_->steps && damping <= most_damping && !arrived(goals, residuals); ++step) {
         if (stale) find_slopes();
         find_step(damping, q);
@@ -174,7 +174,7 @@ void Descender::descend(const Goal* goals, double* q, double* residuals) {
             double& motor = trial_[search_->free[c]];
             motor = clamp(motor + step_[c], search_->low[c], search_->high[c]);
         }
-        const double new_cost = look(goals, trial_.data(), tried_errors_, tried_.data());
+        const double new_cost = evaluate(goals, trial_.data(), tried_errors_, tried_.data());
         stale = new_cost < cost;
         if (!stale) {
             damping *= grow;
@@ -190,9 +190,9 @@ void Descender::descend(const Goal* goals, double* q, double* residuals) {
     }
 }
 
-// Place the links at q; fill the errors (rows,) and the residuals (aims,); returns half the squared sum of the errors.
-double Descender::look(const Goal* goals, const double* q, Array<double>& errors, double* residuals) {
-    ++looks_;
+// Place the links at q, and fill the errors (rows,) and the residuals (aims,); returns half the sum of the squared errors.
+double Descender::evaluate(const Goal* goals, const double* q, Array<double>& errors, double* residuals) {
+    ++evaluations_;
     place_links_at(*robot_, q, links_);
     double total = 0.0;
     std::int64_t row = 0;
@@ -218,7 +218,7 @@ void Descender::find_slopes() {
     }
 }
 
-// What the damped system says, without motors that it would push beyond a limit at which they are; no longer than it may be.
+// Compute the step of the damped system, bounded in length, without motors at a limit that it would push beyond it.
 void Descender::find_step(double damping, const double* q) {
     std::memset(held_.data(), 0, held_.size() * sizeof(bool));
     std::memcpy(active_.data(), slopes_.data(), slopes_.size() * sizeof(double));
@@ -236,7 +236,7 @@ void Descender::find_step(double damping, const double* q) {
 }
 
 // Fill `right` with the solution of (A A^T + damping) x = errors, A the active slopes, by Cholesky's method: the matrix is L L^T.
-// Column by column in whole blocks, with the errors as one more row: so no number waits for the sum of others.
+// Column by column in whole blocks, with the errors as one more row, so that no number depends on a sum that is not finished.
 void Descender::solve(double damping) {
     const std::int64_t side = whole_blocks(rows_);
     double* m = matrix_.data();
@@ -249,7 +249,7 @@ void Descender::solve(double damping) {
     for (std::int64_t j = 0; j < rows_; ++j) {
         const double pivot = std::sqrt(most(m[j * side + j], 1e-300));
         for (std::int64_t i = j; i <= rows_; ++i) column_of_matrix_[i] = m[i * side + j] /= pivot;
-        column_of_matrix_[j] = 0.0;  // what is left of here is done
+        column_of_matrix_[j] = 0.0;  // the columns to the left are finished
         for (std::int64_t i = j + 1; i <= rows_; ++i) {
             double* row = m + i * side;
             const double factor = row[j];
@@ -264,7 +264,7 @@ void Descender::solve(double damping) {
     }
 }
 
-// Hold the motors that the step pushes beyond a limit at which they are; whether there are any that were not held.
+// Hold the motors at a limit that the step would push beyond it; returns whether there are new ones.
 bool Descender::hold_at_limits(const double* q) {
     bool any = false;
     for (std::int64_t c = 0; c < search_->frees; ++c) {
@@ -277,7 +277,7 @@ bool Descender::hold_at_limits(const double* q) {
     return any;
 }
 
-// Whether every aim is met, and closer than its tolerance asks.
+// Return whether every aim is met, well within its tolerance.
 bool Descender::arrived(const Goal* goals, const double* residuals) const {
     for (std::int64_t k = 0; k < search_->count; ++k)
         if (!(residuals[k] <= close * goals[k].tolerance)) return false;
@@ -286,7 +286,7 @@ bool Descender::arrived(const Goal* goals, const double* residuals) const {
 
 }  // namespace descent
 
-// Move the motors that may move of every start to meet the aims; returns how many poses were looked at.
+// Move the free motors of every start towards the aims; returns the number of evaluated poses.
 MOBEE_CALL std::int64_t mobee_descend(const Search* search) {
     const std::int64_t most_threads = search->starts > 1 ? search->starts : 1;
     const std::int64_t threads = search->threads < most_threads ? search->threads : most_threads;
@@ -297,12 +297,12 @@ MOBEE_CALL std::int64_t mobee_descend(const Search* search) {
         descenders[k]->begin(*search, carriers);
     }
     share(search->starts, 1, threads, [&](std::int64_t thread, std::int64_t start, std::int64_t) { descenders[thread]->descend_from(start); });
-    std::int64_t looks = 0;
+    std::int64_t evaluations = 0;
     for (descent::Descender* one : descenders) {
-        looks += one->looks();
+        evaluations += one->evaluations();
         discard(one);
     }
-    return looks;
+    return evaluations;
 }
 
 }  // namespace mobee

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far shapes may have moved since an earlier pose: as seen from the base, and as seen from a link that carries them.
+// Bounds of the motion of shapes since an earlier pose, relative to the base and relative to a link that carries them.
 #pragma once
 
 #include <algorithm>
@@ -11,35 +11,35 @@
 
 namespace mobee {
 
-// Some shapes of a link that are near each other: how far they have moved together is known at less cost than of each.
+// A group of shapes of one link that are near each other; one bound for a group takes less time than one for each shape.
 struct Group {
     std::int64_t link = 0;
-    std::int64_t number = 0;  // of shapes
+    std::int64_t number = 0;  // number of shapes
     Vec3 middle;              // at zero pose
-    Vec3 then;                // where it was in the earlier pose
-    double spread = 0.0;      // how far from the middle centres are, each with its arm [m]
+    Vec3 then;                // its position in the earlier pose
+    double spread = 0.0;      // largest distance of a centre from the middle, plus its arm [m]
 };
 
 struct Motion {
-    std::int64_t serial = 0;             // of the robot that it fits
+    std::int64_t serial = 0;             // of the robot for which it was made
     std::int64_t pose = 0;               // number of the present pose
     Array<bool> moved;                   // (links,): since the last pose
     Array<double> last;                  // (joints,): the angles of the last pose
     Array<std::int64_t> moved_in;        // (links,): the pose in which each has moved last
-    Array<std::int64_t> placed_in;       // (slots,): the pose in which each has been placed last, see `way_of`
+    Array<std::int64_t> placed_in;       // (slots,): the pose in which each has been placed last, see `travel_of`
 
     // The earlier pose.
     Array<double> angles;   // (joints,)
     Array<Frame> frame;     // (links,)
     Array<Four> center;     // (slots,), of outlines
 
-    Array<double> arm;                // (slots,): how far from the centre points are that turn with it [m]: of a ball none, of a capsule its axis
+    Array<double> arm;                // (slots,): largest distance from the centre of a point whose rotation matters [m]: 0 for a ball, half the axis for a capsule
     Array<Group> group;
     Array<std::int64_t> group_of;     // (slots,)
-    Array<double> far;                // (groups + 1,), see `measure_groups`; the last stands for what does not belong to the robot
-    Array<double> turned;             // (links,): by which a point 1 m from a centre that turns with the link has moved [m]
-    Array<double> way;                // (slots,), see `way_of`
-    Array<double> bend, sway, chain;  // (links,), see `bend_links`
+    Array<double> far;                // (groups + 1,), see `measure_groups`; the last is for objects that do not belong to the robot
+    Array<double> turned;             // (links,): motion [m], by the link's rotation, of a point at 1 m from a centre
+    Array<double> travel;                // (slots,), see `travel_of`
+    Array<double> bend, drift, chain;  // (links,), see `bend_links`
 
     void fit(const Robot& robot);
     void make_groups(const Robot& robot);
@@ -47,7 +47,7 @@ struct Motion {
 
 namespace motion {
 
-constexpr std::int64_t most_groups = 4;  // of a link
+constexpr std::int64_t most_groups = 4;  // for one link
 
 // Call the function with every slot that holds a shape.
 template <class Function>
@@ -56,7 +56,7 @@ void each_slot(const Robot& robot, Function function) {
         for (std::int64_t i = cluster.first; i < cluster.end; ++i) function(i);
 }
 
-// Give the shapes of a link to groups, by where they are along the longest side of the box that holds their centres.
+// Divide the shapes of a link into groups, by position along the longest side of the bounding box of their centres.
 inline void group_link(const Robot& robot, std::int64_t link, Motion& to) {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
     std::int64_t number = 0;
@@ -90,8 +90,8 @@ inline void Motion::fit(const Robot& robot) {
     moved_in.resize(robot.links);
     for (Array<std::int64_t>* of_slots : {&placed_in, &group_of}) of_slots->resize(slots);
     for (Array<double>* of_joints : {&last, &angles}) of_joints->resize(robot.joints);
-    for (Array<double>* of_links : {&turned, &bend, &sway, &chain}) of_links->resize(robot.links);
-    for (Array<double>* of_slots : {&arm, &way}) of_slots->resize(slots);
+    for (Array<double>* of_links : {&turned, &bend, &drift, &chain}) of_links->resize(robot.links);
+    for (Array<double>* of_slots : {&arm, &travel}) of_slots->resize(slots);
     frame.resize(robot.links);
     if (serial == robot.serial) return;
     serial = robot.serial;
@@ -118,7 +118,7 @@ inline void Motion::make_groups(const Robot& robot) {
     });
 }
 
-// Mark the links that a joint carries whose angle differs from the last, all of them if `fresh`, and remember the angles.
+// Mark the links carried by joints whose angle differs from the last one, or all links if `fresh`, and store the angles.
 inline void find_moved(const Robot& robot, const double* angles, bool fresh, Motion& motion) {
     ++motion.pose;
     motion.moved[0] = fresh;
@@ -130,18 +130,18 @@ inline void find_moved(const Robot& robot, const double* angles, bool fresh, Mot
         if (motion.moved[link]) motion.moved_in[link] = motion.pose;
 }
 
-// Let the pose be the earlier one: from now on `way` counts from here.
+// Make the present pose the earlier one, from which `travel` is measured.
 inline void remember(const Placed& placed, Motion& motion) {
     const auto copy = [](const auto& from, auto& to) { std::copy(from.begin(), from.begin() + to.size(), to.begin()); };
     copy(placed.links.angles, motion.angles);
     copy(placed.links.frame, motion.frame);
     for (std::size_t i = 0; i < placed.outline.size(); ++i) motion.center[i] = placed.outline[i].center;
-    std::fill(motion.way.begin(), motion.way.end(), 0.0);
+    std::fill(motion.travel.begin(), motion.travel.end(), 0.0);
     for (Group& one : motion.group) one.then = move(motion.frame[one.link], one.middle);
     std::fill(motion.far.begin(), motion.far.end(), 0.0);
 }
 
-// Fill `far`: how far any point of any shape of a group may be from where it was [m]; returns the most of all.
+// Fill `far`: the bound of the motion of any point of any shape of a group [m]; returns the largest.
 inline double measure_groups(const Robot& robot, const Links& links, Motion& motion) {
     for (std::int64_t link = 0; link < robot.links; ++link) {
         if (!motion.moved[link]) continue;
@@ -160,27 +160,27 @@ inline double measure_groups(const Robot& robot, const Links& links, Motion& mot
     return farthest;
 }
 
-// How far any point of a shape may be from where it was [m], after `measure_groups`; places the shape if its link has moved.
-inline double way_of(const Robot& robot, std::int64_t i, Placed& placed, Motion& motion) {
+// Return a bound of the motion of any point of a shape [m], after `measure_groups`; places the shape if its link has moved.
+inline double travel_of(const Robot& robot, std::int64_t i, Placed& placed, Motion& motion) {
     const std::int64_t link = robot.link[i];
-    if (motion.placed_in[i] >= motion.moved_in[link]) return motion.way[i];
+    if (motion.placed_in[i] >= motion.moved_in[link]) return motion.travel[i];
     place_shape(robot, i, placed);
     motion.placed_in[i] = motion.pose;
-    motion.way[i] = length(three(placed.outline[i].center - motion.center[i])) + motion.turned[link] * motion.arm[i];
-    return motion.way[i];
+    motion.travel[i] = length(three(placed.outline[i].center - motion.center[i])) + motion.turned[link] * motion.arm[i];
+    return motion.travel[i];
 }
 
-// The most of all ways; places all shapes.
+// Return the largest bound of all shapes; places all shapes.
 inline double measure_shapes(const Robot& robot, Placed& placed, Motion& motion) {
     double farthest = 0.0;
-    motion::each_slot(robot, [&](std::int64_t i) { farthest = most(farthest, way_of(robot, i, placed, motion)); });
+    motion::each_slot(robot, [&](std::int64_t i) { farthest = most(farthest, travel_of(robot, i, placed, motion)); });
     return farthest;
 }
 
 // Fill for every link three sums over the joints that carry it, from the base on, see `swung`.
 //
-// `bend` [rad]: what they have turned since then; `sway` [m]: how far that may have moved the joint of the link; `chain` [m]: how far
-// the base is along the joints.
+// `bend` [rad]: the angles that they have turned since the earlier pose; `drift` [m]: a bound of the resulting motion of the link's joint;
+// `chain` [m]: the distance from the base along the joints.
 inline void bend_links(const Robot& robot, const double* angles, Motion& motion) {
     for (std::int64_t j = 0; j < robot.joints; ++j) {
         const Joint& joint = robot.joint[j];
@@ -188,15 +188,15 @@ inline void bend_links(const Robot& robot, const double* angles, Motion& motion)
         const double change = std::fabs(angles[j] - motion.angles[j]);
         const double span = robot.span[j] + (joint.slides ? std::fabs(angles[j]) : 0.0);
         motion.bend[link] = motion.bend[parent] + (joint.slides ? 0.0 : change);
-        motion.sway[link] = motion.sway[parent] + motion.bend[parent] * span + (joint.slides ? change : 0.0);
+        motion.drift[link] = motion.drift[parent] + motion.bend[parent] * span + (joint.slides ? change : 0.0);
         motion.chain[link] = motion.chain[parent] + span;
     }
 }
 
-// How far a point may have moved that is `lever` from the joint of its link, as seen from a link that carries it [m].
+// Return a bound of the motion [m] of a point at distance `lever` from the joint of its link, relative to a link that carries it.
 inline double swung(const Motion& motion, std::int64_t link, std::int64_t base, double lever) {
     const double turned = motion.bend[base];
-    return motion.sway[link] - motion.sway[base] - turned * (motion.chain[link] - motion.chain[base]) + (motion.bend[link] - turned) * lever;
+    return motion.drift[link] - motion.drift[base] - turned * (motion.chain[link] - motion.chain[base]) + (motion.bend[link] - turned) * lever;
 }
 
 }  // namespace mobee

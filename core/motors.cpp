@@ -146,8 +146,8 @@ void move_one(const Motors& motors, std::int64_t i, std::int64_t substeps, doubl
 inline Four clamped(Four x, Four low, Four high) { return x < low ? low : x > high ? high : x; }
 inline Four reduced(Four x, Four by) { return x > by ? x - by : x < -by ? x + by : x * 0.0; }
 
-// Four motors in position or velocity mode, one in each SIMD lane.  Each lane does the operations of `move_one` in the same order, which
-// gives equal bits.
+// Four motors in position or velocity mode, one in each SIMD lane.  Each lane does the operations of `move_one` in the same order, so that
+// the results have equal bits.
 struct FourMotors {
     const Motors& motors;
     std::int64_t index[4];  // of the motors; the last index is repeated if there are fewer than four

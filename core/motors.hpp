@@ -19,14 +19,14 @@ struct MotorConstants {
     double max_velocity = 0.0, max_acceleration = 0.0, max_torque = 0.0;
     double response = 0.0;       // share of a velocity error that one substep removes (first-order lag)
     double half_backlash = 0.0;
-    double friction = 0.0;       // Coulomb friction, as the velocity that it takes away
+    double friction = 0.0;       // Coulomb friction, as a decrease of velocity
     std::int64_t delay = 0;      // substeps
 };
 
 struct MotorState {
     double q = 0.0, velocity = 0.0, effort = 0.0;  // of the joint side; effort in N m
     double motor_q = 0.0, motor_velocity = 0.0;    // of the motor side
-    double pulled_q = 0.0;        // where the motor side pulls the joint side
+    double pulled_q = 0.0;        // position to which the motor side pulls the joint side
     double hold_q = 0.0;          // position that a hold keeps after braking
     double reference = 0.0;       // the command: position, velocity or torque, according to the mode
     double load = 0.0;            // external torque [N m]
@@ -39,7 +39,7 @@ struct Motors {
     View<const std::int64_t> living;       // indices of the simulated motors, ascending; the others never move
     View<const MotorConstants> constants;  // (n,)
     MotorState* state = nullptr;           // (n,)
-    double* line = nullptr;                // (rows, n), the delay line: a ring of commands, one row a substep
+    double* line = nullptr;                // (rows, n), the delay line: a ring of commands, one row per substep
     std::int64_t rows = 1;
     std::int64_t newest = 0;               // the row of the delay line written last
     std::uint64_t seed = 0;                // of the encoders' noise

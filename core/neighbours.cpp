@@ -32,7 +32,7 @@ struct Neighbours {
 
     Remembered state = Remembered::nothing;
     std::int64_t served = 0;  // poses that the list has served
-    std::int64_t pause = 0;   // poses that no list is made for
+    std::int64_t pause = 0;   // number of poses for which no list is made
 
     Placed placed;
     Motion motion;
@@ -68,14 +68,14 @@ bool pays(Neighbours& near, double farthest) {
 }
 
 // Return an upper bound of the sum of the motions of a listed pair's two volumes [m].
-double way_of_pair(Neighbours& near, Pair pair) {
+double travel_of_pair(Neighbours& near, Pair pair) {
     const Robot& robot = *near.scene->robot;
-    const double way = way_of(robot, pair.first, near.placed, near.motion);
-    return pair.second < robot.slots() ? way + way_of(robot, pair.second, near.placed, near.motion) : way;
+    const double travel = travel_of(robot, pair.first, near.placed, near.motion);
+    return pair.second < robot.slots() ? travel + travel_of(robot, pair.second, near.placed, near.motion) : travel;
 }
 
 // Return a looser upper bound from their groups alone, without placing the volumes.
-double way_of_groups(const Motion& motion, Pair groups) { return motion.far[groups.first] + motion.far[groups.second]; }
+double travel_of_groups(const Motion& motion, Pair groups) { return motion.far[groups.first] + motion.far[groups.second]; }
 
 // Return the groups of two shapes, or of a shape and an object.
 Pair groups_of(const Neighbours& near, Pair pair) {
@@ -99,8 +99,8 @@ void gather(Neighbours& near) {
     near.still.clear();
     bool bent = false;
     for (const Neighbour& one : near.list) {
-        if (way_of_groups(near.motion, one.groups) < one.gap) continue;
-        const double between = way_of_pair(near, one.pair);
+        if (travel_of_groups(near.motion, one.groups) < one.gap) continue;
+        const double between = travel_of_pair(near, one.pair);
         if (between < one.gap) continue;
         if (between == 0.0) {
             if (one.kept >= 0) near.still.push(near.kept[one.kept]);
@@ -199,7 +199,7 @@ MOBEE_CALL void mobee_neighbours_enter(Neighbours* near, const Scene* scene, con
     near->scene = scene;
     near->hands = *hands;
     near->state = was_of_use ? Remembered::pose_to_renew : Remembered::nothing;
-    near->pause = was_of_use || first ? 0 : following::min_served;  // a world in motion outdates its lists
+    near->pause = was_of_use || first ? 0 : following::min_served;  // in a moving world lists are soon out of date
     near->placed.fit(*scene->robot);
     near->motion.fit(*scene->robot);
     near->wrench.resize(scene->robot->links);

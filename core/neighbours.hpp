@@ -8,13 +8,12 @@
 
 namespace mobee {
 
-struct Neighbours;  // what one user remembers from pose to pose, of a robot in a scene; mobee/model/track.py makes it
+struct Neighbours;  // the state of one user from pose to pose, of a robot in a scene; mobee/model/track.py makes it
 
-// Find the contacts in the pose q (motors,); returns how many, in no order.
+// Find the contacts in the pose q (motors,), unsorted; returns their number.
 std::int64_t find(Neighbours& near, const double* q);
 
-// Put the contacts of the last `find` in order and add what those of fields do to the motors, the sum of J^T (depth * normal), to
-// `torque` (motors,).
+// Sort the contacts of the last `find`, and add the sum of J^T (depth * normal) over the contacts of fields to `torque` (motors,).
 void project_contacts(Neighbours& near, double* torque);
 
 // The contacts of the last `find`; after `project_contacts` in order: by kind, first and second.

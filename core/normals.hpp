@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Standard normals that are a pure function of seed, tick and motor: who knows these draws the same (Box and Muller).
+// Standard normal numbers as a pure function of seed, tick and motor (Box and Muller).
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ inline std::uint64_t mixed(std::uint64_t x) {
     return x ^ (x >> 31);
 }
 
-// The natural logarithm of normal numbers above 0, to two units in the last place: x = 2^e m with m within a root of 2 of 1, and
-// log m = 2 artanh((m - 1) / (m + 1)).  The same bits on every system, unlike those of its C library.
+// The natural logarithm of normal floating-point numbers above 0, to two units in the last place: x = 2^e m, 1/sqrt(2) <= m <= sqrt(2),
+// and log m = 2 artanh((m - 1) / (m + 1)).  The bits are the same on every system, unlike those of C libraries.
 inline Four logarithm(Four x) {
     constexpr double ln_2_high = 0.6931471803691238, ln_2_low = 1.9082149292705877e-10;  // the first has 21 bits of zeros at its end
     constexpr double root_2 = 1.4142135623730951;
@@ -28,7 +28,7 @@ inline Four logarithm(Four x) {
     FourMarks bits;
     std::memcpy(&bits, &x, sizeof bits);
     const FourMarks fraction = (bits & mantissa) | one;
-    const FourMarks counted = (bits >> 52) | integers;  // as a number: 2^52 more than it counts
+    const FourMarks counted = (bits >> 52) | integers;  // as a floating-point number: 2^52 plus the integer
     Four m, e;
     std::memcpy(&m, &fraction, sizeof m);
     std::memcpy(&e, &counted, sizeof e);
@@ -45,17 +45,17 @@ inline Four logarithm(Four x) {
 
 }  // namespace normals
 
-// Those of four ticks, one after the other: they cost what one tick's do.
+// The normal numbers of four successive ticks, which take no more time than those of one.
 class Normals {
 public:
     Normals(std::uint64_t seed, std::int64_t tick) {
         for (std::int64_t j = 0; j < 4; ++j) key_[j] = normals::mixed(normals::mixed(seed) ^ static_cast<std::uint64_t>(tick + j));
     }
 
-    // Fill `even` and `odd`, a number for each tick, of motors 2 c and 2 c + 1: two normals come of two numbers.
+    // Fill `even` and `odd` for motors 2 c and 2 c + 1, one number per tick: the method makes two normal numbers from two uniform ones.
     void draw(std::int64_t couple, double* even, double* odd) const {
         constexpr double unit = 0x1p-53, turn = 2.0 * 3.14159265358979323846;
-        Four uniform, angle, sine, less;  // `less`: by how much the cosine is less than 1
+        Four uniform, angle, sine, less;  // `less`: 1 - cosine
         for (std::int64_t j = 0; j < 4; ++j) {
             const std::uint64_t first = normals::mixed(key_[j] ^ normals::mixed(static_cast<std::uint64_t>(couple)));
             uniform[j] = (static_cast<double>(static_cast<std::int64_t>(first >> 11)) + 1.0) * unit;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of the outcomes of actions, what an observation was worth, and what the next ones may be (thesis 6.4).
+// Counts of the outcomes of actions, the reward of an observation, and the expected rewards of the next ones (thesis 6.4).
 
 #include <cmath>
 #include <cstdint>
@@ -11,19 +11,19 @@
 
 namespace mobee {
 
-// The counts of a transition model, where Python keeps them, see mobee/learning/transitions.py.
+// The counts of a transition model, in Python's arrays, see mobee/learning/transitions.py.
 struct OutcomeCounts {
     double* count;           // (states, actions, bins): T(s, a), imagined observations included, 0 where there is no bin
     double* probability;     // (states, actions, bins)
     std::int64_t* outcome;   // (states, actions, bins)
-    std::int64_t* used;      // (states, actions): how many bins there are, the first of them for staying and for the goal
+    std::int64_t* used;      // (states, actions): number of bins in use; the first two are for staying and for the goal
     double* weight;          // (states, actions): the sum of the real counts
-    double* total;           // (states, actions): of the counts that the reward is taken over
+    double* total;           // (states, actions): sum of the counts from which the reward is computed
     double* reward;          // (states, actions): the last information gain, in nats
     std::int64_t* tries;     // (states, actions)
-    const double* imagined;  // (bins,): how much of a bin's count is imagined
+    const double* imagined;  // (bins,): imagined part of a bin's count
     std::int64_t actions, bins;
-    std::int64_t over_states;  // the reward is taken over so many states, each imagined once; 0: over the bins of the state-action
+    std::int64_t over_states;  // number of states, each imagined once, over which the reward is computed; 0: over the bins of the state-action
     double forgetting;         // factor of the real counts before an observation
 };
 
@@ -31,25 +31,25 @@ struct OutcomeCounts {
 struct DebiasedCounts {
     double* probability;  // (states, actions, bins)
     const double* prior;  // (bins,)
-    double sum;           // of the prior
+    double sum;           // sum of the prior
 };
 
 namespace observing {
 
-constexpr double new_bin = 1.0;      // the imagined count of all bins but the first two (Algorithm 6)
-constexpr double no_room = -1.0;     // instead of a reward: all bins are in use
+constexpr double new_bin = 1.0;      // the imagined count of every bin after the first two (Algorithm 6)
+constexpr double no_room = -1.0;     // returned instead of a reward if all bins are in use
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// KL(P || T) in nats when one bin of T grows by one (eq. 6.5): its count before, and that of all bins.
+// Return KL(P || T) in nats for an observation that adds 1 to one bin (eq. 6.5), from its count and the total before.
 inline double information_gain(double count, double total) {
     const double gain = (count + 1.0) / (total + 1.0) * std::log1p(1.0 / count) - std::log1p(1.0 / total);
     return gain > 0.0 ? gain : 0.0;  // rounding
 }
 
-// How many bins a state-action has; not more than fit, should another thread of Python have made room meanwhile.
+// Return the number of bins of a state-action, at most the number in the arrays, since another Python thread may have widened them.
 inline std::int64_t bins_of(const OutcomeCounts& known, std::int64_t row) { return known.used[row] < known.bins ? known.used[row] : known.bins; }
 
-// The bin of an outcome, the next free one if it is new.
+// Return the bin of an outcome; for a new outcome, the next free bin.
 std::int64_t bin_of(const OutcomeCounts& known, std::int64_t row, std::int64_t outcome) {
     const std::int64_t* outcomes = known.outcome + row * known.bins;
     const std::int64_t used = bins_of(known, row);
@@ -62,7 +62,7 @@ inline double imagined_total(const OutcomeCounts& known, std::int64_t used) {
     return known.imagined[0] + known.imagined[1] + static_cast<double>(used - 2) * new_bin;
 }
 
-// What an observation of a bin would pay now.
+// Return the reward that an observation of a bin would have now.
 double gain(const OutcomeCounts& known, std::int64_t row, std::int64_t bin) {
     const std::int64_t used = bins_of(known, row);
     const double weight = known.weight[row] * known.forgetting;
@@ -104,13 +104,13 @@ void believe(const OutcomeCounts& known, const DebiasedCounts& beliefs, std::int
     }
 }
 
-// Counts over which the gain of the next observation will be taken.
+// Counts from which the gain of the next observation is computed.
 struct NextCounts {
-    const double* count;  // (states, actions, bins), above 0 where the probability is
+    const double* count;  // (states, actions, bins): above 0 where the probability is above 0
     const double* total;  // (states, actions)
 };
 
-// The information gain to expect, in nats, after `more` observations of the bin `likely`.
+// Return the expected information gain [nats] of the next observation, after `more` observations of the bin `likely`.
 double expected(const TransitionTable& table, const NextCounts& next, std::int64_t row, std::int64_t likely, double more) {
     const double* probability = table.probability + row * table.bins;
     const double total = next.total[row];
@@ -134,30 +134,30 @@ std::int64_t largest(const double* values, std::int64_t count) {
 
 }  // namespace observing
 
-// What observing an outcome would pay now; changes nothing.
+// Return the reward that observing an outcome would have now; changes nothing.
 MOBEE_CALL double mobee_gain(const OutcomeCounts* known, std::int64_t state, std::int64_t action, std::int64_t outcome) {
     const std::int64_t row = state * known->actions + action;
     return observing::gain(*known, row, observing::bin_of(*known, row, outcome));
 }
 
-// Count one real transition; returns its reward, or `no_room` if there has to be one more bin first.
+// Count one real transition; returns its reward, or `no_room` if the arrays need one more bin.
 MOBEE_CALL double mobee_observe(const OutcomeCounts* known, std::int64_t state, std::int64_t action, std::int64_t outcome) {
     return observing::observe(*known, state * known->actions + action, outcome);
 }
 
-// Let beliefs follow the counts of a state-action.
+// Compute the debiased probabilities of a state-action anew from its counts.
 MOBEE_CALL void mobee_believe(const OutcomeCounts* known, const DebiasedCounts* beliefs, std::int64_t state, std::int64_t action) {
     observing::believe(*known, *beliefs, state * known->actions + action);
 }
 
-// Replace the `gains` (states, actions) of all that was tried by the information gain to expect next.
+// Replace the `gains` (states, actions) of all tried state-actions by the expected information gain of their next try.
 MOBEE_CALL void mobee_expected_gains(const TransitionTable* table, const observing::NextCounts* next, const std::int64_t* tries, double* gains) {
     for (std::int64_t row = 0; row < table->states * table->actions; ++row)
         if (tries[row] != 0) gains[row] = observing::expected(*table, *next, row, 0, 0.0);
 }
 
-// Follow the best actions from a state through their most likely outcomes, and let the `gains` (states, actions) met fall as they would.
-// `action_values` (states, actions) are minus infinity where there is no action.
+// Simulate the best actions from a state, each with its most likely outcome, and reduce the `gains` (states, actions) of these actions as
+// the observations would.  `action_values` (states, actions) are minus infinity where there is no action.
 MOBEE_CALL void mobee_deplete(const TransitionTable* table, const observing::NextCounts* next, const double* action_values,
                               std::int64_t state, std::int64_t steps, double* gains) {
     const std::int64_t actions = table->actions;

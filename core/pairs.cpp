@@ -18,7 +18,7 @@ inline Balls balls_at(const float* x, const float* y, const float* z, const floa
     return {load<Eight>(x), load<Eight>(y), load<Eight>(z), load<Eight>(bound)};
 }
 
-// Which of them touch a ball, bit by bit.
+// Bit k: whether ball k touches a given ball.
 inline unsigned touching(const Ball& ball, const Balls& balls) {
     const Eight d = ball.x - balls.x, e = ball.y - balls.y, f = ball.z - balls.z, r = ball.radius + balls.bound;
     return less(d * d + e * e + f * f, r * r);
@@ -35,7 +35,7 @@ inline Ball ball_of(const Robot& robot, const Placed& placed, std::int64_t slot,
 
 inline EightInts from_number(std::int64_t first) { return EightInts{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int32_t>(first); }
 
-// A list of pairs that is being written.
+// A list of pairs to which pairs are being appended.
 struct Writer {
     PairList& list;
     std::int32_t *begin, *first, *second;
@@ -57,7 +57,7 @@ struct Writer {
     }
 };
 
-// The pairs of some strips.
+// Append the pairs of some strips.
 void look_through(const Robot& robot, const Placed& placed, std::int64_t begin, std::int64_t end, float skin, PairList& list) {
     Writer found(list, (end - begin) * lanes);
     const float *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data(), *bound = robot.bound.data();
@@ -80,7 +80,7 @@ void own(const Robot& robot, const Placed& placed, float skin, Pairs& pairs) {
     }
 }
 
-// The bits of the lanes from `k` to before `end`.
+// A mask of the lanes from `k` to before `end`.
 inline unsigned before(std::int64_t k, std::int64_t end) { return end - k < lanes ? (1u << (end - k)) - 1u : 0xffu; }
 
 // Add the objects from `begin` to before `end` that touch a ball.
@@ -127,7 +127,7 @@ void fit(Near& near, const Scene& scene) {
     near.second.resize(scene.x.size());
 }
 
-// Put the pairs with objects each where they belong.
+// Sort the pairs with objects into the two lists.
 void sort_out(const Scene& scene, const PairList& found, Pairs& pairs) {
     const Robot& robot = *scene.robot;
     const auto slots = static_cast<std::int32_t>(robot.slots());
@@ -146,7 +146,7 @@ void sort_out(const Scene& scene, const PairList& found, Pairs& pairs) {
     pairs.others.second.extend(count - both);
 }
 
-// The pairs of a shape and a free object; what is near a cluster is gathered once for all of its shapes.
+// Append the pairs of shapes and free objects; the objects near a cluster are gathered once for all of its shapes.
 void with_world(const Scene& scene, const Placed& placed, float skin, Pairs& pairs) {
     const Robot& robot = *scene.robot;
     Near& near = pairs.near;

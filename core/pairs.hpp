@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which pairs of volumes may touch in a pose, found in three steps: balls about clusters, balls about volumes, and the sieve.
+// Finds the pairs of volumes that may touch in a pose, in three steps: balls about clusters, balls about volumes, and the sieve.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct Pair {
     std::int32_t first = 0, second = 0;
 };
 
-// Pairs that are being listed: for each the first and the second.
+// A list of pairs: the first and the second volume of each.
 struct PairList {
     Array<std::int32_t> first, second;
 
@@ -25,23 +25,23 @@ struct PairList {
 // The free objects near one cluster, as columns.
 struct Near {
     Array<float> x, y, z, bound;
-    Array<std::int32_t> second;  // each of them as the second of a pair
+    Array<std::int32_t> second;  // the index of each as the second volume of a pair
     std::int64_t count = 0;
 };
 
-// The pairs of one pose, and what finding them needs; kept from pose to pose, for fresh memory costs more than the search.
+// The pairs of one pose, and the buffers of the search, which are kept because allocating memory takes longer than the search.
 struct Pairs {
     PairList thick;       // two volumes about their cores, see `Outline`
-    PairList others;      // a box or a hull with whatever
-    Array<Pair> left;     // by the sieve
-    PairList with_world;  // what touches an object, before it is put where it belongs
+    PairList others;      // a box or a hull with any volume
+    Array<Pair> left;     // the pairs that the sieve does not drop
+    PairList with_world;  // pairs with an object, before they are sorted into `thick` and `others`
     Near near;
 };
 
 // Find the pairs whose balls are nearer than the skin [m].
 void find_pairs(const Scene& scene, const Placed& placed, double skin, Pairs& pairs);
 
-// Leave those of the pairs that may be nearer than the skin: most of those whose balls are have nothing to do with each other.
+// Keep the pairs of volumes that may be nearer than the skin; for most pairs of near balls the volumes are far apart.
 void sieve(const Scene& scene, Placed& placed, double skin, Pairs& pairs);
 
 }  // namespace mobee

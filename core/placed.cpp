@@ -33,9 +33,9 @@ void Placed::fit(const Robot& robot) {
 
 namespace placing {
 
-constexpr float farthest = 1e15f;  // m: beyond it squares would leave single precision
+constexpr float farthest = 1e15f;  // m: squares of larger numbers overflow in single precision
 
-// Four slots at once, those behind the last shape of a cluster too.
+// Place four slots at once, including the empty slots at the end of a cluster.
 void fill_columns(const Robot& robot, Placed& placed) {
     const Outline* outline = placed.outline.data();
     float *x = placed.x.data(), *y = placed.y.data(), *z = placed.z.data();

@@ -28,7 +28,7 @@ enum RunEnd : std::int64_t { all_ticks_done, action_ended, state_lost };
 // velocities, each (n,).
 constexpr std::int64_t record_depths = 2;
 
-// The memory belongs to the caller.
+// The caller owns the memory.
 struct Plant {
     Neighbours* neighbours = nullptr;  // of the robot in the world; null: contacts are not computed
     const Law* law = nullptr;
@@ -57,7 +57,7 @@ struct Plant {
 
 namespace plant {
 
-// Give the motors the command that is `command_age` ticks old.
+// Send the motors the command that is `command_age` ticks old.
 void apply_command(Plant& plant, std::int64_t tick) {
     if (tick <= plant.command_age) return;
     const double* command = plant.commands + tick % plant.command_age * plant.law->motors.size;

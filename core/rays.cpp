@@ -21,7 +21,7 @@ struct Convex {
     std::int64_t count;
 };
 
-// What Python passes, see mobee/_core/rays.py.  The ray of column i and row j, with x = left + i * step and y = top + j * step:
+// The arguments from Python, see mobee/_core/rays.py.  The ray of column i and row j, with x = left + i * step and y = top + j * step:
 // in a perspective picture from `origin` along ahead + x * right + y * down, in a parallel one from origin + x * right + y * down along ahead.
 struct Picture {
     const Convex* volumes;
@@ -31,14 +31,14 @@ struct Picture {
     std::int64_t count, height, width, perspective;
     Vec3 origin, right, down, ahead;
     double left, top, step;
-    double nearest;       // what is entered nearer than this is not seen [m]
+    double nearest;       // a surface nearer than this is not drawn [m]
 };
 
 namespace casting {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Where a ray enters a volume, in the volume's own axes.
+// The point where a ray enters a volume, in the volume's own axes.
 struct Entry {
     double at = infinity;
     Vec3 normal;
@@ -74,7 +74,7 @@ Entry into_sphere(Vec3 start, Vec3 along, double radius, double z) {
     return {at, (1.0 / radius) * (from + at * along)};
 }
 
-// The endless cylinder about z: where the ray is inside; enter > leave if it misses.
+// The part of a ray inside the infinite cylinder about z; enter > leave if it misses.
 Inside within_mantle(Vec3 start, Vec3 along, double radius) {
     Inside found;
     const double a = along.x * along.x + along.y * along.y, c = start.x * start.x + start.y * start.y - radius * radius;
@@ -152,7 +152,7 @@ struct Span {
     std::int64_t begin, end;
 };
 
-// The pixels of one axis of the picture in which a sphere can be seen; `aside` and `ahead`: its centre from the origin.
+// The range of pixels along one axis of the picture in which a sphere can be visible; `aside`, `ahead`: its centre from the origin.
 Span span_of(const Picture& picture, double aside, double ahead, double radius, double first, std::int64_t size) {
     double low = aside - radius, high = aside + radius;
     if (picture.perspective != 0) {
@@ -196,7 +196,7 @@ void draw(const Picture& picture, std::int32_t number) {
 
 }  // namespace casting
 
-// Draw the volumes, in their order: of two at the same depth the first is seen.
+// Draw the volumes in their order; of two at the same depth the first is visible.
 MOBEE_CALL void mobee_cast(const Picture* picture) {
     for (std::int64_t pixel = 0; pixel < picture->height * picture->width; ++pixel) {
         picture->depth[pixel] = std::numeric_limits<float>::infinity();

@@ -13,7 +13,7 @@ namespace mobee {
 namespace reach {
 
 constexpr double degree = 3.14159265358979323846 / 180.0;
-// rad/s^2 for a lever of 1 m and a distance of 1 m; a normal gets all of it where it is opposite to the target's.  The 2014 program has
+// rad/s^2 for a lever of 1 m and a distance of 1 m; a normal gets the full value if it is opposite to the target's.  The 2014 program has
 // 5000 deg/s^2.
 constexpr double gain = 5000.0 * degree;
 

@@ -18,7 +18,7 @@ struct RobotTables {
     const double *scale, *offset;                         // (drives, joints), (joints,)
     const VolumeRow* volume;                              // (shapes,)
     const std::int64_t *link, *name, *field, *meets_world;  // (shapes,)
-    const std::int64_t* cluster;                          // (clusters + 1,): where each begins
+    const std::int64_t* cluster;                          // (clusters + 1,): first shape of each
     const unsigned char* tested;                          // (shapes, shapes)
     const Vec3* corner;                                   // (corners,)
     const std::int32_t *edge_start, *edge;                // (corners + 1,), (edges,)
@@ -57,8 +57,8 @@ void set_joints(Robot& robot, const RobotTables& from) {
     robot.offset = Array<double>(from.offset, from.joints);
 }
 
-// For every joint how far it is from the one before, for every shape how far its points are from the joint of its link: between the
-// points of their axes that are nearest to the joint before, the base's is its origin.
+// Compute the distance of every joint from the one before, and the largest distance of every shape's points from the joint of its link.
+// A joint is represented by the point of its axis that is nearest to the joint before, the base by its origin.
 void set_levers(Robot& robot) {
     Array<Vec3> at(robot.links);
     robot.span.resize(robot.joints);
@@ -119,7 +119,7 @@ void set_shapes(Robot& robot, const RobotTables& from) {
     }
 }
 
-// Add the strips of two clusters with pairs of which both are thick, or of all others.
+// Add the strips of two clusters: of pairs of two thick volumes, or of all other pairs.
 void add_strips(Robot& robot, const RobotTables& from, std::int64_t a, std::int64_t b, bool thick) {
     const Cluster rows = robot.cluster[a], columns = robot.cluster[b];
     for (std::int64_t i = rows.first; i < rows.end; ++i) {

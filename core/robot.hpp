@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot as the core reads it: joints, motors, shapes, and which of them are tested against each other.  It never changes.
+// A robot in the core: joints, motors, shapes, and the pairs of shapes that are tested against each other.  It never changes.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 namespace mobee {
 
 // A joint moves link j + 1, which its parent, a link with a smaller number, carries.  Its motion is I + s S + c C: s and c are the
-// sine and 1 - cosine of its angle, where it slides the way and 0.
+// sine and 1 - cosine of its angle; for a prismatic joint, s is its position and c is 0.
 struct Joint {
     Frame S, C;
     std::int64_t parent = 0;
@@ -25,22 +25,22 @@ struct VolumeRow {
     std::int64_t kind;
     Vec3 position;
     Rotation rotation;
-    Vec3 half;  // of a convex one its first corner in the table of corners, and their number
+    Vec3 half;  // half sizes; for a convex volume, its first corner in the table of corners and their number
     double bound;
 };
 
-// What a shape is on its link, in the link's axes at zero pose.
+// A shape on its link, in the link's axes at zero pose.
 struct Shape {
     Volume volume;
     std::int64_t link = 0;
-    std::int64_t name = 0;  // number in the robot file; from the number of own shapes on, which carried object
+    std::int64_t name = 0;  // index in the robot file; from the number of own shapes on, index among the carried objects
     bool field = false;
     bool meets_world = false;
-    double lever = 0.0;  // how far its points are from the joint of its link, see `swung`
+    double lever = 0.0;  // largest distance of its points from the joint of its link [m], see `swung`
 };
 
-// What is read of a volume before anything is known of its neighbours.  Nothing of the volume is farther from its core than the radius,
-// but of boxes and hulls, which have none.
+// The part of a volume that the broad phase reads.  All points of the volume are within the radius of its core,
+// except for boxes and hulls, which have no core.
 struct Outline {
     Four center;  // the fourth is the radius
     Four core;    // half of it; the fourth is 1 over its square, 0 where it is a point
@@ -56,46 +56,46 @@ struct Cluster {
     std::int64_t first = 0, end = 0;  // slots
 };
 
-// A slot that is tested against some of `lanes` later ones in a row.
+// A slot that is tested against some of `lanes` successive later slots.
 struct Strip {
     std::int32_t slot = 0, start = 0;
     std::uint32_t tested = 0;  // bits
 };
 
-// Two clusters, or one with itself, of which some shapes are tested, and their strips: of pairs of thick volumes, and of all others.
+// Two clusters (or one with itself) with tested pairs of shapes, and their strips: pairs of thick volumes, then all others.
 struct ClusterPair {
     std::int64_t first = 0, second = 0;
-    std::int64_t thick = 0, others = 0, end = 0;  // where in the strips the first begin, the others, and where they end
+    std::int64_t thick = 0, others = 0, end = 0;  // indices in the strips: begin of the thick ones, begin of the others, end
 };
 
 struct Robot {
     std::int64_t serial = 0;  // no two robots have the same
     std::int64_t motors = 0, joints = 0, links = 0, drives = 0;  // drives: the largest number of motors on one joint
-    std::int64_t own_shapes = 0;                                 // without what is carried
+    std::int64_t own_shapes = 0;                                 // without carried objects
     Array<Joint> joint;         // (joints,)
-    Array<std::int64_t> motor;  // (drives, joints): which motor
-    Array<double> scale;        // (drives, joints): by how much it turns the joint
+    Array<std::int64_t> motor;  // (drives, joints): index of the motor
+    Array<double> scale;        // (drives, joints): motion of the joint per motion of the motor
     Array<double> offset;       // (joints,)
-    Array<double> span;         // (joints,): how far a joint is from the one before [m]
+    Array<double> span;         // (joints,): distance of a joint from the one before [m]
 
     // Shapes stand in slots, cluster by cluster; each cluster begins at a multiple of `lanes`, and slots between them hold nothing.
     Array<Shape> shape;            // (slots,)
     Array<Outline> outline;        // (slots,)
-    Array<std::int64_t> link;      // (slots,): that of the shape
-    Array<float> bound;            // (slots,): of their balls, see `roomy`; less than nothing where there is no shape
-    Array<bool> thick;             // (slots,): no box nor hull, see `Outline`
+    Array<std::int64_t> link;      // (slots,): link of the shape
+    Array<float> bound;            // (slots,): radii of their balls, see `roomy`; negative in empty slots
+    Array<bool> thick;             // (slots,): neither a box nor a hull, see `Outline`
     Array<Cluster> cluster;
     Array<ClusterPair> cluster_pair;
     Array<Strip> strip;
     Array<std::int32_t> common;        // (links, links): the last link that carries both
     Array<Vec3> corner;                // of all hulls
-    Array<std::int32_t> edge_start, edge;  // of their corners, see `Hull`; empty, or for all of them
+    Array<std::int32_t> edge_start, edge;  // of the corners, see `Hull`; empty, or for all hulls
 
     std::int64_t slots() const { return static_cast<std::int64_t>(shape.size()); }
 };
 
-// A radius of the broad phase, larger by more than single precision rounds, so that it hides nothing that the narrow phase would find;
-// `far`: how far from the origin anything is whose place is rounded.
+// A radius for the broad phase, larger than the exact one by more than the rounding of single precision, so that no contact is missed;
+// `far`: largest distance from the origin of any position that is rounded [m].
 inline float roomy(double radius, double far = 0.0) { return static_cast<float>(radius * (1.0 + 1e-6) + 1e-6 * far + 1e-9); }
 
 // Whether a volume lies within its radius of its core.
@@ -104,7 +104,7 @@ inline bool is_thick(Kind kind) { return kind <= Kind::cylinder; }
 Outline outline_of(const Volume& volume);
 Box box_of(const Volume& volume);
 
-// The volume of a row in its own place, with the corners that stand in a table from its first one on.
+// Return the volume of a row at its own position; `corner`: the table of corners.
 Volume volume_of(const VolumeRow& row, const Robot& owner);
 
 }  // namespace mobee

@@ -11,10 +11,10 @@ namespace mobee {
 
 namespace pieces {
 
-constexpr std::size_t large = 1 << 17, largest = 1 << 26;  // bytes of those that wait
+constexpr std::size_t large = 1 << 17, largest = 1 << 26;  // bytes: smallest and largest pieces that are kept
 constexpr int most = 4;
 
-// In front of the memory that is used.
+// The header of a piece of memory.
 struct alignas(16) Piece {
     std::size_t bytes;
 };
@@ -24,7 +24,7 @@ Piece* waiting[most] = {};
 
 Piece* of(void* memory) { return memory == nullptr ? nullptr : static_cast<Piece*>(memory) - 1; }
 
-// Put a piece in the place of a smaller one, if there is one; gives what is to be ended.
+// Keep a piece in place of a smaller one, if there is one; returns the piece to be freed.
 Piece* let_wait(Piece* piece) {
     if (piece->bytes < large || piece->bytes > largest) return piece;
     pthread_mutex_lock(&lock);
@@ -36,7 +36,7 @@ Piece* let_wait(Piece* piece) {
     return piece;
 }
 
-// The smallest piece that is large enough, or none.
+// Return the smallest kept piece that is large enough, or null.
 Piece* take(std::size_t bytes) {
     if (bytes < large) return nullptr;
     Piece** best = nullptr;
@@ -60,7 +60,7 @@ void* resized(void* old, std::size_t bytes) {
         end(old);
         return kept + 1;
     }
-    piece = static_cast<Piece*>(std::realloc(piece, sizeof(Piece) + bytes));  // which moves the pages of large ones, without a copy
+    piece = static_cast<Piece*>(std::realloc(piece, sizeof(Piece) + bytes));  // moves the pages of a large piece without copying them
     if (piece == nullptr) std::abort();
     piece->bytes = bytes;
     return piece + 1;

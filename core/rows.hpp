@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts as Python gets them, see ContactTable in mobee/model/contact.py: two arrays of numbers, a row a contact.
+// Contacts in the form for Python, see ContactTable in mobee/model/contact.py: two arrays of numbers, one row per contact.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +26,12 @@ inline void write_rows(std::int64_t pose, const Array<Contact>& contacts, Contac
     }
 }
 
-// Memory for rows.  Large pieces that are ended wait for the next user: for a batch, getting them anew from the system would cost as
-// much as a tenth of the search.  `resized` gives other memory that begins like the old, which may be none.
+// Memory for rows.  Large freed pieces are kept for the next user: for a batch, allocating them anew would take a tenth of the time of
+// the search.  `resized` returns memory with the content of the old piece, which may be null.
 void* resized(void* old, std::size_t bytes);
 void end(void* memory);
 
-// Whoever takes the arrays ends each.
+// The owner of the arrays must free each.
 struct Rows {
     ContactNumbers* numbers = nullptr;
     ContactReals* reals = nullptr;
@@ -66,7 +66,7 @@ struct Rows {
         size += others.size;
     }
 
-    // Give both arrays away.
+    // Hand both arrays over to the caller.
     void give(void** arrays) {
         arrays[0] = numbers;
         arrays[1] = reals;

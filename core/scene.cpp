@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// A snapshot of the world as Python lays it out, see mobee/model/snapshot.py.  Everything except the robot is copied.
+// A snapshot of the world in Python's layout, see mobee/model/snapshot.py.  Everything except the robot is copied.
 struct WorldTables {
     std::int64_t objects, carried, side;  // side: number of grid cells along the longest side
     const VolumeRow* volume;              // (objects,)
@@ -145,7 +145,7 @@ bool ignores_targets(const Robot& robot, const Shape& shape, const Hands& hands)
 
 Span span(double offset, double along, double per_metre, std::int64_t cells) {
     const double last = static_cast<double>(cells) - 1.0;
-    // With the arguments in this order, NaN from overflown coordinates also gives a valid cell.
+    // With the arguments in this order, NaN (from an overflow) results in a valid cell too.
     const double low = most((offset - along) * per_metre, 0.0), high = most((offset + along) * per_metre, 0.0);
     return {static_cast<std::int64_t>(least(low, last)), static_cast<std::int64_t>(least(high, last)) + 1};
 }

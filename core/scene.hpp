@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// Who does not feel the targets: no volume of a link nor of what it carries, and no field of another nor of what that carries.
+// The links that targets do not repel: all volumes of `link` and of the links it carries, the fields of `fields` and of those it carries.
 struct Hand {
     std::int64_t link = -1, fields = -1;
 };
@@ -20,14 +20,14 @@ struct Hands {
     Hand hand[most_hands];
 };
 
-// Where the objects stand: sorted into the cells of a grid, x runs fastest.  Large ones (a table) come first, in no cell.
+// The objects sorted into the cells of a grid, with x running fastest.  Large objects (a table) come first and are in no cell.
 struct Grid {
     std::int64_t large = 0;
     std::int64_t cells[3] = {0, 0, 0};
     double corner[3] = {0.0, 0.0, 0.0};
     double per_metre = 0.0;
     double widest = 0.0;         // the largest radius in the grid
-    Array<std::int64_t> starts;  // (cells + 1,): where each cell begins
+    Array<std::int64_t> starts;  // (cells + 1,): first object of each cell
 };
 
 struct Scene {
@@ -37,21 +37,21 @@ struct Scene {
     Array<Outline> outline;       // (objects,)
     Array<Box> box;               // (objects,)
     Array<bool> thick;            // (objects,): no boxes, see `Outline`
-    Array<float> x, y, z, bound;  // (objects + lanes,): their balls, as columns; what is behind them means nothing
-    Array<std::int64_t> name;     // (objects,): which of the world's objects each is
+    Array<float> x, y, z, bound;  // (objects + lanes,): their balls, as columns; the last `lanes` entries are meaningless
+    Array<std::int64_t> name;     // (objects,): index of each in the world
     Array<bool> target;           // (objects,)
-    Array<std::int64_t> carried;  // which of the world's objects the robot carries
+    Array<std::int64_t> carried;  // indices of the world's objects that the robot carries
 
     std::int64_t objects() const { return static_cast<std::int64_t>(volume.size()); }
 };
 
-// Whether a link is the carrier, or mounted on it.
+// Return whether a link is the carrier or is mounted on it.
 bool carried_by(const Robot& robot, std::int64_t link, std::int64_t carrier);
 
-// Whether a shape is one of those that reach, which do not feel the targets.
+// Return whether a shape belongs to a reaching hand, so that its contacts with targets are ignored.
 bool ignores_targets(const Robot& robot, const Shape& shape, const Hands& hands);
 
-// The first cell, and the one past the last, that [offset - along, offset + along] reaches; what lies outside counts to the edge cells.
+// Return the first cell that overlaps [offset - along, offset + along], and the one after the last; points outside count to the edge cells.
 struct Span {
     std::int64_t first, end;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drops most pairs whose balls overlap though the volumes do not.
 //
-// A pair is only dropped when a separating direction or the exact distance says so by a margin; what is left, the narrow phase decides.
+// A pair is dropped only if a separating direction or the exact distance proves it, by a margin; the narrow phase tests the others.
 #include <bit>
 #include <cmath>
 
@@ -12,10 +12,10 @@ namespace mobee {
 
 namespace sieves {
 
-constexpr double margin = 1e-9;  // m: far above rounding, far below what costs time
+constexpr double margin = 1e-9;  // m: far above rounding errors, and so small that few pairs more remain
 constexpr double tiny = 1e-30;
 
-// The outlines of slots and, behind them, of objects.
+// The outlines of slots, followed by those of objects.
 struct Outlines {
     const Outline *of_slots, *of_objects;
     std::int32_t slots;
@@ -27,8 +27,8 @@ inline Outlines outlines_of(const Scene& scene, const Placed& placed) {
     return {placed.outline.data(), scene.outline.data(), static_cast<std::int32_t>(scene.robot->slots())};
 }
 
-// Four segments, each beside another: from the middle of the second to that of the first, both halves, and 1 over their squares; and how
-// far the two volumes reach together.
+// Four pairs of segments: the vector from the middle of the second to that of the first, both half axes, one over their squares, and the
+// sum of the radii of the two volumes.
 struct FourPairs {
     Four wx, wy, wz, reach;
     Four ux, uy, uz, per_a;
@@ -50,7 +50,7 @@ inline FourPairs four_pairs(const Outlines& outlines, const std::int32_t* first,
     return {w[0], w[1], w[2], w[3], u[0], u[1], u[2], u[3], v[0], v[1], v[2], v[3]};
 }
 
-// Which of them are nearer than they reach and the skin more.  Of parallel segments, too: t and s follow each other.
+// Bit k: whether pair k is nearer than the sum of its radii plus the skin; also valid for parallel segments.
 inline unsigned near_each_other(const FourPairs& p, double skin) {
     const Four b = p.ux * p.vx + p.uy * p.vy + p.uz * p.vz;
     const Four c = (p.ux * p.wx + p.uy * p.wy + p.uz * p.wz) * p.per_a, f = (p.vx * p.wx + p.vy * p.wy + p.vz * p.wz) * p.per_e;
@@ -66,7 +66,7 @@ inline unsigned near_each_other(const FourPairs& p, double skin) {
 void thick_ones(const Scene& scene, const Placed& placed, double skin, PairList& pairs, Array<Pair>& left) {
     const std::size_t count = pairs.size();
     std::int32_t *first = pairs.first.data(), *second = pairs.second.data();
-    for (std::size_t k = count; k % 4 != 0; ++k) first[k] = second[k] = 0;  // there is room for them
+    for (std::size_t k = count; k % 4 != 0; ++k) first[k] = second[k] = 0;  // the arrays have space for them
     Pair* to = left.spare(count);
     const Pair* begin = to;
     const Outlines outlines = outlines_of(scene, placed);
@@ -83,14 +83,14 @@ void thick_ones(const Scene& scene, const Placed& placed, double skin, PairList&
 
 inline Four into(const Box& box, Four v) { return v[0] * box.row[0] + v[1] * box.row[1] + v[2] * box.row[2]; }
 
-// Whether the segment c - k .. c + k is nearer than `reach` to a box about the origin, as its own axes say.
+// Return whether the segment c - k .. c + k may be nearer than `reach` to a box about the origin, by a test along the box's axes.
 inline bool segment_near_box(Four c, Four k, Four half, double reach) {
     const Four none{};
     const Four beyond = most_of(most_of(absolute_of(c) - absolute_of(k), none) - half, none);
     return sum_of_three(beyond * beyond) < reach * reach;
 }
 
-// Whether two boxes are nearer than the skin along the line of their centres.
+// Return whether two boxes are nearer than the skin along the line of their centres.
 inline bool boxes_near(Four w, const Box& one, const Box& two, double skin) {
     const Four along = one.half * absolute_of(into(one, w)) + two.half * absolute_of(into(two, w));
     const double square = sum_of_three(w * w);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same work in several threads.
+// Runs work in several threads.
 #pragma once
 
 #include <pthread.h>
@@ -12,8 +12,8 @@
 
 namespace mobee {
 
-// Hand `count` things out, in blocks of `size`, to whichever of the threads has time; the first is this one.  Calls
-// work(number of the thread, begin, end) and returns when all is done; where the system has fewer threads they take more.
+// Process `count` items, in blocks of `size`, in several threads, of which this one is the first; each takes the next block when it is
+// free.  Calls work(number of the thread, begin, end) and returns when all items are done, also if the system has fewer threads.
 template <class Work>
 void share(std::int64_t count, std::int64_t size, std::int64_t threads, const Work& work) {
     std::atomic<std::int64_t> next{0};

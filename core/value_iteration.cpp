@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The value of being in each state and of each action there (thesis Algorithm 7), and modified policy iteration.
+// The values of states and actions (thesis Algorithm 7), and modified policy iteration.
 //
-// Sums have one order, so that values of actions of which the same is known are the same to the last bit: ties stay ties.
+// Sums have a fixed order, so that actions with equal data have values with equal bits: ties stay ties.
 
 #include <cmath>
 #include <cstring>
@@ -17,8 +17,8 @@ namespace mobee::planning {
 enum Refused : std::int64_t { bad_reward = -1, bad_outcome = -2, bad_start = -3 };  // instead of the number of sweeps
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double rounding = 4.0 * 0x1p-52;      // of a value: changes as small as this may cycle indefinitely
-constexpr double soon = 50.0;                   // over 1 - discount: after so many sweeps a change is e^-50 of itself
+constexpr double rounding = 4.0 * 0x1p-52;      // relative to a value: changes as small as this may cycle indefinitely
+constexpr double soon = 50.0;                   // divided by 1 - discount: number of sweeps after which a change has decreased by the factor e^-50
 constexpr std::int64_t most_evaluated = 60;     // improvements that are followed by an evaluation; later ones are plain sweeps, which converge from anywhere
 constexpr std::int64_t most_evaluations = 5;    // sweeps of one evaluation at most
 constexpr double alike = 0.5;                   // changes whose spread is less than this share of the largest
@@ -41,7 +41,7 @@ struct Problem {
     Array<std::int64_t> chosen;  // (states,): the best row s A + a of each state, -1 without any
     Array<double> fresh;         // (states,): values that are not valid yet
     Array<std::int64_t> end;     // (rows + 1,): the branches of a row are end[row] to end[row + 1], none if it is no action
-    Array<Branch> branch;        // what leads somewhere, row by row
+    Array<Branch> branch;        // outcomes with a probability above 0, row by row
 };
 
 struct Sweep {
@@ -68,7 +68,7 @@ inline void take(const Best& best, std::int64_t state, bool of_states, const dou
     if (of_states) sweep.change = most(by, sweep.change);
 }
 
-// The first sweep: reads the tables, looks whether they are right, and keeps the bins that are not empty.  Returns 0, or what is wrong.
+// The first sweep: reads and checks the tables, and keeps the bins that are not empty.  Returns 0 or an error code.
 std::int64_t begin(Problem& problem, bool of_states, double* values, double* found, Sweep& sweep, double& largest_reward) {
     const TransitionTable& table = problem.table;
     const std::int64_t states = table.states, actions = table.actions, bins = table.bins;
@@ -128,8 +128,8 @@ Sweep improve(Problem& problem, bool of_states, const double* values, double* fo
     return sweep;
 }
 
-// A few sweeps over the chosen row of each state, all from the old values, so that states that are alike stay so.  Where all values
-// change by much the same, they will go on to by discount / (1 - discount) times as much: that step is taken at once.
+// A few sweeps over the chosen row of each state, all from the old values, so that states with equal data keep equal values.  If all values
+// change by nearly the same amount, they would change further by discount / (1 - discount) times as much: that step is made at once.
 void evaluate(Problem& problem, double tolerance, double* values) {
     const std::int64_t states = problem.table.states;
     for (std::int64_t sweep = 0; sweep < most_evaluations; ++sweep) {
@@ -153,8 +153,8 @@ void evaluate(Problem& problem, double tolerance, double* values) {
 }
 
 // Sweep over all actions until nothing changes by the tolerance; with `evaluate` each sweep is followed by some over the best action of
-// each state alone.  `values` (states,) change in place, `found` (states, actions) is filled.  What has no probability, or a reward of
-// minus infinity, is no action: its value is minus infinity.  Returns the number of sweeps over all actions, or what is wrong.
+// each state alone.  `values` (states,) change in place, `found` (states, actions) is filled.  An entry without probability, or with reward
+// minus infinity, is no action: its value is minus infinity.  Returns the number of sweeps over all actions, or an error code.
 std::int64_t solve(const TransitionTable& table, const double* reward, const Wanted& wanted, double* values, double* found) {
     for (std::int64_t s = 0; s < table.states; ++s)
         if (!std::isfinite(values[s])) return bad_start;
@@ -165,7 +165,7 @@ std::int64_t solve(const TransitionTable& table, const double* reward, const Wan
     const double limit = wanted.relative && largest_reward > 0.0 ? wanted.tolerance * largest_reward : wanted.tolerance;
     for (std::int64_t sweeps = 1;; ++sweeps) {
         std::memcpy(values, problem.fresh.data(), table.states * sizeof(double));
-        // A change that has outlived what the discount leaves of it is rounding too: a cycle of more than four last bits.
+        // A change that is larger than the discount allows by now is rounding too: a cycle of more than four last bits.
         const double patience = 1.0 + std::floor(static_cast<double>(sweeps) * (1.0 - wanted.discount) / soon);
         if (done.change < limit || done.change <= patience * rounding * done.largest) return sweeps;
         if (wanted.evaluate && sweeps <= most_evaluated) evaluate(problem, 0.5 * (1.0 - wanted.discount) * limit, values);

@@ -21,7 +21,7 @@ inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
 
-// These compile to single instructions, unlike std::min and std::max on some compilers; NaN gives b.
+// These compile to single instructions, unlike std::min and std::max on some compilers; if a is NaN the result is b.
 inline double least(double a, double b) { return a < b ? a : b; }
 inline double most(double a, double b) { return a > b ? a : b; }
 inline double clamp(double value, double low, double high) { return least(most(value, low), high); }
@@ -34,27 +34,27 @@ struct Rotation {
     Vec3 column(int k) const { return {m[k], m[3 + k], m[6 + k]}; }
 };
 
-// From the body's own axes to the axes outside.
+// Return v, given in the body's own axes, in the outer axes.
 inline Vec3 out_of(const Rotation& r, Vec3 v) {
     return {r.m[0] * v.x + r.m[1] * v.y + r.m[2] * v.z,
             r.m[3] * v.x + r.m[4] * v.y + r.m[5] * v.z,
             r.m[6] * v.x + r.m[7] * v.y + r.m[8] * v.z};
 }
 
-// From the axes outside to the body's own.
+// Return v, given in the outer axes, in the body's own axes.
 inline Vec3 into(const Rotation& r, Vec3 v) {
     return {r.m[0] * v.x + r.m[3] * v.y + r.m[6] * v.z,
             r.m[1] * v.x + r.m[4] * v.y + r.m[7] * v.z,
             r.m[2] * v.x + r.m[5] * v.y + r.m[8] * v.z};
 }
 
-// Four numbers in one register; of a vector the fourth is whatever its user says.
+// Four numbers in one register; for a vector, each user defines the fourth number.
 typedef double Four __attribute__((vector_size(32)));
 
 inline Vec3 three(Four v) { return {v[0], v[1], v[2]}; }
 inline Four four(Vec3 v) { return Four{v.x, v.y, v.z, 0.0}; }
 
-// Where a link has gone from its place at zero pose: the columns of its rotation, and its shift.  The fourth numbers are 0.
+// The motion of a link from its zero pose: the columns of its rotation, and its translation.  The fourth numbers are 0.
 struct Frame {
     Four x{1.0, 0.0, 0.0, 0.0}, y{0.0, 1.0, 0.0, 0.0}, z{0.0, 0.0, 1.0, 0.0}, shift{0.0, 0.0, 0.0, 0.0};
 };

@@ -10,8 +10,8 @@ namespace mobee {
 
 enum class Kind : std::int32_t { sphere, capsule, cylinder, box, convex };
 
-// The corners of a convex hull, in its own axes [m], and which of them an edge joins: corner i's are at
-// edges[starts[i]] .. edges[starts[i + 1] - 1].  Without edges (nullptr) all corners are looked at.
+// The corners of a convex hull, in its own axes [m], and its edges: the neighbours of corner i are
+// edges[starts[i]] .. edges[starts[i + 1] - 1].  Without edges (nullptr), a search tests all corners.
 struct Hull {
     const Vec3* corners = nullptr;
     std::int32_t count = 0;
@@ -24,23 +24,23 @@ struct Volume {
     Rotation rotation;
     Vec3 half;              // sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges
     Vec3 core;              // half of the axis of a capsule or cylinder, 0 for others
-    double radius = 0.0;    // about the core; 0 of boxes and hulls
-    double bound = 0.0;     // of the sphere about the centre that holds the volume
+    double radius = 0.0;    // about the core; 0 for boxes and hulls
+    double bound = 0.0;     // radius of the sphere about the centre that contains the volume
     double squared = 0.0;   // of the core's length
     double inverse = 0.0;   // one over it, 0 without a core
     Kind kind = Kind::sphere;
     Hull hull;              // of convex volumes
 };
 
-// Where two volumes touch, root frame: moving the first by depth * normal separates them; the point is midway between the deepest points.
+// The contact of two volumes, root frame: moving the first by depth * normal separates them; the point is midway between the deepest points.
 struct Touch {
     Vec3 normal, point;
 };
 
-// How deep two volumes overlap [m]; if they do not, minus a lower bound of their distance, and `touch` is left as it was.
+// Return the depth by which two volumes overlap [m]; if they do not, minus a lower bound of their distance, and `touch` is not changed.
 double overlap(const Volume& a, const Volume& b, Touch& touch);
 
-// How far two volumes are apart [m], 0 if they overlap.
+// Return the distance of two volumes [m], 0 if they overlap.
 double distance(const Volume& a, const Volume& b);
 
 }  // namespace mobee

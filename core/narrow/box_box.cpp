@@ -8,7 +8,7 @@ namespace mobee::narrow {
 
 namespace box_box_axes {
 
-// The overlap across two edges, not yet divided by the length hypot(p, q) of their cross product; no matter if parallel.
+// The overlap along the cross product of two edges, not yet divided by its length hypot(p, q); parallel edges are allowed.
 inline double edges(double t, double r, double p, double q) {
     const double squared = p * p + q * q;
     return squared > flat * flat ? (r - std::fabs(t)) / std::sqrt(squared) : std::numeric_limits<double>::infinity();
@@ -24,14 +24,14 @@ Vec3 direction(const Volume& a, const Volume& b, int which) {
 
 inline double smallest(Vec3 v) { return least(least(std::fabs(v.x), std::fabs(v.y)), std::fabs(v.z)); }
 
-// At a corner if one of the boxes is met there.
+// The contact is at a corner if one of the boxes touches with a corner.
 Touch contact(const Volume& a, const Volume& b, Vec3 n, double depth) {
     const Vec3 in_a = into(a.rotation, -n), in_b = into(b.rotation, n);
     const bool corner_of_a = smallest(in_a) > aligned;
     if (!corner_of_a && !(smallest(in_b) > aligned)) return touch_along(a, b, n, depth);
     const Volume& met = corner_of_a ? a : b;
-    const Vec3 way = corner_of_a ? in_a : in_b, half = met.half;
-    const Vec3 corner = {std::copysign(half.x, way.x), std::copysign(half.y, way.y), std::copysign(half.z, way.z)};
+    const Vec3 toward = corner_of_a ? in_a : in_b, half = met.half;
+    const Vec3 corner = {std::copysign(half.x, toward.x), std::copysign(half.y, toward.y), std::copysign(half.z, toward.z)};
     return {n, met.center + out_of(met.rotation, corner) + (corner_of_a ? 0.5 : -0.5) * depth * n};
 }
 
@@ -55,7 +55,7 @@ double box_box(const Volume& a, const Volume& b, Touch& touch) {
     overlaps[5] = dot(h, az) + k.z - std::fabs(dot(z, t));
     apart = least(least(overlaps[3], overlaps[4]), overlaps[5]);
     if (apart <= 0.0) return apart;
-    // Across the first's axis x (y, z) and each of the second's.
+    // Along the cross products of the first box's axis x (y, z) and each axis of the second.
     overlaps[6] = edges(t.z * x.y - t.y * x.z, h.y * ax.z + h.z * ax.y + k.y * az.x + k.z * ay.x, x.y, x.z);
     overlaps[7] = edges(t.z * y.y - t.y * y.z, h.y * ay.z + h.z * ay.y + k.x * az.x + k.z * ax.x, y.y, y.z);
     overlaps[8] = edges(t.z * z.y - t.y * z.z, h.y * az.z + h.z * az.y + k.x * ay.x + k.y * ax.x, z.y, z.z);
@@ -76,7 +76,7 @@ double box_box(const Volume& a, const Volume& b, Touch& touch) {
         if (overlaps[axis] < overlaps[which] - tie) which = axis;
     const Vec3 n = box_box_axes::direction(a, b, which);
     const double shift = dot(n, b.center - a.center), side = away(shift);
-    // Against the shift it would be shorter, but where the centres are one, rounding shall not choose.
+    // The opposite direction would be shorter; but if the centres coincide, rounding must not decide.
     const double depth = side * shift > 0.0 ? overlaps[which] + 2.0 * side * shift : overlaps[which];
     touch = box_box_axes::contact(a, b, side * n, depth);
     return depth;

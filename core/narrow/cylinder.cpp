@@ -22,15 +22,15 @@ inline Vec3 axis_of(int i) {
     return e;
 }
 
-// The difference of segments along three axes (a box, or the core of a capsule) and a cylinder, seen along those axes.
-// Its shortest way out is along the cylinder's axis c, along an axis of a box, across c and a segment, or a smooth minimum among the
-// directions square to c or to a segment.  (Where the rim meets a corner, the reach has no minimum.)
+// The Minkowski difference of segments along three axes (a box, or the core of a capsule) and a cylinder, in the frame of those axes.
+// Its smallest separation is along the cylinder's axis c, along an axis of a box, across c and a segment, or a smooth minimum among the
+// directions perpendicular to c or to a segment.  (Where the rim meets a corner, the reach has no minimum.)
 struct Swept {
     Vec3 shift;  // from the cylinder's centre to that of the segments
     Vec3 half;   // of the segments
     Vec3 axis;   // c
     double radius, height;
-    Vec3 beside;  // of c, how much is beside each segment: the length of their cross product
+    Vec3 beside;  // the length of the cross product of c and each segment
     Vec3 moment;  // shift x c
 
     Swept(const Volume& round, const Volume& other, Vec3 halves)
@@ -41,7 +41,7 @@ struct Swept {
         moment = cross(shift, c);
     }
 
-    // How far the difference extends from `shift` along c, along the axes of a box, and across c and a segment.
+    // The extent of the difference from `shift` along c, along the axes of a box, and along the cross product of c and a segment.
     double along_cylinder() const { return dot(half, absolute(axis)) + height; }
     Vec3 along_box() const { return half + height * absolute(axis) + radius * beside; }
     double across(int i) const {
@@ -49,10 +49,10 @@ struct Swept {
         return beside[i] > flat ? (half[j] * std::fabs(axis[k]) + half[k] * std::fabs(axis[j])) / beside[i] + radius : infinity;
     }
     Vec3 normal_across(int i) const { return over(cross(axis_of(i), axis), beside[i]); }
-    // Of the shift along that normal.
+    // The component of the shift along that normal.
     double shift_across(int i) const { return beside[i] > flat ? -moment[i] / beside[i] : 0.0; }
 
-    // The reach along a unit vector.
+    // The reach of the difference along a unit vector.
     double reach(Vec3 n) const {
         return dot(n, shift) + dot(half, absolute(n)) + height * std::fabs(dot(n, axis)) + radius * length(cross(n, axis));
     }
@@ -60,14 +60,14 @@ struct Swept {
 
 inline double smallest(Vec3 v) { return least(least(v.x, v.y), v.z); }
 
-// Take the way along an axis, or against it, whichever leads apart sooner.
-inline void prefer(Way& best, Vec3 n, double extent, double shift) {
+// Replace the best separation by the one along an axis, or against it, if that is smaller.
+inline void prefer(Separation& best, Vec3 n, double extent, double shift) {
     const double reach = extent + away(shift) * shift;
     if (reach < best.reach - tie) best = {reach, away(shift) * n};
 }
 
-// Square to c: away from the corner of the segments' outline that is closest to c.
-void prefer_away_from_corner(Way& best, const Swept& swept) {
+// Perpendicular to c: away from the corner of the segments' outline that is closest to c.
+void prefer_away_from_corner(Separation& best, const Swept& swept) {
     const Vec3 c = swept.axis, half = swept.half;
     double nearest = infinity;
     Vec3 corner;
@@ -76,7 +76,7 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
         const Vec3 q = p - dot(p, c) * c;
         if (dot(q, q) < nearest) corner = q, nearest = dot(q, q);
     }
-    corner = corner - dot(corner, c) * c;  // again, for where it is near the axis
+    corner = corner - dot(corner, c) * c;  // again, since rounding errors are large for a corner near the axis
     const double size = length(corner);
     if (size <= touching) return;
     const Vec3 n = over(-corner, size);
@@ -84,17 +84,17 @@ void prefer_away_from_corner(Way& best, const Swept& swept) {
     if (reach < best.reach - tie) best = {reach, n};
 }
 
-// Of three axes what comes after each in order, and what comes before.
+// For three axes: the axis after each in cyclic order, and the axis before.
 inline Four afters(Vec3 v) { return Four{v.y, v.z, v.x, 0.0}; }
 inline Four befores(Vec3 v) { return Four{v.z, v.x, v.y, 0.0}; }
 
-// Whether no smooth part of three outlines about the origin, from a point on and along a chord, nor its mirror image about `shift`, is
-// nearer than a limit; `reach` is how far it goes at the first point, of which `off` is due to the shift.  Bit by bit.
+// Bit k: whether the smooth part of outline k about the origin, along a chord from a given point, and its mirror image about `shift`, are not
+// nearer than a limit; `reach`: reach at the first point, of which `off` is due to the shift.
 struct Parts {
     Four shift_x, shift_y;
     double limit;
 
-    // (Where there is no disc to see, numbers are none, and nothing is ruled out.)
+    // (Without a visible disc the numbers are NaN, and nothing is ruled out.)
     unsigned beyond(Four reach, Four off, Four x, Four y, Four chord_x, Four chord_y) const {
         const Four area = (x * chord_y - y * chord_x) - absolute_of(shift_x * chord_y - shift_y * chord_x);
         const Four nearest = least_of(reach - absolute_of(off), area / root_of(chord_x * chord_x + chord_y * chord_y));
@@ -102,14 +102,14 @@ struct Parts {
     }
 };
 
-// Bit i: whether a smooth minimum square to axis i may be below the limit, as the chords of the outlines say, see `improve_around`.
+// Bit i: whether a smooth minimum perpendicular to axis i may be below the limit, by the chords of the outlines, see `improve_around`.
 unsigned where_around(const Swept& swept, double limit) {
     const Four one{1.0, 1.0, 1.0, 1.0};
     const Four x = afters(swept.axis), y = befores(swept.axis), turn = x * y < -1e-12 ? -one : one;
     const Four c_x = absolute_of(x), c_y = absolute_of(y), size = four(swept.beside);
     const Four half_x = afters(swept.half), half_y = befores(swept.half), end_x = swept.height * c_x, end_y = swept.height * c_y;
     const Parts parts = {turn * afters(swept.shift), befores(swept.shift), limit};
-    // How far the disc reaches along the plane's axes and across the cylinder's, and how far it is then off them.
+    // The reach of the disc along the plane's axes and perpendicular to the cylinder's, and the offsets of these points.
     const Four beside_x = afters(swept.beside), beside_y = befores(swept.beside), both = swept.radius * c_x * c_y;
     const Four out_x = swept.radius * beside_x, off_x = both / beside_x, out_y = swept.radius * beside_y, off_y = both / beside_y;
     const auto leans = size > flat;
@@ -126,8 +126,8 @@ unsigned where_around(const Swept& swept, double limit) {
     return ~hopeless & 7u;
 }
 
-// Square to the segment along axis i.
-void prefer_around(Way& best, const Swept& swept, int i) {
+// Perpendicular to the segment along axis i.
+void prefer_around(Separation& best, const Swept& swept, int i) {
     const int j = after(i), k = before(i);
     const Vec3 c = swept.axis;
     const Point axis = {c[j], c[k]};
@@ -141,27 +141,27 @@ void prefer_around(Way& best, const Swept& swept, int i) {
     best.direction[k] = exit.n.y;
 }
 
-// A segment c + s h, |s| <= 1, and a cylinder about the z axis: how far apart they are at s, and half the slope of the square.
+// A segment c + s h, |s| <= 1, and a cylinder about the z axis: their distance at s, and half the slope of its square.
 struct Apart {
     double s;
-    Vec3 way;  // from the cylinder
+    Vec3 to_point;  // from the cylinder
     double distance, slope, rise;
 
     Apart(Vec3 c, Vec3 h, double radius, double height, double at) : s(at) {
         const Vec3 p = c + s * h;
         const double side = std::sqrt(p.x * p.x + p.y * p.y), beyond = most(side - radius, 0.0), share = beyond > 0.0 ? beyond / side : 0.0;
-        way = {share * p.x, share * p.y, p.z - clamp(p.z, -height, height)};
-        distance = std::sqrt(beyond * beyond + way.z * way.z);
-        slope = dot(way, h);
+        to_point = {share * p.x, share * p.y, p.z - clamp(p.z, -height, height)};
+        distance = std::sqrt(beyond * beyond + to_point.z * to_point.z);
+        slope = dot(to_point, h);
         const double across = beyond > 0.0 ? (p.x * h.x + p.y * h.y) / side : 0.0;
-        rise = across * across + share * (h.x * h.x + h.y * h.y - across * across) + (way.z != 0.0 ? h.z * h.z : 0.0);
-        if (beyond <= 0.0) rise = way.z != 0.0 ? h.z * h.z : 0.0;
+        rise = across * across + share * (h.x * h.x + h.y * h.y - across * across) + (to_point.z != 0.0 ? h.z * h.z : 0.0);
+        if (beyond <= 0.0) rise = to_point.z != 0.0 ? h.z * h.z : 0.0;
     }
-    // No point of the segment is nearer than this: beyond the plane across the way, which touches the cylinder.
+    // A lower bound for all points of the segment: their distance from the plane perpendicular to `to_point` that touches the cylinder.
     double bound() const { return distance > 0.0 ? distance - std::fabs(slope) / distance * (slope > 0.0 ? 1.0 + s : 1.0 - s) : 0.0; }
 };
 
-// The closest that the two come; once that is known to be more than `limit`, a lower bound that is more, too.
+// The distance of the two; once it is known to be more than `limit`, a lower bound that is also more.
 Apart closest_to_cylinder(Vec3 c, Vec3 h, const Volume& round, double inverse, double limit, double& bound) {
     double low = -1.0, high = 1.0;
     Apart here(c, h, round.half.x, round.half.y, unit(-dot(c, h) * inverse));
@@ -208,11 +208,11 @@ double cylinder_box(const Volume& a, const Volume& b, Touch& touch) {
     const double between = smallest(across - absolute(aside));
     const double apart = least(least(along - std::fabs(off), between), smallest(box - absolute(swept.shift)));
     if (apart <= 0.0) return apart;
-    Way best = {infinity, {}};
+    Separation best = {infinity, {}};
     prefer(best, swept.axis, along, off);
     for (const int i : {2, 0, 1}) prefer(best, axis_of(i), box[i], swept.shift[i]);
     for (int i = 0; i < 3; ++i) prefer(best, swept.normal_across(i), across[i], aside[i]);
-    // Where the cylinder's axis passes beside the box, a corner may be closest.
+    // If the cylinder's axis passes outside of the box, a corner may be closest.
     if (between < swept.radius) prefer_away_from_corner(best, swept);
     unsigned around = where_around(swept, best.reach - tie);
     for (int i = 0; around != 0; ++i, around >>= 1)
@@ -234,14 +234,14 @@ double capsule_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     if (apart.distance > touching) {
         if (apart.distance >= a.radius) return a.radius - apart.distance;
         const double depth = a.radius - apart.distance;
-        // Between its ends the way is square to the segment, which rounding spoils where that is long and the way short.
-        const Vec3 way = std::fabs(apart.s) < 1.0 - flat ? apart.way - apart.slope * a.inverse * h : apart.way;
-        touch = touch_along(a, b, out_of(b.rotation, over(way, length(way))), depth);
+        // Between its ends, `to_point` is perpendicular to the segment; rounding spoils this if the segment is long and the distance small.
+        const Vec3 to_point = std::fabs(apart.s) < 1.0 - flat ? apart.to_point - apart.slope * a.inverse * h : apart.to_point;
+        touch = touch_along(a, b, out_of(b.rotation, over(to_point, length(to_point))), depth);
         return depth;
     }
-    // The core meets the cylinder.
+    // The core overlaps the cylinder.
     const Swept swept(b, a, {0.0, 0.0, a.half.y});
-    Way best = {infinity, {}};
+    Separation best = {infinity, {}};
     prefer(best, swept.axis, swept.along_cylinder(), dot(swept.shift, swept.axis));
     for (int i = 2; i >= 0; --i) prefer(best, swept.normal_across(i), swept.across(i), swept.shift_across(i));
     prefer_away_from_corner(best, swept);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two cylinders.
 //
-// Their difference is two discs and two segments.  Its shortest way out is along an axis, across both axes, a smooth minimum among the
-// directions square to one axis, or the least distance of a rim of one from a rim of the other.
+// Their difference is two discs and two segments.  Its smallest separation is along an axis, across both axes, a smooth minimum among the
+// directions perpendicular to one axis, or the smallest distance of a rim of one from a rim of the other.
 #include <bit>
 #include <limits>
 
@@ -17,23 +17,23 @@ namespace cylinders {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Take the way along an axis, or against it, whichever leads apart sooner.
-inline void prefer(Way& best, Vec3 n, double extent, double shift) {
+// Replace the best separation by the one along an axis, or against it, if that is smaller.
+inline void prefer(Separation& best, Vec3 n, double extent, double shift) {
     const double reach = extent + away(shift) * shift;
     if (reach < best.reach - tie) best = {reach, away(shift) * n};
 }
 
-// A call, for as part of a sum g++ 12 may round product and sum as one, in spite of -ffp-contract=off.
+// A function, because g++ 12 may fuse a product into a sum (one rounding) in spite of -ffp-contract=off.
 [[gnu::noinline]] Point times(double s, Point v) { return s * v; }
 
-// Square to the z axis, which is that of `around`; the other's axis and how far it is away are seen from there.
-bool prefer_square_to(Way& best, const Volume& around, const Volume& other, Vec3 axis, Vec3 shift) {
+// Perpendicular to the axis of `around`, which is z; `axis` and `shift`: of the other cylinder, in the frame of `around`.
+bool prefer_square_to(Separation& best, const Volume& around, const Volume& other, Vec3 axis, Vec3 shift) {
     const Point across = {axis.x, axis.y};
     Exit exit = {best.reach, {}};
     if (std::fabs(axis.z) > flat) {
         improve_around({other.half.x, across, other.half.y * across, axis.z * axis.z, around.half.x}, {shift.x, shift.y}, {0.0, 0.0}, exit);
     } else {
-        // The other is seen from the side: a rectangle, along the axis and across it.
+        // The other cylinder is seen from the side, as a rectangle along its axis and across it.
         const Disc none = {0.0, {0.0, 0.0}, {0.0, 0.0}, 1.0, around.half.x};
         const Point turned = times(shift.x, {across.x, -across.y}) + times(shift.y, {across.y, across.x});
         improve_around(none, turned, {other.half.y, other.half.x}, exit);
@@ -44,13 +44,13 @@ bool prefer_square_to(Way& best, const Volume& around, const Volume& other, Vec3
     return true;
 }
 
-// How far a cylinder reaches along a vector, times its length, from its centre.
+// The reach of a cylinder from its centre along a vector, times the vector's length.
 inline double reach(const Volume& v, Vec3 n) {
     const Vec3 axis = v.rotation.column(2);
     return v.half.y * std::fabs(dot(n, axis)) + v.half.x * length(cross(n, axis));
 }
 
-// The overlap along the direction in which the two axes are closest; nearly all that are apart are so along it.
+// The overlap along the direction in which the two axes are closest, which separates nearly all separate cylinders.
 double across_axes(const Volume& a, const Volume& b) {
     const Vec3 w = a.center - b.center;
     const auto [s, t] = closest_parameters(w, a.core, b.core);
@@ -61,7 +61,7 @@ double across_axes(const Volume& a, const Volume& b) {
 
 }  // namespace cylinders
 
-// Where the shortest way out is smooth, from a point of one rim to a point of another, their distance is a local minimum of that of
+// Where the smallest separation is smooth, from a point of one rim to a point of another, their distance is a local minimum of that of
 // two circles: the second derivatives of the reach and of the distance have the same sign there.
 namespace rims {
 
@@ -79,18 +79,18 @@ struct Pair {
     }
 };
 
-// A circle about the z axis and another: its middle, and two radii of it, of which the second is level; which way is out of the other's
-// end, and how much of that is level.
+// A circle about the z axis, and another one: its middle, and two of its radii, the second of which is horizontal; the direction out of the
+// other cylinder's end, and the horizontal part of that direction.
 struct Circles {
     double radius, height, other_radius;
     Vec3 middle, rising, level, out_of_end;
     double sine;
 };
 
-// A point of the other circle and what is nearest on the first.
+// A point of the other circle and the nearest point of the first.
 struct Near {
-    Vec3 way;     // from there
-    Vec3 across;  // both circles
+    Vec3 to_point;     // from the nearest point to the point
+    Vec3 across;  // perpendicular to both circles
     double side, distance;
     double slope, bend;  // first and second derivative of half the squared distance
 
@@ -99,12 +99,12 @@ struct Near {
         const Vec3 p = circles.middle + outwards;
         side = std::sqrt(p.x * p.x + p.y * p.y);
         const Vec3 radial = side > 0.0 ? Vec3{p.x / side, p.y / side, 0.0} : Vec3{1.0, 0.0, 0.0}, round = {-radial.y, radial.x, 0.0};
-        way = p - circles.radius * radial - Vec3{0.0, 0.0, circles.height};
+        to_point = p - circles.radius * radial - Vec3{0.0, 0.0, circles.height};
         across = cross(round, along);
-        distance = length(way);
-        slope = dot(way, along);
+        distance = length(to_point);
+        slope = dot(to_point, along);
         const double turning = dot(along, round);
-        bend = dot(along, along) - circles.radius / side * turning * turning - dot(way, outwards);
+        bend = dot(along, along) - circles.radius / side * turning * turning - dot(to_point, outwards);
     }
 };
 
@@ -114,9 +114,9 @@ struct Arc {
 
 inline Point normalized(Point v) { return (1.0 / std::sqrt(dot(v, v))) * v; }
 
-// The minimum within an angle of a point, where the slope rises all along; false if there is none.
+// The minimum within an angle of a point, where the slope increases everywhere; false if there is none.
 bool descend(const Circles& circles, Point start, double angle, Near& found) {
-    // The point at x is start + x aside, made a unit.
+    // The point at x is start + x aside, normalised.
     const Point aside = {-start.y, start.x};
     const double end = std::tan(least(1.01 * angle, 1.5));
     double low = -end, high = end, x = 0.0;
@@ -135,8 +135,8 @@ bool descend(const Circles& circles, Point start, double angle, Near& found) {
     return true;
 }
 
-void prefer(Way& best, const Pair& pair, const Near& near, double up) {
-    Vec3 n = near.distance > touching ? near.way : near.across;
+void prefer(Separation& best, const Pair& pair, const Near& near, double up) {
+    Vec3 n = near.distance > touching ? near.to_point : near.across;
     n = (1.0 / length(n)) * n;
     n.z *= up;
     for (const double turn : {1.0, -1.0}) {
@@ -145,7 +145,7 @@ void prefer(Way& best, const Pair& pair, const Near& near, double up) {
     }
 }
 
-// Three numbers of four each.
+// Four vectors: three registers of four numbers.
 struct FourVectors {
     Four x, y, z;
 };
@@ -155,7 +155,7 @@ inline FourVectors operator-(FourVectors a, FourVectors b) { return {a.x - b.x, 
 inline FourVectors operator*(Four s, Vec3 v) { return {s * v.x, s * v.y, s * v.z}; }
 inline Four dot(FourVectors a, FourVectors b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-// Four arcs, with the directions of their middles and how far no end is from these.
+// Four arcs: the directions of their middles, and a bound of the distance of their ends from these.
 struct FourArcs {
     Four from_x, from_y, to_x, to_y;
     Four middle_x, middle_y, angle;
@@ -173,24 +173,24 @@ struct FourArcs {
     Arc second_half(int which) const { return {middle(which), {to_x[which], to_y[which]}}; }
 };
 
-// Of four arcs which may hold shortest ways, and of these which hold one at most; bit by bit.
+// For four arcs, bit by bit: whether an arc may contain a smallest separation, and whether it contains one at most.
 struct Minima {
     unsigned perhaps, at_most_one;
 };
 
-// What the middles of four arcs tell of the shortest ways, shorter than a limit, that start there.
+// Decide from the middles of four arcs whether separations smaller than a limit can start on the arcs.
 //
-// Of half the squared distance, derivatives that a middle does not tell are bounded: side >= the least there is, turning by the
-// radius, and the product of turning and its derivative by half of the square.  A way out leads out of both volumes.
+// The derivatives of half the squared distance that are not known at a middle are bounded: `side` by its least value, `turning` by the
+// radius, and the product of `turning` and its derivative by half of the square.  A separation leads out of both volumes.
 Minima minima_on(const Circles& circles, const FourArcs& arcs, double limit) {
     const FourVectors out_of_axis = arcs.middle_x * circles.rising + arcs.middle_y * circles.level;
     const FourVectors along = arcs.middle_x * circles.level - arcs.middle_y * circles.rising;
     const FourVectors p = Four{1.0, 1.0, 1.0, 1.0} * circles.middle + out_of_axis;
     const Four none{}, p_side = root_of(p.x * p.x + p.y * p.y), x = p.x / p_side, y = p.y / p_side;
-    const FourVectors way = {p.x - circles.radius * x, p.y - circles.radius * y, p.z - circles.height};
-    const Four distance = root_of(dot(way, way)), out = dot(way, out_of_axis);
-    const Four beyond = way.x * circles.out_of_end.x + way.y * circles.out_of_end.y + way.z * circles.out_of_end.z;
-    const Four slope = absolute_of(dot(way, along)), turning = along.y * x - along.x * y;
+    const FourVectors to_point = {p.x - circles.radius * x, p.y - circles.radius * y, p.z - circles.height};
+    const Four distance = root_of(dot(to_point, to_point)), out = dot(to_point, out_of_axis);
+    const Four beyond = to_point.x * circles.out_of_end.x + to_point.y * circles.out_of_end.y + to_point.z * circles.out_of_end.z;
+    const Four slope = absolute_of(dot(to_point, along)), turning = along.y * x - along.x * y;
     const Four bend = dot(along, along) - circles.radius / p_side * turning * turning - out;
 
     const double other = circles.other_radius, square = other * other;
@@ -209,8 +209,8 @@ Minima minima_on(const Circles& circles, const FourArcs& arcs, double limit) {
     return {~ruled_out & ~at_most_one & 0xfu, at_most_one};
 }
 
-// Of the arcs of the other circle that are below the first; false if they are too many.
-bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up) {
+// Search the arcs of the other circle that are below the first; false if there are too many.
+bool prefer_along(Separation& best, const Pair& pair, const Circles& circles, double up) {
     const double rise = circles.rising.z, above = circles.height - circles.middle.z;
     const double high = clamp(above / rise, -1.0, 1.0), low = clamp((above - best.reach) / rise, -1.0, 1.0);
     if (!(low < high)) return true;
@@ -241,15 +241,15 @@ bool prefer_along(Way& best, const Pair& pair, const Circles& circles, double up
     return false;
 }
 
-// Whether all ways from rim to rim have been tried.
-bool prefer_where_they_meet(Way& best, const Pair& pair) {
+// Return whether all separations from rim to rim have been tried.
+bool prefer_where_they_meet(Separation& best, const Pair& pair) {
     for (const double up : {1.0, -1.0}) {
-        // Turned so that the first's rim is the upper one.
+        // Rotated so that the first cylinder's rim is the upper one.
         const Vec3 axis = {pair.axis.x, pair.axis.y, up * pair.axis.z}, shift = {pair.shift.x, pair.shift.y, up * pair.shift.z};
         const Vec3 rising = (1.0 / pair.sine) * (Vec3{0.0, 0.0, 1.0} - axis.z * axis), level = cross(axis, rising);
         for (const double turn : {1.0, -1.0}) {
             const Vec3 middle = shift + turn * pair.other_height * axis;
-            // The first's rim must come below the other's end, too, by less than the shortest way.
+            // The first cylinder's rim must also be below the other's end, by less than the smallest separation.
             const double off = turn * dot(Vec3{0.0, 0.0, pair.height} - shift, axis), swing = pair.radius * pair.sine;
             if (off - swing > pair.other_height || off + swing < pair.other_height - best.reach) continue;
             const double other = pair.other_radius;
@@ -274,7 +274,7 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     const double across = leans ? a.half.x + b.half.x : infinity, aside = dot(d, square);
     const double apart = least(least(first - std::fabs(d.z), second - std::fabs(off)), across - std::fabs(aside));
     if (apart <= 0.0) return apart;
-    Way best = {infinity, {}};
+    Separation best = {infinity, {}};
     prefer(best, {0.0, 0.0, 1.0}, first, d.z);
     prefer(best, c, second, off);
     prefer(best, square, across, aside);
@@ -283,7 +283,7 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     if (prefer_square_to(best, b, a, axis, shift)) best.direction = into(a.rotation, out_of(b.rotation, best.direction));
     if (best.reach <= 0.0) return best.reach;
     Touch found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
-    const double known = best.reach, bound = least_way_out(a, b, found, known);
+    const double known = best.reach, bound = separation_bound(a, b, found, known);
     if (bound >= known - tie) {
         touch = found;
         return known;
@@ -291,7 +291,7 @@ double cylinder_cylinder(const Volume& a, const Volume& b, Touch& touch) {
     Difference difference(a, b);
     const double gap = bound > 0.0 || known_to_meet(a, b, found.point) ? 0.0 : difference.apart();
     if (gap > 0.0) return -gap;
-    if (leans && !rims::prefer_where_they_meet(best, {d, c, a.half.x, a.half.y, b.half.x, b.half.y, sine})) best = way_out(difference, best);
+    if (leans && !rims::prefer_where_they_meet(best, {d, c, a.half.x, a.half.y, b.half.x, b.half.y, sine})) best = least_separation(difference, best);
     if (best.reach < known) found = touch_along(a, b, out_of(a.rotation, best.direction), best.reach);
     touch = found;
     return best.reach;

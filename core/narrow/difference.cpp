@@ -7,9 +7,9 @@ namespace mobee::narrow {
 
 namespace core_support {
 
-constexpr std::int32_t few = 100;  // corners: looking at all of so many costs less than going from one to the next
+constexpr std::int32_t few = 100;  // corners: testing all of so many takes less time than a search along edges
 
-// Four at a time, without branches.
+// Tests four at a time, without branches.
 std::int32_t farthest_of_all(const Hull& hull, Vec3 v) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     double farthest[4] = {-infinity, -infinity, -infinity, -infinity};
@@ -51,7 +51,7 @@ Reach of_corners(const Hull& hull, Vec3 n) {
     return {least(least(low[0], low[1]), least(low[2], low[3])), most(most(high[0], high[1]), most(high[2], high[3]))};
 }
 
-// The best of the first few corners that an edge joins to others; -1 if there is none.
+// The best of the first few corners that have edges; -1 if there is none.
 std::int32_t first_corner(const Hull& hull, Vec3 v) {
     std::int32_t best = -1, looked_at = 0;
     for (std::int32_t k = 0; k < hull.count && looked_at < 6; ++k) {
@@ -62,7 +62,7 @@ std::int32_t first_corner(const Hull& hull, Vec3 v) {
     return best;
 }
 
-// From a corner along edges that lead farther along v, until there is none.
+// Moves from a corner along edges that lead farther along v, until there is none.
 std::int32_t climb(const Hull& hull, Vec3 v, std::int32_t from) {
     double farthest = dot(v, hull.corners[from]);
     for (std::int32_t at = from;; at = from) {
@@ -100,7 +100,7 @@ Vec3 of_core(const Volume& volume, Vec3 v, std::int32_t& last) {
     return of_hull(volume.hull, v, last);
 }
 
-// From where to where a core reaches along n, in its own axes.
+// The interval of a core along n, in its own axes.
 Reach of_core_along(const Volume& volume, Vec3 n) {
     const Vec3 half = volume.half;
     double high = 0.0;
@@ -120,7 +120,7 @@ bool holds(const Volume& v, Vec3 point) {
     return p.x * p.x + p.y * p.y < half.x * half.x && std::fabs(p.z) < half.y;
 }
 
-// How far inside a point is: the radius of the largest ball about it; below 0 outside.
+// The radius of the largest ball about a point that is inside; below 0 for a point outside.
 double inside(const Volume& v, Vec3 point) {
     const Vec3 p = absolute(into(v.rotation, point - v.center)), half = v.half;
     if (v.kind == Kind::box) return least(least(half.x - p.x, half.y - p.y), half.z - p.z);
@@ -134,12 +134,12 @@ bool known_to_meet(const Volume& a, const Volume& b, Vec3 point) {
     return (holds(a, point) && holds(b, point)) || holds(a, b.center) || holds(b, a.center);
 }
 
-// With balls of radii r in one and s in the other about the same point, the difference holds a ball of r + s about the origin.  Where
-// a vertex of one sinks into a face of the other, or two edges cross, that about one of the deepest points is the best there is.
-double least_way_out(const Volume& a, const Volume& b, const Touch& way, double length) {
+// If the same point has a ball of radius r inside one volume and a ball of radius s inside the other, the difference contains a ball of
+// radius r + s about the origin.  If a vertex of one is inside a face of the other, or two edges cross, a deepest point gives the best bound.
+double separation_bound(const Volume& a, const Volume& b, const Touch& touch, double length) {
     double bound = 0.0;
     for (const double along : {0.0, 0.5, -0.5}) {
-        const Vec3 point = way.point + along * length * way.normal;
+        const Vec3 point = touch.point + along * length * touch.normal;
         const double in_a = core_support::inside(a, point), in_b = core_support::inside(b, point);
         if (in_a > -touching && in_b > -touching) bound = most(bound, in_a + in_b);
     }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shortest way out of a Minkowski difference that holds the origin: an expanding polytope inside it.
+// The smallest separation, for a Minkowski difference that contains the origin, by an expanding polytope inside it.
 //
-// Each step takes the face of the polytope that is closest to the origin (below it, where the polytope does not yet hold the
-// origin) and adds the farthest point along its normal, until there is none.  How far the difference reaches along any direction
-// tried is a true way out, whatever rounding did to the polytope, and the shortest of these is the answer.  It is exact for
-// polytopes.  With cylinders it is better than 1e-9 m, but where ways out all round an axis are nearly as short and the steps end
+// Each step takes the face of the polytope that is closest to the origin (below it, while the polytope does not contain the
+// origin) and adds the farthest point along its normal, until there is none.  The reach of the difference along any direction
+// tried is a valid separation in spite of rounding errors of the polytope, and the smallest of these is the result.  It is exact for
+// polytopes.  With cylinders it is better than 1e-9 m, except where all separations around an axis are nearly as small and the steps end
 // first: there it may be too long by 1e-6 of the size.
 #include <limits>
 
@@ -15,11 +15,11 @@ namespace mobee::narrow {
 namespace epa {
 
 constexpr int most_corners = 128, most_faces = 2 * most_corners;
-constexpr int full = most_faces - 8;  // which is sooner than there are too many corners
-constexpr double exact = 1e-12;       // m, for volumes of up to a metre: the bounds have met
+constexpr int full = most_faces - 8;  // reached before there are too many corners
+constexpr double exact = 1e-12;       // m, for volumes of up to a metre: difference at which the bounds count as equal
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Corners against the clock, seen from outside.
+// Corners anticlockwise, seen from outside.
 struct Face {
     std::int32_t a, b, c;
 };
@@ -28,12 +28,12 @@ struct Edge {
     std::int32_t from, to;
 };
 
-// Plain numbers, not set to zero: there is room for more than most polytopes need.
+// Arrays that are not initialised, since most polytopes use only a part of them.
 struct Polytope {
     double px[most_corners], py[most_corners], pz[most_corners];
     Face face[most_faces];
     double nx[most_faces], ny[most_faces], nz[most_faces];  // unit normals
-    double low[most_faces];                                 // how far out
+    double low[most_faces];                                 // distance from the origin
     int faces = 0;
 
     Vec3 corner(int k) const { return {px[k], py[k], pz[k]}; }
@@ -72,11 +72,11 @@ struct Polytope {
         return k;
     }
 
-    // Take away the faces that see a corner, and span new ones from it to the edge of the hole.
+    // Remove the faces that are visible from a corner, and add new ones from it to the edge of the hole.
     void expand(int added, double tolerance);
 };
 
-// Add an edge, or take it away if the other face along it is taken away too; how many then.
+// Add an edge, or remove it if the other face along it is removed too; returns the number of edges.
 inline int toggle(Edge* rim, int count, Edge edge) {
     for (int k = 0; k < count; ++k) {
         if (rim[k].from == edge.to && rim[k].to == edge.from) {
@@ -112,7 +112,7 @@ void Polytope::expand(int added, double tolerance) {
 
 inline Vec3 normalized(Vec3 v) { return (1.0 / length(v)) * v; }
 
-// Unit vectors square to u, and to u and the first.
+// Unit vectors perpendicular to u, and to u and the first.
 void square_to(Vec3 u, Vec3& one, Vec3& two) {
     const Vec3 a = absolute(u);
     if (a.x <= a.y && a.x <= a.z)
@@ -125,12 +125,12 @@ void square_to(Vec3 u, Vec3& one, Vec3& two) {
 }
 
 struct Start {
-    double size;  // how far the fourth corner is from the plane of the others; 0: the difference is flat
+    double size;  // distance of the fourth corner from the plane of the others; 0: the difference is flat
     Vec3 normal;  // of the difference, where it is flat
 };
 
-// Set four corners of the difference that are farthest along a direction and three others far from it, if they are not nearly in one
-// plane; 0 1 2 are against the clock seen from outside.
+// Set four corners of the difference: the farthest along a direction, and three far from it, unless they are nearly in one plane; 0 1 2
+// are anticlockwise seen from outside.
 bool spread(Difference& difference, Vec3 n, Polytope& polytope, Start& start) {
     Vec3 t, u;
     square_to(n, t, u);
@@ -144,20 +144,20 @@ bool spread(Difference& difference, Vec3 n, Polytope& polytope, Start& start) {
     return true;
 }
 
-// Set four corners of the difference, 0 1 2 against the clock seen from outside.
+// Set four corners of the difference, 0 1 2 anticlockwise seen from outside.
 Start tetrahedron(Difference& difference, Polytope& polytope) {
     Vec3 axis[3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
     Vec3 found[4];
     double width = 0.0, turned = 0.0;
     constexpr int tried[4] = {2, 6, 4, 2};
     for (int count = 0; count < 4; ++count) {
-        // Each the farthest from the first along the directions square to those that there are.
+        // Each is the farthest from the first, along directions perpendicular to those found before.
         width = count == 0 ? -1.0 : tie;
         found[count] = found[0];
         for (int which = 0; which < tried[count]; ++which) {
             const double turn = which % 2 == 0 ? 1.0 : -1.0;
-            const Vec3 way = turn * axis[which / 2], p = difference.farthest(way);
-            const double off = dot(way, p - found[0]);
+            const Vec3 along = turn * axis[which / 2], p = difference.farthest(along);
+            const double off = dot(along, p - found[0]);
             if (count == 0 ? which == 0 || off > width : off > width) width = off, turned = turn, found[count] = p;
         }
         if (width == tie) return {0.0, axis[0]};
@@ -165,7 +165,7 @@ Start tetrahedron(Difference& difference, Polytope& polytope) {
         if (count == 1) square_to(u, axis[0], axis[1]);
         if (count == 2) axis[0] = normalized(cross(u, found[2] - found[0]));
     }
-    // With the last in front of 0 1 2, those turn round.
+    // If the last is in front of 0 1 2, their order is reversed.
     if (turned > 0.0) std::swap(found[0], found[1]);
     for (int k = 0; k < 4; ++k) polytope.set(k, found[k]);
     return {width, axis[0]};
@@ -173,25 +173,25 @@ Start tetrahedron(Difference& difference, Polytope& polytope) {
 
 }  // namespace epa
 
-// A last search around a way out of curved volumes that the expanding polytope could not end, because many are nearly as short.
+// A last search near a separation of curved volumes, if the expanding polytope did not end because many are nearly as small.
 namespace polish {
 
-constexpr int ring = 64;  // directions tried all round the axis of either
+constexpr int ring = 64;  // directions tried around the axis of either volume
 constexpr int rounds = 100;
-constexpr double gain = 1e-13;    // m: more than rounding
+constexpr double gain = 1e-13;    // m: larger than rounding errors
 constexpr double finest = 1e-8;   // rad; the reach is then within its square of a smooth minimum
 constexpr double pi = 3.14159265358979323846;
 
-bool improve(Difference& difference, Way& best, Vec3 direction, double by) {
+bool improve(Difference& difference, Separation& best, Vec3 direction, double by) {
     const double reach = dot(direction, difference.farthest(direction));
     if (!(reach < best.reach - by)) return false;
     best = {reach, direction};
     return true;
 }
 
-// A direction near the known one, or square to the axis of either volume, along which the difference reaches least.  The search
-// turns about the axes of both volumes: where a least reach of cylinders or boxes is a crease, it is square to one of them.
-Way search(Difference& difference, Way best) {
+// A direction near the known one, or perpendicular to the axis of either volume, with the smallest reach of the difference.  The search
+// rotates about the axes of both volumes: if a smallest reach of cylinders or boxes is at a crease, it is perpendicular to one of them.
+Separation search(Difference& difference, Separation best) {
     for (int which = 0; which < 2 * ring; ++which) {
         const double angle = 2.0 * pi * which / ring;
         const Vec3 round = {std::cos(angle), std::sin(angle), 0.0};
@@ -218,13 +218,13 @@ Way search(Difference& difference, Way best) {
 
 }  // namespace polish
 
-Way way_out(Difference& difference, Way known) {
+Separation least_separation(Difference& difference, Separation known) {
     epa::Polytope polytope;
     epa::Start start;
     if (!epa::spread(difference, known.direction, polytope, start)) start = epa::tetrahedron(difference, polytope);
     const double exact = epa::exact * most(start.size, 1.0);
     for (const epa::Face face : {epa::Face{0, 1, 2}, {2, 1, 3}, {0, 2, 3}, {1, 0, 3}}) polytope.add(face);
-    Way best = {epa::infinity, known.direction};
+    Separation best = {epa::infinity, known.direction};
     double low = -epa::infinity;
     Vec3 n = start.normal;
     for (int count = 4; count < epa::most_corners; ++count) {

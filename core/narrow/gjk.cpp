@@ -9,8 +9,8 @@ namespace mobee::narrow {
 namespace gjk {
 
 constexpr int steps = 100;
-constexpr double exact = 1e-15;   // relative: the bounds have met
-constexpr double origin = 1e-12;  // m, or of some size: what is so close to the origin holds it
+constexpr double exact = 1e-15;   // relative difference at which the bounds count as equal
+constexpr double origin = 1e-12;  // m, or relative to a size: a simplex this close to the origin contains it
 constexpr double thin = 1e-28;    // squared sine of the angle below which a triangle is one of its sides
 constexpr double level = 1e-24;   // squared sine of the angle below which a tetrahedron is one of its faces
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -20,13 +20,13 @@ struct Simplex {
     int count = 0;
 };
 
-// The point of a triangle closest to the origin, and which corners span the face, side or corner it lies on.
+// The point of a triangle closest to the origin, and the corners of the face, side or corner on which it lies.
 struct OnTriangle {
     Vec3 point;
     bool kept[3] = {false, false, false};
 };
 
-// Whether, seen against n, the origin is to the right of the line from p to q.
+// Return whether the origin, seen against n, is to the right of the line from p to q.
 inline bool right_of(Vec3 p, Vec3 q, Vec3 n) { return dot(n, cross(q - p, p)) > 0.0; }
 
 OnTriangle on_triangle(Vec3 p, Vec3 q, Vec3 r) {
@@ -34,7 +34,7 @@ OnTriangle on_triangle(Vec3 p, Vec3 q, Vec3 r) {
     const double squared = dot(n, n);
     const bool is_thin = squared <= thin * dot(q - p, q - p) * dot(r - p, r - p);
     if (!(is_thin || right_of(p, q, n) || right_of(q, r, n) || right_of(r, p, n))) {
-        // Through the normal: exact also where the triangle is narrow.
+        // Computed from the normal, which is exact also for a narrow triangle.
         return {(dot(n, p) / squared) * n, {true, true, true}};
     }
     OnTriangle found;
@@ -46,7 +46,7 @@ OnTriangle on_triangle(Vec3 p, Vec3 q, Vec3 r) {
         const double along = -dot(u, corner[from]), whole = dot(u, u);
         const double w = along <= 0.0 ? 0.0 : along >= whole ? 1.0 : along / whole;
         Vec3 point = corner[from] + w * u;
-        if (along > 0.0 && along < whole) point = point - (dot(u, point) / whole) * u;  // square to the side also where it is far shorter
+        if (along > 0.0 && along < whole) point = point - (dot(u, point) / whole) * u;  // perpendicular to the side also if it is much shorter
         if (dot(point, point) < nearest) {
             nearest = dot(point, point);
             found = {point, {false, false, false}};
@@ -57,7 +57,7 @@ OnTriangle on_triangle(Vec3 p, Vec3 q, Vec3 r) {
     return found;
 }
 
-// Whether the origin and the other corner are not on the same side of the face p, q, r; so, too, if the four are flat.
+// Return whether the origin and the other corner are not on the same side of the face p, q, r; true also if the four are in one plane.
 bool beyond(Vec3 p, Vec3 q, Vec3 r, Vec3 other) {
     const Vec3 n = cross(q - p, r - p), o = other - p;
     const double side = dot(n, o), here = -dot(n, p);
@@ -65,7 +65,7 @@ bool beyond(Vec3 p, Vec3 q, Vec3 r, Vec3 other) {
 }
 
 // Keep the corners of a simplex that span its point closest to the origin, and return that; with all four kept, it is inside.
-// What is known to be apart from the origin does not hold it, whatever rounding says of a thin tetrahedron.
+// A difference that is known not to contain the origin is treated so in spite of rounding errors for a thin tetrahedron.
 Vec3 reduce(Simplex& simplex, bool apart) {
     Vec3* corner = simplex.corner;
     const int count = simplex.count;

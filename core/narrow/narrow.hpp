@@ -9,15 +9,15 @@
 
 namespace mobee::narrow {
 
-constexpr double touching = 1e-10;  // m: below it a distance is no direction
-constexpr double tie = 1e-9;        // m: a way out must be shorter by more than this to be preferred to an earlier one
+constexpr double touching = 1e-10;  // m: a smaller distance does not define a direction
+constexpr double tie = 1e-9;        // m: a separation must be smaller by more than this to replace an earlier one
 constexpr double flat = 1e-9;       // sine of the angle below which a line counts as parallel to a face
-constexpr double aligned = 1e-6;    // sine of the angle below which a direction counts as square to an edge or a face
+constexpr double aligned = 1e-6;    // sine of the angle below which a direction counts as perpendicular to an edge or a face
 
-// -1 or 1; next to zero always 1, so that rounding cannot choose.
+// -1 or 1; near zero always 1, so that rounding cannot decide.
 inline double sign(double value) { return value < -tie ? -1.0 : 1.0; }
 
-// The better side of a plane across an axis to leave by, where `value` is how far the second volume is in front of the first.
+// The shorter direction of separation along an axis; `value`: position of the second volume relative to the first.
 inline double away(double value) { return value > tie ? -1.0 : 1.0; }
 
 // Of a plane.
@@ -36,7 +36,7 @@ inline Vec3 over(Vec3 v, double s) { return {v.x / s, v.y / s, v.z / s}; }
 
 inline Vec3 absolute(Vec3 v) { return {std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}; }
 
-// By how much a volume is larger than its core.
+// The radius by which a volume is larger than its core.
 inline double rounding(const Volume& v) { return v.kind <= Kind::capsule ? v.radius : 0.0; }
 
 // See `overlap` for these; the order of the kinds is that of their names.
@@ -55,10 +55,10 @@ double box_box(const Volume& a, const Volume& b, Touch& touch);
 double capsule_box_distance(const Volume& a, const Volume& b);
 double capsule_cylinder_distance(const Volume& a, const Volume& b);
 
-// The s, t in [-1, 1] that bring w + s u and t v closest; the middle of the span if they are parallel.
+// The s, t in [-1, 1] for which w + s u and t v are closest; the middle of the interval if they are parallel.
 std::pair<double, double> closest_parameters(Vec3 w, Vec3 u, Vec3 v);
 
-// The contact of two volumes of any kind, given the way out of the first (unit vector, root frame) and its length.
+// The contact of two volumes of any kind, from the separation of the first: direction (unit vector, root frame) and length.
 Touch touch_along(const Volume& a, const Volume& b, Vec3 normal, double depth);
 
 }  // namespace mobee::narrow

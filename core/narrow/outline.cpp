@@ -6,19 +6,19 @@ namespace mobee::narrow {
 namespace outline_of_disc {
 
 constexpr int most_steps = 80, most_arcs = 16;
-constexpr double level = 1e-12;    // so near to an axis of the plane, rounding shall not choose the side
+constexpr double level = 1e-12;    // this near to an axis of the plane, rounding must not decide the side
 constexpr double settled = 1e-10;  // rad; the reach is then within its square of the minimum
 
 inline Point normalized(Point v) { return (1.0 / std::sqrt(dot(v, v))) * v; }
 
-// Square to the axis.
+// Perpendicular to the axis.
 inline Point beside(const Disc& disc) { return {-disc.axis.y, disc.axis.x}; }
 
-// A direction, the outline's point that is farthest along it, and what follows from them.
+// A direction, the outline's point that is farthest along it, and derived values.
 struct Support {
     Point n, point;
     double reach;
-    double slope;   // of the reach, against the clock
+    double slope;   // of the reach, anticlockwise
     double radius;  // of curvature
 };
 
@@ -32,8 +32,8 @@ struct Arc {
     Support from, to;
 };
 
-// Whether no smooth minimum below the limit is between the two.  The reach h there is not below the distance of the chord, where that
-// is positive; with its slope it is bound by h'' = radius - h, and the radius has its extremes at the ends or along the axis.
+// Return whether there is no smooth minimum below the limit between the two.  The reach h is at least the distance of the chord, if that
+// is positive; its slope obeys h'' = radius - h, and the radius has its extremes at the ends or along the axis.
 bool hopeless(const Disc& disc, const Arc& arc, double limit) {
     const Point chord = arc.to.point - arc.from.point, turn = arc.to.n - arc.from.n;
     const double far = std::sqrt(dot(chord, chord)), area = cross(arc.from.point, chord);
@@ -55,14 +55,14 @@ inline Point across_chord(const Arc& arc) {
 
 inline bool inside(const Arc& arc, Point n) { return cross(arc.from.n, n) > 0.0 && cross(n, arc.to.n) > 0.0; }
 
-// The minimum of an arc along which the slope rises through zero (Newton, within the part where it does; halved where that is slow).
+// The minimum of an arc on which the slope increases through zero (Newton's method, with bisection where it is slow).
 //
 // Along n = start + t aside, not made a unit, the disc reaches radius * swing, where swing^2 = lean n.n + u^2 and u = axis x n = w + v t.
 // The slope times a power of n's length is then across - along t + radius * u (v - w t) / swing.
 void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
     const Point start = across_chord(arc), aside = {-start.y, start.x};
     const double w = cross(disc.axis, start), v = cross(disc.axis, aside), along = dot(corner, start), across = dot(corner, aside);
-    // No arc is more than a quarter turn, so that its ends are in front of the start but for rounding.
+    // No arc is more than a quarter turn, so that its ends are in front of the start, apart from rounding.
     const auto tangent = [start](Point n) { return cross(start, n) / most(dot(start, n), flat); };
     double low = tangent(arc.from.n), high = tangent(arc.to.n), last = high - low, t = 0.0;
     for (int step = 0; step < most_steps; ++step) {
@@ -82,7 +82,7 @@ void descend(const Disc& disc, Point corner, const Arc& arc, Exit& best) {
     if (found.reach < best.reach - tie) best = {found.reach, found.n};
 }
 
-// The smooth minima along an arc of a quarter turn at most; the outline is the disc's about a corner.
+// The smooth minima along an arc of at most a quarter turn; the outline is that of the disc about a corner.
 void improve_between(const Disc& disc, Point corner, const Arc& whole, Exit& best) {
     Arc stack[most_arcs];
     stack[0] = whole;
@@ -90,7 +90,7 @@ void improve_between(const Disc& disc, Point corner, const Arc& whole, Exit& bes
     for (int step = 0; step < most_steps && waiting > 0; ++step) {
         const Arc arc = stack[--waiting];
         if (hopeless(disc, arc, best.reach - tie)) continue;
-        // Where h is not above the least radius at both ends it is so between them, and h is convex.
+        // If h is not above the least radius at both ends, the same holds between them, and h is convex.
         if (most(arc.from.reach, arc.to.reach) <= least(arc.from.radius, arc.to.radius) + tie) {
             if (arc.from.slope < 0.0 && arc.to.slope > 0.0) descend(disc, corner, arc, best);
             continue;
@@ -109,12 +109,12 @@ inline Support placed(const Support& own, double side, Point by) {
     return {n, point, dot(n, point), cross(n, point), own.radius};
 }
 
-// Between two kinks, and opposite to that, with the disc's own outline about a corner.
+// Between two kinks, and on the opposite side, with the disc's outline about a corner.
 inline void improve_part(const Disc& disc, Point shift, Point corner, const Support& from, const Support& to, Exit& best) {
     const Point first = corner + from.point, chord = to.point - from.point;
     const double reach = dot(from.n, first), off = dot(from.n, shift);
     const double area = cross(first, chord), aside = cross(shift, chord), square = dot(chord, chord);
-    // Cheaper than to tell the two sides apart where, mostly, neither can be shorter.
+    // Faster than deciding between the two sides, since mostly neither can be shorter.
     const double limit = least(best.reach, reach - std::fabs(off)) - tie, lower = area - std::fabs(aside);
     if (reach - std::fabs(off) >= best.reach - tie && lower > 0.0 && lower * lower >= limit * limit * square) return;
     const double far = std::sqrt(square);
@@ -130,7 +130,7 @@ inline void improve_part(const Disc& disc, Point shift, Point corner, const Supp
 
 void improve_around(const Disc& seen, Point shift, Point half, Exit& best) {
     using namespace outline_of_disc;
-    // A disc seen from the side has no smooth minimum.
+    // A disc seen edge-on has no smooth minimum.
     if (seen.lean <= flat * flat) return;
     // Mirrored, so that the axis points into the first quadrant and the kinks are in this order.
     const double size = std::sqrt(dot(seen.axis, seen.axis));

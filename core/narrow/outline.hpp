@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outline of a difference of volumes with a cylinder in it, seen along an edge: where it comes closest to the origin.
+// The smallest distance from the origin of the outline, seen along an edge, of a difference of volumes one of which is a cylinder.
 //
-// Along directions square to a unit vector e, a disc across an axis c reaches as far as an ellipse.  Segments add corners and a disc
+// Along directions perpendicular to a unit vector e, a disc across an axis c has the reach of an ellipse.  Segments add corners and a disc
 // across e adds a circle.  Between the directions where the corner changes (kinks) the outline is smooth.
 #pragma once
 
@@ -9,23 +9,23 @@
 
 namespace mobee::narrow {
 
-// A cylinder seen along e, in two axes across it.
+// A cylinder seen along e, in two axes perpendicular to e.
 struct Disc {
     double radius;
     Point axis;   // c
     Point end;    // half the cylinder's axis
     double lean;  // the square of e.c
-    double ball;  // radius of the circle that is added
+    double ball;  // radius of the added circle
 };
 
-// The shortest way that is known.
+// The smallest separation known so far.
 struct Exit {
     double reach;
     Point n;
 };
 
-// Take the shortest smooth minimum of how far a cylinder, swept along a rectangle about `shift`, reaches, if it is shorter by more
-// than `tie` than what is known; the reach at the kinks has been considered.
+// Replace the known separation by the smallest smooth minimum of the reach of a cylinder, swept along a rectangle about `shift`, if that
+// is smaller by more than `tie`; the reach at the kinks has been considered before.
 void improve_around(const Disc& disc, Point shift, Point half, Exit& best);
 
 }  // namespace mobee::narrow

@@ -11,13 +11,13 @@ namespace narrow {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// The shortest way out along the axes of either volume, across two axes, or straight away from the axis of either.
-Way natural(const Difference& difference) {
+// The smallest separation along the axes of either volume, along cross products of two axes, or radially from the axis of either.
+Separation natural(const Difference& difference) {
     const Vec3 first = {0.0, 0.0, 1.0}, second = difference.turn.column(2), shift = difference.shift;
     const Vec3 tried[9] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}, {1.0, 0.0, 0.0},
                            difference.turn.column(2), difference.turn.column(0), difference.turn.column(1),
                            {shift.x, shift.y, 0.0}, shift - dot(shift, second) * second, cross(first, second)};
-    Way best = {infinity, first};
+    Separation best = {infinity, first};
     for (const Vec3 axis : tried) {
         const double size = length(axis);
         if (size <= tie) continue;
@@ -36,9 +36,9 @@ double general(const Volume& a, const Volume& b, Touch& touch) {
     const double round_off = rounding(a) + rounding(b);
     const auto [distance, point] = closest(difference, round_off);
     if (distance >= round_off && distance > 0.0) return round_off - distance;
-    const Way way = distance > touching ? Way{-distance, over(-point, distance)} : way_out(difference, natural(difference));
-    const double depth = way.reach + round_off;
-    if (depth > 0.0) touch = touch_along(a, b, out_of(a.rotation, way.direction), depth);
+    const Separation separation = distance > touching ? Separation{-distance, over(-point, distance)} : least_separation(difference, natural(difference));
+    const double depth = separation.reach + round_off;
+    if (depth > 0.0) touch = touch_along(a, b, out_of(a.rotation, separation.direction), depth);
     return depth;
 }
 

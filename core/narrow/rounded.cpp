@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spheres and capsules with each other: a point or a segment each, inflated by a radius.
+// Pairs of spheres and capsules: each is a point or a segment, inflated by a radius.
 #include "narrow.hpp"
 
 namespace mobee::narrow {
@@ -9,12 +9,12 @@ namespace rounded {
 constexpr double parallel = 1e-12;  // sin^2 of the angle below which segments count as parallel
 constexpr double brief = 1e-24;     // m^2: the square of a half length below which a capsule counts as a sphere
 
-// The contact of two rounded volumes whose cores come closest at s and t.
+// The contact of two rounded volumes whose cores are closest at s and t.
 Touch contact_at(const Volume& a, const Volume& b, Vec3 normal, double s, double t) {
     return {normal, 0.5 * (a.center + s * a.core + b.center + t * b.core + (b.radius - a.radius) * normal)};
 }
 
-// A unit vector square to both of two crossing segments (along one line: the longer one's own x axis).
+// A unit vector perpendicular to two crossing segments (if both are on one line: the longer one's own x axis).
 Vec3 across(const Volume& a, const Volume& b) {
     const Vec3 n = cross(a.core, b.core);
     const double squared = dot(n, n), aa = dot(a.core, a.core), bb = dot(b.core, b.core);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spheres and capsules with boxes: a point or a segment c + s h, |s| <= 1, inflated by a radius, seen from the box.
+// Spheres and capsules with boxes: a point or a segment c + s h, |s| <= 1, inflated by a radius, in the box's axes.
 #include "lanes.hpp"
 #include "narrow.hpp"
 
@@ -13,7 +13,7 @@ struct Span {
     double low, high;
 };
 
-// Between which s the coordinate x + s h is within [-k, k]; all if the line is parallel to these faces.
+// The interval of s in which the coordinate x + s h is within [-k, k]; all s if the line is parallel to these faces.
 inline Span span_within(double x, double h, double k, double least_square) {
     if (h * h <= least_square) return {-far, far};
     const double middle = -x / h, reach = std::fabs(k / h);
@@ -33,7 +33,7 @@ inline Spans spans_within(Four c, Four h, Four k, double least_square) {
     return {parallel ? Four{} - far : middle - reach, parallel ? Four{} + far : middle + reach};
 }
 
-// Half the derivative of the squared distance at four places along the segment.  It never falls, and is linear between the ends of the
+// Half the derivative of the squared distance at four points of the segment.  It never decreases, and is linear between the ends of the
 // spans.
 inline Four slopes(Four s, const Spans& spans, Four weight) {
     const Four none{};
@@ -46,13 +46,13 @@ inline Four slopes(Four s, const Spans& spans, Four weight) {
 inline double most_of_three(Four v) { return most(most(v[0], v[1]), v[2]); }
 inline double least_of_three(Four v) { return least(least(v[0], v[1]), v[2]); }
 
-// The s that brings the segment closest to the box of half edges k about the origin: the middle of all such s.
+// The s at which the segment is closest to the box of half edges k about the origin; the middle of all such s.
 double closest_to_box(Vec3 center, Vec3 half_core, Vec3 half) {
     const Four c = four(center), h = four(half_core), k = four(half);
     const Spans spans = spans_within(c, h, k, flat * flat * dot(half_core, half_core));
     const double low = most(most_of_three(spans.low), -1.0), high = least(least_of_three(spans.high), 1.0);
     if (low <= high) return (low + high) / 2.0;
-    // Where the slope changes its sign: between the last knot where it is not above 0 and the first where it is not below.
+    // The slope changes its sign between the last knot at which it is not above 0 and the first at which it is not below 0.
     const Four weight = h * h, none{};
     const Four a = unit_of(Four{-1.0, spans.low[0], spans.low[1], spans.low[2]}), b = unit_of(Four{1.0, spans.high[0], spans.high[1], spans.high[2]});
     const Four at_a = slopes(a, spans, weight), at_b = slopes(b, spans, weight);
@@ -79,7 +79,7 @@ double outside(const Volume& a, const Volume& box, Vec3 p, Vec3 d, double apart,
     return a.radius - apart;
 }
 
-// A way out of the box, or of the box swept along the core: through a face, or across the core and the edge along one axis.
+// A separation from the box, or from the box swept along the core: through a face, or along the cross product of the core and an edge.
 struct Exit {
     double sink = 0.0;
     Vec3 normal;
@@ -105,7 +105,7 @@ void try_edge(Exit& exit, Vec3 c, Vec3 h, Vec3 k, int axis, double least_square)
     exit.normal[two] = turn * h[one] / length;
 }
 
-// Where on the core the deepest point is, on the way out of the box: an end, or above the middle of what meets.
+// The deepest point of the core along the separation from the box: an end, or a point above the middle of the overlap.
 double deepest(Vec3 c, Vec3 h, Vec3 k, const Exit& exit, double least_square) {
     const Vec3 n = exit.normal;
     if (exit.edge >= 0) {
@@ -122,7 +122,7 @@ double deepest(Vec3 c, Vec3 h, Vec3 k, const Exit& exit, double least_square) {
     return unit((most(most(x.low, y.low), most(z.low, -1.0)) + least(least(x.high, y.high), least(z.high, 1.0))) / 2.0);
 }
 
-// The contact of a core that meets the box.
+// The contact of a core that overlaps the box.
 double pierced(const Volume& a, const Volume& box, Vec3 c, Vec3 h, Touch& touch) {
     const Vec3 k = box.half, reach = absolute(h);
     const double least_square = flat * flat * dot(h, h);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where two volumes touch: the middle of what their features share, seen along the normal, midway between their surfaces.
+// The contact point of two volumes: the middle of the overlap of their features, seen along the normal, midway between their surfaces.
 //
-// A feature is the vertex, edge or face of a volume that lies farthest along a direction, as a polygon in the plane across it.
+// A feature is the vertex, edge or face of a volume that lies farthest along a direction, as a polygon in the plane perpendicular to it.
 #include <limits>
 
 #include "array.hpp"
@@ -12,14 +12,14 @@ namespace mobee::narrow {
 
 namespace feature {
 
-constexpr int cap_corners = 32;  // of the polygon that stands for a cap
+constexpr int cap_corners = 32;  // of the polygon that represents a cap
 
-// The plane across a unit normal: t and u span it, the second volume's centre is its origin.
+// The plane perpendicular to a unit normal: t and u span it, the second volume's centre is its origin.
 struct Plane {
     Vec3 normal, t, u;
 
     explicit Plane(Vec3 n) : normal(n) {
-        // The root axis that is farthest from the normal, made square to it.
+        // The root frame's axis that is farthest from the normal, made perpendicular to it.
         const Vec3 a = absolute(n);
         Vec3 axis;
         axis[a.x <= a.y && a.x <= a.z ? 0 : a.y <= a.z ? 1 : 2] = 1.0;
@@ -35,7 +35,7 @@ std::int32_t most_points(const Volume& v) {
     return v.kind == Kind::cylinder ? cap_corners : 4;
 }
 
-// The coordinate of the end farthest along a direction; the middle if both are as far.
+// The coordinate of the end that is farthest along a direction; the middle if both are equally far.
 inline double end(double slope, double half) { return std::fabs(slope) < aligned ? 0.0 : slope > 0.0 ? half : -half; }
 
 // The corners of a hull that are farthest along n (in its own axes), within rounding.
@@ -69,15 +69,15 @@ int of_cap(const Volume& v, double z, const Plane& plane, Vec3 center, Point* ou
     return cap_corners;
 }
 
-// What of a volume is farthest along a direction, in its own axes: a point and up to two half edges across the direction, or a cap.
+// The feature of a volume farthest along a direction, in its own axes: a point and up to two perpendicular half edges, or a cap.
 struct Feature {
     Vec3 n;  // the direction
     Vec3 point, edge;
     int count;  // of corners; 0: see `of_hull`
 };
 
-Feature feature_of(const Volume& v, Vec3 way) {
-    const Vec3 n = into(v.rotation, way);
+Feature feature_of(const Volume& v, Vec3 direction) {
+    const Vec3 n = into(v.rotation, direction);
     Feature found = {n, {}, {}, 1};
     if (v.kind == Kind::convex) return {n, {}, {}, 0};
     if (v.kind == Kind::box) {
@@ -98,12 +98,12 @@ Feature feature_of(const Volume& v, Vec3 way) {
     return found;
 }
 
-// Write the corners of a feature, in order round it; how many.  The centre is seen from the plane's origin.
+// Write the corners of a feature in cyclic order; returns their number.  The centre is relative to the plane's origin.
 int corners(const Volume& v, const Feature& feature, const Plane& plane, Vec3 center, Point* out) {
     const Vec3 point = feature.point, edge = feature.edge;
     if (feature.count == 0) return of_hull(v, feature.n, plane, center, out);
     if (feature.count == cap_corners) return of_cap(v, point.z, plane, center, out);
-    // Round a square; a single edge takes two corners that differ in both signs.
+    // In cyclic order around a square; a single edge takes two corners that differ in both signs.
     constexpr double round[4][2] = {{1.0, 1.0}, {-1.0, 1.0}, {-1.0, -1.0}, {1.0, -1.0}};
     for (int k = 0; k < feature.count; ++k) {
         const double one = round[k][0], two = feature.count == 2 ? one : round[k][1];
@@ -114,9 +114,9 @@ int corners(const Volume& v, const Feature& feature, const Plane& plane, Vec3 ce
     return feature.count;
 }
 
-// How far a volume reaches along a unit direction of the root frame, from its centre.
-double reach(const Volume& v, Vec3 way) {
-    const Vec3 n = into(v.rotation, way);
+// The reach of a volume from its centre along a unit direction of the root frame.
+double reach(const Volume& v, Vec3 direction) {
+    const Vec3 n = into(v.rotation, direction);
     switch (v.kind) {
         case Kind::sphere: return v.radius;
         case Kind::capsule: return v.radius + v.half.y * std::fabs(n.z);
@@ -141,7 +141,7 @@ int outline(Point* points, int count, double near) {
     while (true) {
         std::swap(points[kept], points[current]);
         const Point from = points[kept++];
-        // The start competes, too: choosing it ends the march.
+        // The start is a candidate too; choosing it ends the march.
         int following = 0;
         Point f = {points[0].x - from.x, points[0].y - from.y};
         for (int k = kept; k < count; ++k) {
@@ -206,7 +206,7 @@ Point crossing(const Point* one, const Point* two) {
     return {found.x, found.y};
 }
 
-// The middle of what two convex features (corners in order) share; the memory holds `room` points.
+// The middle of the overlap of two convex features (corners in order); the memory holds `room` points.
 Point shared(Point* one, int ones, Point* two, int twos, Point* spare, int room) {
     if (ones == 1 && twos == 1) return {(one[0].x + two[0].x) / 2.0, (one[0].y + two[0].y) / 2.0};
     if (ones == 2 && twos == 2) return crossing(one, two);
@@ -215,7 +215,7 @@ Point shared(Point* one, int ones, Point* two, int twos, Point* spare, int room)
         std::swap(ones, twos);
     }
     if (ones == 1) return one[0];
-    // The window that the other is seen through has few sides, but it is no segment.
+    // The polygon that clips the other one has few sides, but it is not a segment.
     return ones == 2 ? clipped(one, ones, two, twos, spare, room) : clipped(two, twos, one, ones, spare, room);
 }
 
@@ -242,11 +242,11 @@ int cut(const Point* points, int count, Point on, Point inward, Point* out, int 
 
 namespace feature {
 
-// The middle of what the features of two volumes share; the second's centre is the plane's origin.
+// The middle of the overlap of the features of two volumes; the second's centre is the plane's origin.
 Point shared(const Volume& a, const Volume& b, const Plane& plane) {
     const Vec3 center = a.center - b.center;
     const Feature of_a = feature_of(a, -plane.normal), of_b = feature_of(b, plane.normal);
-    // Mostly one of them is a vertex, and then it is there.
+    // Mostly one of them is a vertex, which is then the middle.
     if (of_a.count == 1 && of_b.count > 1) return plane.seen(center + out_of(a.rotation, of_a.point));
     if (of_b.count == 1 && of_a.count > 1) return plane.seen(Vec3{} + out_of(b.rotation, of_b.point));
     const int room = most_points(a) + most_points(b);
