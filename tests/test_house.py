@@ -197,7 +197,7 @@ def test_the_environment_is_made_once_and_again_when_the_lock_changes(bare_clone
     assert log(bare_clone) == RUN_MADE + RUN_MADE.replace("core\n", "")
 
 
-def test_stages_are_told_before_they_start_and_no_progress_goes_into_a_pipe(bare_clone: Path) -> None:
+def test_stages_are_announced_before_they_start_and_a_pipe_gets_no_progress(bare_clone: Path) -> None:
     fake_interpreter(bare_clone)
     told = ensure(bare_clone).stderr.splitlines()
     assert [line[: len("launch: 1 of 3")] for line in told[:3]] == [f"launch: {stage} of 3" for stage in (1, 2, 3)]
@@ -244,7 +244,7 @@ def test_where_there_is_no_compiler_one_is_fetched_for_the_core(bare_clone: Path
     assert log(bare_clone) == RUN_MADE.replace("core\n", "core\npip\ncore\n")
 
 
-def test_a_core_that_does_not_compile_is_said_in_the_compiler_s_words(bare_clone: Path) -> None:
+def test_a_core_that_does_not_compile_shows_the_compiler_s_message(bare_clone: Path) -> None:
     fake_interpreter(bare_clone, core="echo wrong.cpp: error >&2; exit 1")
     done = ensure(bare_clone)
     assert done.returncode != 0

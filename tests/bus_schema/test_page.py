@@ -97,7 +97,7 @@ def named(text: str) -> set[str]:
 
 
 @pytest.mark.parametrize("cls", page.streams(), ids=lambda cls: cls.__name__)
-def test_the_services_write_and_read_what_the_contract_says(cls: type[Message]) -> None:
+def test_the_services_write_and_read_the_streams_of_the_contract(cls: type[Message]) -> None:
     writers, readers = (each[cls.__name__] for each in found())
     if not named(cls.stream.writer) and not named(cls.stream.readers):
         return  # every service, through services/common

@@ -76,7 +76,7 @@ def test_all_levels_are_built_once_and_again_after_an_edit(tree: Path) -> None:
     assert all(path.stat().st_mtime_ns > time for path, time in made.items())
 
 
-def test_what_does_not_compile_is_said_in_the_compiler_s_words_and_changes_nothing(tree: Path) -> None:
+def test_a_compilation_error_shows_the_compiler_s_message_and_changes_nothing(tree: Path) -> None:
     build(tree, *ONE)
     before = {path: path.read_bytes() for path in libraries(tree)}
     (tree / "core" / "wrong.cpp").write_text("int mobee_wrong = ;\n")
@@ -87,7 +87,7 @@ def test_what_does_not_compile_is_said_in_the_compiler_s_words_and_changes_nothi
     assert {path: path.read_bytes() for path in libraries(tree)} == before
 
 
-def test_warnings_are_errors_unless_told_otherwise(tree: Path) -> None:
+def test_compiler_warnings_are_errors_by_default(tree: Path) -> None:
     (tree / "core" / "loose.cpp").write_text('#include "interface.hpp"\nMOBEE_CALL int mobee_loose(int unused) { return 1; }\n')
     assert "unused" in build(tree, *ONE).stderr
     assert libraries(tree) == []
@@ -103,14 +103,14 @@ def test_without_a_compiler_one_line_names_the_remedies(tree: Path) -> None:
     assert re.search(r"needs a compiler of C\+\+20 .*apt install g\+\+.*pip install ziglang==\d", line)
 
 
-def test_a_compiler_that_does_not_know_the_language_is_passed_over(tree: Path) -> None:
+def test_a_compiler_without_cpp20_is_skipped(tree: Path) -> None:
     old = tree / "bin" / "g++"
     old.write_text("#!/bin/sh\nexit 1\n")
     old.chmod(0o755)
     assert build(tree, PATH=str(tree / "bin")).returncode == 3
 
 
-def test_a_compiler_that_was_asked_for_is_the_one(tree: Path) -> None:
+def test_the_requested_compiler_is_used(tree: Path) -> None:
     done = build(tree, *ONE, CXX="no-such-compiler -O1")
     assert (done.returncode, done.stderr.splitlines()[-1]) == (1, "core: no-such-compiler could not be started: No such file or directory")
 

@@ -81,14 +81,14 @@ def test_a_file_too_large_to_be_committed_is_refused(tmp_path: Path, name: str, 
 
 
 @pytest.mark.parametrize("name", ACCEPTED)
-def test_what_only_looks_malformed_is_read(tmp_path: Path, name: str) -> None:
+def test_valid_files_that_resemble_malformed_ones_are_read(tmp_path: Path, name: str) -> None:
     path = tmp_path / "given.xml"
     path.write_bytes(ACCEPTED[name]())
     assert read_robot(path).motors
 
 
 @pytest.mark.parametrize("read", [load_robot, load_world])
-def test_what_is_no_readable_file_is_refused(tmp_path: Path, read: Callable[[Path], object]) -> None:
+def test_an_unreadable_file_is_refused(tmp_path: Path, read: Callable[[Path], object]) -> None:
     folder = tmp_path / "folder.xml"
     folder.mkdir()
     with pytest.raises(RobotFileError, match="folder.xml: no such file"):

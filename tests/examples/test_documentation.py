@@ -51,7 +51,7 @@ def test_the_readers_own_robot_learns(tmp_path: Path) -> None:
     assert transition.startswith("Transition(n=10, ")
 
 
-def test_the_weight_of_a_robot_is_told(tmp_path: Path) -> None:
+def test_the_documented_weight_of_a_robot_is_printed(tmp_path: Path) -> None:
     _, _, masses = blocks("docs/robots.md", tmp_path)
     torque, energy = map(float, run(tmp_path, "-c", masses).splitlines())
     assert 0.0 < abs(torque) < 5.0  # N m, an elbow of a small robot
@@ -80,7 +80,7 @@ def test_many_plants_go_on_together(tmp_path: Path) -> None:
     assert run(tmp_path, "-c", many).strip() == "[True, True, True] (100, 41)"
 
 
-def test_what_is_wrong_with_a_robot_is_said_as_printed(tmp_path: Path) -> None:
+def test_the_findings_of_a_robot_are_as_documented(tmp_path: Path) -> None:
     _, check, _ = blocks("docs/robots.md", tmp_path)
     assert [line.split(" ", 2)[:2] for line in run(tmp_path, "-c", check).splitlines()] == [
         ["error", "slips.xml:3"],

@@ -97,7 +97,7 @@ def test_settings_are_kept_and_only_the_same_are_taken(tmp_path):
         store.bind({"seed": 4})
 
 
-def test_of_settings_that_hold_others_those_that_differ_are_told(tmp_path):
+def test_the_differing_entries_of_nested_settings_are_reported(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.bind({"plant": {"dt": 0.02, "gains": {"damping": 50.0, "stiffness": 50.0}}})
         with pytest.raises(MobeeError) as error:
@@ -126,7 +126,7 @@ def test_when_each_was_committed_is_on_record(tmp_path):
     assert len(times) == 3 and begin <= times[0] <= times[1] <= times[2] <= time.time()
 
 
-def test_the_name_of_nobody_is_a_name(tmp_path):
+def test_nobody_is_a_valid_agent_name(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.bind({"seed": 1})
         store.append(transition(1))
@@ -149,7 +149,7 @@ def one_line(error: pytest.ExceptionInfo[MobeeError]) -> str:
     return message
 
 
-def test_two_processes_with_the_name_of_one_agent_are_told(tmp_path):
+def test_two_processes_with_one_agent_name_are_reported(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as first, TransitionStore(tmp_path / "run.sqlite", "torso") as second:
         first.append(transition(1))
         with pytest.raises(MobeeError) as error:

@@ -31,12 +31,12 @@ def test_what_is_shipped_passes(name: str, capsys: pytest.CaptureFixture[str]) -
     assert "warning" not in capsys.readouterr().out
 
 
-def test_of_a_good_file_it_is_said_that_nothing_is_wrong(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_correct_file_is_reported_as_correct(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(good)]) == 0
     assert capsys.readouterr().out.endswith("toy: 1 part, 2 motors, 2 joints, 6 shapes: nothing is wrong\n")
 
 
-def test_a_warning_is_said_with_what_why_and_what_to_do(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_warning_has_problem_reason_and_remedy(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(bad)]) == 1
     what, why, remedy, *_, summary = capsys.readouterr().out.splitlines()
     assert "warning: marker 'tip' differs from marker 'Tip'" in what
@@ -61,7 +61,7 @@ def test_pairs_are_counted_and_on_request_named(good: Path, capsys: pytest.Captu
     assert "base - bend" in capsys.readouterr().out
 
 
-def test_with_a_world_the_robot_is_looked_at_in_it(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_with_a_world_the_robot_is_checked_in_it(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rock = tmp_path / "rock.xml"
     rock.write_text('<World><sphere name="rock" radius="0.05" px="-0.2" pz="0.2"/></World>')
     assert main(["check", str(good), "--world", str(rock)]) == 1

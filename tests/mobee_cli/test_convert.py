@@ -31,7 +31,7 @@ def test_options_of_a_urdf_are_passed_on(tmp_path: Path) -> None:
     assert_same_robot(load_robot(source, field=0.05, meshes="bounding"), load_robot(tmp_path / "r.xml"))
 
 
-def test_files_that_are_there_are_kept_unless_told_otherwise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_existing_files_are_kept_by_default(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "k.srdf").write_text("mine")
     assert main(["convert", "katana", str(tmp_path / "k.urdf")]) == BAD_INPUT
     assert "k.srdf exists already. Choose another name, or overwrite it with --force" in capsys.readouterr().err

@@ -109,7 +109,7 @@ def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):
         (["run", "model-throughput", "--resume", "nowhere"], "not the folder of a run"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(arguments, says, capsys):
+def test_an_impossible_request_is_refused_in_one_line(arguments, says, capsys):
     assert main(["experiment", *arguments]) == 2
     said = capsys.readouterr().err
     assert says in said
@@ -117,7 +117,7 @@ def test_what_cannot_be_done_is_said_in_one_line(arguments, says, capsys):
 
 
 @pytest.mark.parametrize("option", [["--objects", "0"], ["--edits", "many"], ["--duration", "nan"], ["--robots", "nao"], ["--objcts", "3"]])
-def test_a_wrong_option_of_an_experiment_is_said_in_one_line(option, capsys):
+def test_a_wrong_option_of_an_experiment_is_refused_in_one_line(option, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["experiment", "run", "model-throughput", *option])
     assert ended.value.code == 2
@@ -182,7 +182,7 @@ def test_resume_without_a_name_goes_on_with_the_newest_run(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["run"] == newest
 
 
-def test_claims_are_told_as_the_page_has_them(capsys):
+def test_claims_are_printed_as_on_the_page(capsys):
     assert main(["experiment", "claims", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert {"experiment", "source", "text", "published", "ours", "verdict"} == set(told[0])

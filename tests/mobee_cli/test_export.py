@@ -80,7 +80,7 @@ def test_parquet_has_the_same_with_types_and_settings(run: Path, tmp_path: Path,
     assert kept[2]["settings"] == {"explorer": "curious", "seed": 4}
 
 
-def test_what_cannot_be_exported_is_said_in_a_line(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_cannot_be_exported_is_refused_in_one_line(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     for words, code, says in (
         ([str(tmp_path / "nothing")], 2, "nothing: there is no such folder"),

@@ -51,7 +51,7 @@ def test_every_verb_and_action_has_help_that_fits_80_columns(
 @pytest.mark.parametrize(
     "arguments", [["status", "--jsn"], ["topic", "lst"], ["topic", "hz"], ["launch", "--duration", "-1"], ["launch", "--duration", "soon"]]
 )
-def test_a_wrong_option_is_said_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_option_is_refused_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(arguments)
     assert ended.value.code == 2

@@ -84,7 +84,7 @@ def test_a_place_may_be_given_as_angles_and_the_start_left_out(run: Path, capsys
         (["--to", "3", "--discount", "1"], "discount=1.0"),
     ],
 )
-def test_what_cannot_be_planned_is_said_in_a_line(run: Path, words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_impossible_plan_is_refused_in_one_line(run: Path, words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = main(["plan", "--run", str(run), *words])
     error = capsys.readouterr().err
     assert code == 2

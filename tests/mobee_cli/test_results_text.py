@@ -37,7 +37,7 @@ def test_a_list_of_results_is_a_table_whose_first_names_the_rows():
     ]
 
 
-def test_rows_have_as_many_names_as_tell_them_apart():
+def test_rows_have_as_many_names_as_are_needed_to_distinguish_them():
     found = {"rows": [{"law": "old", "who": "both", "x": 1}, {"law": "old", "who": "reach", "x": 2}, {"law": "new", "who": "both", "x": 3}]}
     assert results_text(found, 40).splitlines() == ["rows:", "  law  who    x", "  old  both   1", "  old  reach  2", "  new  both   3"]
 

@@ -78,7 +78,7 @@ def _flat(text: str) -> str:
     return " ".join(text.split())
 
 
-def test_show_tells_what_is_in_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_show_describes_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Any] = []
     monkeypatch.setattr("mobee.rendering.sheet.marker_cloud", lambda *given, **_: drawn.append(given) or given[3])
     code, out, _ = say("show", free, "--check", "--picture", tmp_path / "a.png")
@@ -112,7 +112,7 @@ def test_query_prints_the_path(say: Say, free: Path) -> None:
     assert found["length"] == pytest.approx(1.2) and len(found["poses"]) == 7
 
 
-def test_a_way_from_home_begins_there(say: Say, free: Path) -> None:
+def test_a_path_from_home_begins_at_home(say: Say, free: Path) -> None:
     robot = mobee.load_robot("icub")
     found = json.loads(say("query", free, "--to", 0, 0, "--json")[1])
     assert found["poses"][0] == robot.home.tolist() and found["entry"] > 0.2
@@ -120,12 +120,12 @@ def test_a_way_from_home_begins_there(say: Say, free: Path) -> None:
     assert again["poses"] == found["poses"]
 
 
-def test_a_way_goes_round_what_is_in_it(say: Say, blocked: Path) -> None:
+def test_a_path_avoids_an_obstacle(say: Say, blocked: Path) -> None:
     code, out, _ = say("query", blocked, "--from", 0.2, 0.1, "--to", 0.2, 0.3)
     assert code == 0 and "The shortest path has contacts: this one avoids them." in _flat(out)
 
 
-def test_what_cannot_be_gone_round_is_told_with_exit_code_1(say: Say, blocked: Path) -> None:
+def test_an_obstacle_that_cannot_be_avoided_is_reported_with_exit_code_1(say: Say, blocked: Path) -> None:
     robot = mobee.load_robot("icub")
     start = mobee.load_roadmap(blocked).q[12]
     assert mobee.load_roadmap(blocked).model.evaluate(start).count and len(start) == len(robot.motors)
@@ -165,7 +165,7 @@ def test_play_arrives_offline(say: Say, free: Path, tmp_path: Path, monkeypatch:
         (["build", "palm-down", "-o", "/nowhere/a.npz"], "there is no folder /nowhere"),
     ],
 )
-def test_bad_input_is_told_in_a_line(say: Say, free: Path, words: list[str], text: str) -> None:
+def test_invalid_input_is_refused_in_one_line(say: Say, free: Path, words: list[str], text: str) -> None:
     code, out, err = say(*(word.replace("{map}", str(free)) for word in words))
     assert code == 2 and out == ""
     assert text in err and err.count("\n") == 1
@@ -208,7 +208,7 @@ def test_tasks_are_listed_with_their_figures(say: Say) -> None:
         ("def example():\n    return 1\n", "example() returned int"),
     ],
 )
-def test_a_task_file_that_cannot_be_used_is_told_with_its_line(say: Say, tmp_path: Path, text: str, told: str) -> None:
+def test_an_invalid_task_file_is_refused_with_its_line(say: Say, tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "task.py").write_text(text)
     code, out, err = say("build", tmp_path / "task.py")
     assert code == 2 and out == "" and told in err and err.count("\n") == 1
@@ -273,7 +273,7 @@ def test_a_task_file_is_built_shown_asked_and_played_for_another_robot(
     assert code == 2 and out == "" and "--robot FILE" in err
 
 
-def test_a_way_is_looked_at_in_another_world(say: Say, arm: Path, tmp_path: Path) -> None:
+def test_a_path_is_checked_in_another_world(say: Say, arm: Path, tmp_path: Path) -> None:
     path, words = tmp_path / "task.npz", ("--from", 0.6, 0.8, "--to", 0.8, 0.9)
     assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--robot", arm)[0] == 0
     at = mobee.load_roadmap(path, robot=mobee.load_robot(arm)).model.evaluate(np.array([0.0, 0.8, 0.0, 0.9])).position("link_3")
@@ -315,7 +315,7 @@ def test_tasks_name_the_robot_they_need(say: Say) -> None:
     assert {one["robot"] for one in json.loads(say("tasks", "--json")[1])} == {"icub"}
 
 
-def test_build_is_given_the_task_and_tells_of_the_map(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_build_takes_a_task_and_describes_the_map(say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {}
 
     def built(model: mobee.Model, **settings: Any) -> Roadmap:

@@ -19,7 +19,7 @@ def test_every_robot_and_world_is_listed_within_80_columns(capsys: pytest.Captur
     assert any("CC BY-SA 4.0" in line for line in lines)
 
 
-def test_json_tells_parts_counts_and_origin(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_parts_counts_and_origin(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robots", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     icub, robot = told["robots"]["icub"], load_robot("icub")

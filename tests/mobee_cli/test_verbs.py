@@ -53,7 +53,7 @@ def test_status_fails_while_a_service_is_down(running: Launched) -> None:
     assert mobee("status", "--endpoint", running.endpoint).returncode == 0
 
 
-def test_topic_list_finds_what_is_said(running: Launched) -> None:
+def test_topic_list_finds_the_published_messages(running: Launched) -> None:
     topics = json.loads(mobee("topic", "list", "--json", "--endpoint", running.endpoint).stdout)
     event = next(topic for topic in topics if topic["key"] == "event/agent_toy")
     assert event["type"] == "Event"

@@ -50,7 +50,7 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
         assert "Traceback" not in shown.stderr.read()
 
 
-def test_without_the_viewer_it_is_said_how_to_install_it(tmp_path: Path) -> None:
+def test_without_the_viewer_the_message_has_the_installation_command(tmp_path: Path) -> None:
     """In a process in which rerun cannot be imported, as if it were not installed."""
     code = "import sys; sys.modules['rerun'] = None; from mobee_cli.__main__ import main; sys.exit(main(['view', 'katana']))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -58,7 +58,7 @@ def test_without_the_viewer_it_is_said_how_to_install_it(tmp_path: Path) -> None
     assert done.stderr == 'mobee view: a view needs rerun-sdk: pip install "mobee[viz]"\n'
 
 
-def test_bad_input_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_input_is_refused_in_a_single_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "icubb"]) == 2
     assert "Did you mean 'icub'" in capsys.readouterr().err
     assert main(["view", "katana", "--save", str(tmp_path / "missing" / "out.rrd")]) == 2

@@ -55,7 +55,9 @@ def test_a_level_can_be_asked_for() -> None:
         ("sanitized", OF_LEVEL["x86-64-v3"], "run python core/sanitize.py"),
     ],
 )
-def test_what_does_not_run_here_is_refused_in_one_line(forced: str, flags: set[str], said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_build_that_does_not_run_here_is_refused_in_one_line(
+    forced: str, flags: set[str], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("LD_PRELOAD", raising=False)
     with pytest.raises(CoreUnavailable, match=said) as caught:
         choose(forced, flags)

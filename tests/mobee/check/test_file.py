@@ -13,7 +13,7 @@ from tests.mobee.check.arm import ARM
 from tests.mobee.robot.robot_files import robot_file
 
 
-def test_what_a_reader_warns_of_is_a_finding_with_its_line(tmp_path: Path) -> None:
+def test_a_warning_of_the_reader_is_a_finding_with_its_line(tmp_path: Path) -> None:
     path = robot_file(tmp_path, *ARM.replace("<marker", '<jont z="1"/><marker').splitlines())
     checked = check_file(path)
     (finding,) = checked.findings
@@ -23,7 +23,7 @@ def test_what_a_reader_warns_of_is_a_finding_with_its_line(tmp_path: Path) -> No
     assert finding.remedy.startswith("Did you mean 'joint'? Valid: bodypart")
 
 
-def test_a_world_is_told_from_a_robot(tmp_path: Path) -> None:
+def test_a_world_file_is_distinguished_from_a_robot_file(tmp_path: Path) -> None:
     path = tmp_path / "desk.xml"
     path.write_text('<World name="desk">\n <box name="desk" width="600" height="0.6" depth="0.1"/>\n</World>\n')
     checked = check_file(path)
@@ -32,7 +32,7 @@ def test_a_world_is_told_from_a_robot(tmp_path: Path) -> None:
     assert isinstance(check_file("table").content, World)
 
 
-def test_what_cannot_be_read_is_the_readers_error(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_raises_the_readers_error(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match=r"toy\.xml:2: <bodypart> name: is required"):
         check_file(robot_file(tmp_path, "<bodypart/>"))
     with pytest.raises(UnknownName, match="icub"):
@@ -44,6 +44,6 @@ def test_a_misspelt_world_is_answered_with_the_nearest() -> None:
         check_file("tabel")
 
 
-def test_a_folder_is_said_to_be_one(tmp_path: Path) -> None:
+def test_a_folder_is_refused_as_a_folder(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match="is a folder"):
         check_file(tmp_path)

@@ -49,7 +49,7 @@ def test_a_home_that_the_reader_chose_is_no_finding(tmp_path: Path) -> None:
     assert found(check_file(path).findings) == []
 
 
-def test_the_zone_of_a_slide_is_its_own_and_said_in_millimetres(tmp_path: Path) -> None:
+def test_the_zone_of_a_slide_is_reported_in_millimetres(tmp_path: Path) -> None:
     limits = np.array([0.0, 0.04])
     robot = with_joint(arm(tmp_path), "bend", kind="prismatic", limits=limits)
     assert found(check_robot(with_motor(robot, "bend", limits=limits, home=0.003))) == []

@@ -40,7 +40,7 @@ def test_a_new_srdf_is_found_and_the_robot_no_longer_touches_itself(urdf: Path) 
     assert load_robot(urdf).untested[frozenset((0, 2))].startswith("disabled in the SRDF: Always (toy.srdf, line 3)")
 
 
-def test_asked_again_nothing_is_added(urdf: Path) -> None:
+def test_a_second_call_adds_nothing(urdf: Path) -> None:
     text = leave_out_touching(urdf).path.read_bytes()
     again = leave_out_touching(urdf)
     assert (again.pairs, again.merged) == ((), True)
@@ -112,7 +112,7 @@ def test_an_srdf_that_cannot_take_the_lines_is_refused_and_stays(urdf: Path, tex
     assert sorted(path.name for path in urdf.parent.iterdir()) == ["toy.srdf", "toy.urdf"]
 
 
-def test_where_it_cannot_be_written_it_says_so(urdf: Path, tmp_path: Path) -> None:
+def test_an_srdf_that_cannot_be_written_is_refused(urdf: Path, tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match=r"nowhere/toy.srdf: cannot be written: No such file or directory\. Name another file"):
         leave_out_touching(urdf, tmp_path / "nowhere" / "toy.srdf")
 
@@ -127,7 +127,7 @@ def test_an_srdf_under_another_name_is_not_mixed_with_the_one_that_is_read(urdf:
         leave_out_touching(urdf, tmp_path / "toy.urdf")
 
 
-def test_links_in_one_line_are_refused_for_lines_tell_them_apart(urdf: Path) -> None:
+def test_several_links_in_one_line_are_refused(urdf: Path) -> None:
     urdf.write_text(urdf.read_text().replace("\n", " "))
     with pytest.raises(RobotFileError, match=r"toy.urdf:1: several links are in this line. .*xmllint --format toy.urdf"):
         leave_out_touching(urdf)

@@ -16,7 +16,7 @@ def found(folder: Path, upper: str = '<mass value="2" px="-0.2"/>', fore: str = 
     return named(arm(folder, (UPPER, UPPER + upper), (FORE, FORE + fore)), "mass")
 
 
-def test_of_sensible_masses_nothing_is_said(tmp_path: Path) -> None:
+def test_plausible_masses_cause_no_finding(tmp_path: Path) -> None:
     assert found(tmp_path) == []
 
 

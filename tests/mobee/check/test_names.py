@@ -24,7 +24,7 @@ def test_a_cylinder_turned_about_itself_or_upside_down_is_the_same(tmp_path: Pat
     assert len(named(arm(tmp_path, ("<marker", pair)), "duplicate")) == 1
 
 
-def test_a_hull_is_told_apart_by_its_vertices(tmp_path: Path) -> None:
+def test_hulls_with_different_vertices_are_not_duplicates(tmp_path: Path) -> None:
     robot = arm(tmp_path)
     corners = robot.shapes[2].rotation[:, :3] * 0.01
     hull = replace(robot.shapes[2], kind="convex", size=(), vertices=corners)

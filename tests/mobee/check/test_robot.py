@@ -12,7 +12,7 @@ from mobee.robot.load import load_robot, shipped_robots
 from tests.mobee.check.arm import arm, with_motor
 
 
-def test_of_a_good_arm_nothing_is_said(tmp_path: Path) -> None:
+def test_a_correct_arm_has_no_findings(tmp_path: Path) -> None:
     assert check_robot(arm(tmp_path)) == []
 
 
@@ -21,7 +21,7 @@ def test_shipped_robots_have_nothing_but_notes(name: str) -> None:
     assert [finding for finding in check_robot(load_robot(name)) if finding.severity != "note"] == []
 
 
-def test_katana_feels_nothing_and_says_so() -> None:
+def test_katana_without_fields_gets_a_finding() -> None:
     assert [finding.what for finding in check_robot(load_robot("katana")) if finding.check != "home-zone"] == ["the robot has no field"]
 
 
@@ -31,7 +31,7 @@ def test_the_icubs_pelvis_is_known_to_stand_out_of_its_fields() -> None:
     assert "link 'root_link': root_link_3 by" in said
 
 
-def test_a_robot_is_answered_the_same_way_every_time() -> None:
+def test_the_findings_of_a_robot_are_repeatable() -> None:
     assert check_robot(load_robot("icub")) == check_robot(load_robot("icub"))
 
 

@@ -58,7 +58,7 @@ def test_a_field_that_reaches_into_another_parts_bare_solid_is_noted(tmp_path: P
     assert finding.what.endswith("into solid 'knob' of 'wall'")
 
 
-def test_a_field_that_meets_the_other_solids_own_field_is_felt(tmp_path: Path) -> None:
+def test_a_field_that_touches_the_field_of_the_other_solid_is_a_home_force(tmp_path: Path) -> None:
     findings = check_robot(arm(tmp_path, beside(KNOB, HALO)))
     assert [finding.check for finding in findings] == ["home-force"]
 

@@ -27,7 +27,7 @@ def test_nothing_touches_in_a_good_arm_and_fields_do_not_count(tmp_path: Path) -
     assert touching_pairs(load_robot("icub"), poses=50) == ()
 
 
-def test_the_same_robot_is_answered_the_same_way(tmp_path: Path) -> None:
+def test_touching_pairs_are_repeatable(tmp_path: Path) -> None:
     robot = arm(tmp_path, LINK, HUB, BALL)
     assert touching_pairs(robot, poses=50) == touching_pairs(robot, poses=50)
 

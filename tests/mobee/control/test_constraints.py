@@ -58,7 +58,7 @@ def test_clauses_add_up() -> None:
     assert force([PLANE, EITHER], q) == pytest.approx(force([PLANE], q) + force([EITHER], q))
 
 
-def test_a_robot_without_constraints_feels_none() -> None:
+def test_a_robot_without_constraints_has_no_constraint_force() -> None:
     assert np.array_equal(force([], np.zeros(3)), np.zeros(3))
     assert np.array_equal(published([0.0, 0.0, 0.0], []), np.zeros(3))
 

@@ -25,12 +25,12 @@ def test_a_contact_pushes_the_tip_out(gains: Gains) -> None:
 
 
 @BOTH
-def test_without_contact_forces_a_contact_is_not_felt(gains: Gains) -> None:
+def test_without_contact_forces_a_contact_causes_no_force(gains: Gains) -> None:
     assert not constraint_forces(touching(-0.02).evaluate(STRETCHED), gains, contact_forces=False).total.any()
 
 
 @BOTH
-def test_an_object_out_of_reach_is_not_felt(gains: Gains) -> None:
+def test_an_object_out_of_reach_causes_no_force(gains: Gains) -> None:
     assert not constraint_forces(touching(+0.01).evaluate(STRETCHED), gains).total.any()
 
 

@@ -100,7 +100,7 @@ def test_a_resting_part_is_settled_at_the_first_check_and_not_before() -> None:
     assert [test.update(t, REST, REST) for t in (5.0, 5.5, 5.99, 6.0)] == ["moving"] * 3 + ["settled"]
 
 
-def test_between_two_looks_nobody_looks() -> None:
+def test_the_settle_test_checks_only_at_its_interval() -> None:
     test = SettleTest(SETTLE, 0.0)
     assert test.update(1.0, np.array([0.0, 0.03, 0.0]), REST) == "moving"
     assert [test.update(t, REST, REST) for t in (1.1, 1.19, 1.2)] == ["moving", "moving", "settled"]
@@ -123,7 +123,7 @@ def test_ticks_that_add_up_to_almost_a_second_count_as_one() -> None:
     assert test.update(sum([0.01] * 110), REST, REST) == "settled"
 
 
-def test_looks_missed_by_a_late_caller_are_not_made_up_for() -> None:
+def test_settle_checks_missed_by_a_late_caller_are_skipped() -> None:
     test = SettleTest(SETTLE, 0.0)
     assert test.update(1.55, np.ones(3), REST) == "moving"
     assert test.update(1.59, REST, REST) == "moving"

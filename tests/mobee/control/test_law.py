@@ -13,7 +13,7 @@ from mobee.robot.load import load_robot
 ICUB = load_robot("icub")
 
 
-def test_only_motors_that_live_and_have_weight_are_moved_and_only_those_that_live_feel() -> None:
+def test_only_active_motors_with_weight_move_and_only_active_motors_have_forces() -> None:
     arm = ICUB.part("left_arm")
     alive = np.zeros(len(ICUB.motors), dtype=bool)
     alive[arm.slice] = True

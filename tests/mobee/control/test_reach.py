@@ -76,7 +76,7 @@ def test_a_step_goes_where_the_error_falls_fastest() -> None:
     assert step / np.linalg.norm(step) == pytest.approx(-slope / np.linalg.norm(slope), abs=1e-6)
 
 
-def test_what_is_no_target_is_refused() -> None:
+def test_an_invalid_target_is_refused() -> None:
     with pytest.raises(UnknownName, match="marker 'tpi'. Did you mean 'tip'"):
         reach_path(ARM, "tpi", np.zeros(3), BENT)
     with pytest.raises(InvalidValue, match="position .*three finite numbers"):

@@ -189,7 +189,7 @@ def test_the_default_reach_ends_at_a_free_target(seed: int, dt: float) -> None:
     assert np.abs(plant.motors.velocities).max() < np.deg2rad(3.0)
 
 
-def test_from_a_stretched_arm_the_default_reach_finds_a_way_inwards() -> None:
+def test_the_default_reach_leaves_the_singular_pose_of_a_stretched_arm() -> None:
     """J^T f is zero there: the target is on the line of the arm."""
     plant = OfflinePlant(one_part(planar_arm()), contact_forces=False, motors=MotorParameters.ideal())
     plant.present(ReachTarget((0.6, 0.0, 0.0)))
@@ -207,7 +207,7 @@ def test_a_target_out_of_reach_ends_as_near_as_the_arm_can() -> None:
     assert outcome.duration < 40.0
 
 
-def test_a_motor_at_its_limit_leaves_the_way_to_the_others() -> None:
+def test_a_motor_at_its_limit_does_not_block_the_others() -> None:
     """Least motion would turn the first joint beyond its limit."""
     free = planar_arm()
     first = replace(free.motor_table[0], limits=np.array([-0.5, 0.5]))

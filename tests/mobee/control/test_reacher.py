@@ -135,7 +135,7 @@ def test_it_is_the_controllers_reach_by_all_motors_that_move_the_marker() -> Non
     assert np.array_equal(reaching.attractor, q)
 
 
-def test_the_next_takes_over() -> None:
+def test_a_new_reacher_replaces_the_last_one() -> None:
     first, second = PLANAR.evaluate(np.array([[1.0, 0.5, 0.8], [0.5, 0.4, 0.3]])).position("tip")
     one, other = Controller(PLANAR), Controller(PLANAR)
     Reacher(one, "tip", first)
@@ -159,7 +159,7 @@ def test_stop_ends_the_pull_and_leaves_the_other_motors_at_their_attractors() ->
     assert np.array_equal(controller.step(q, DT).velocity, inside.step(q, DT).velocity)
 
 
-def test_what_is_no_reach_is_refused() -> None:
+def test_an_invalid_reach_is_refused() -> None:
     controller = Controller(PLANAR)
     with pytest.raises(UnknownName, match="tip"):
         Reacher(controller, "tpi", np.zeros(3))

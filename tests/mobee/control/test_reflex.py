@@ -43,7 +43,7 @@ def rewind(reflex: Reflex, limit: int = 1000) -> list[float]:
     return went
 
 
-def test_the_robot_goes_back_the_way_it_came_to_the_waypoint() -> None:
+def test_the_robot_retraces_its_path_to_the_waypoint() -> None:
     reflex = Reflex(quick(), DT, FAST)
     walk(reflex, 0, 1)
     assert reflex.mark()
@@ -154,7 +154,7 @@ def test_a_waypoint_in_violation_is_passed_by() -> None:
     assert reflex.recovery.passed == 1
 
 
-def test_with_nothing_to_rewind_it_is_stuck_until_somebody_answers_for_the_pose() -> None:
+def test_without_a_history_it_is_stuck_until_the_pose_is_accepted() -> None:
     reflex = Reflex(quick(dead_time=DT), DT, FAST)
     for _ in range(5):
         assert reflex.tick(at(1), WALL) is not None
@@ -186,7 +186,7 @@ def test_a_stuck_robot_is_free_when_the_obstacle_goes_away() -> None:
     assert reflex.tick(at(1), NOTHING) is None
 
 
-def test_contact_that_comes_back_on_the_way_is_counted() -> None:
+def test_a_contact_that_returns_while_retracing_is_counted() -> None:
     reflex = Reflex(quick(dead_time=DT), DT, FAST)
     walk(reflex, 0)
     reflex.mark()

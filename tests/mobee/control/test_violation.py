@@ -25,7 +25,7 @@ def test_nothing_is_wrong_at_home() -> None:
     assert Watch(ROBOT).check(posture()) == ()
 
 
-def test_contacts_are_told_the_deepest_first() -> None:
+def test_the_deepest_contact_is_reported_first() -> None:
     pose = posture(torso_pitch=50.0)
     found = Watch(ROBOT).check(pose)
     assert len(found) > 1

@@ -289,7 +289,7 @@ def test_each_agent_acts_again_when_its_own_part_has_settled():
 
 
 @pytest.mark.parametrize("total", [1, 2, 7, 30])
-def test_transitions_are_counted_over_all_agents_and_none_is_left_under_way(total):
+def test_transitions_are_counted_over_all_agents_and_every_action_ends(total):
     plant = ToyConcurrent(toy_robot(), {"torso": 2.0, "left_arm": 2.0, "right_arm": 2.0})  # all end at once
     three = agents(plant)
     run(three, total)

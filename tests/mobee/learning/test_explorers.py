@@ -179,7 +179,7 @@ def test_depleting_learns_uncertain_actions_at_least_1_6_times_better_than_least
     assert least_tried >= 1.6 * depleting
 
 
-def test_who_draws_again_at_the_same_count_draws_the_same():
+def test_draws_at_the_same_count_are_equal():
     first, again = Draws("torso"), Draws("torso")
     wanted = [first.at(3, n).random() for n in range(20)]
     assert [again.at(3, n).random() for n in reversed(range(20))] == wanted[::-1]
@@ -192,7 +192,7 @@ def test_nothing_is_left_of_the_draws_before():
     assert draws.at(0, 7).random(3).tolist() == wanted
 
 
-def test_seeds_names_and_counts_tell_draws_apart():
+def test_draws_differ_by_seed_name_and_count():
     drawn = {Draws(name).at(seed, n).random() for seed in (-1, 0, 1, 11) for name in ("torso", "left_arm") for n in (0, 1, 10)}
     assert len(drawn) == 24
 
@@ -279,7 +279,7 @@ def test_gains_along_a_plan_fall_as_if_its_most_likely_outcomes_were_observed(se
         assert left[s, a] == pytest.approx(min(gains[s, a], falls_to), abs=1e-14)
 
 
-def test_of_two_ways_to_the_untried_it_takes_the_one_to_more_of_it():
+def test_of_two_paths_to_untried_actions_it_takes_the_one_to_more_of_them():
     """From 0 to 1 or 2; both have one action back and four onward, of which 1 has tried three and 2 none."""
     space = space_of([[1, 2, -1, -1, -1]] + [[0, 3, 4, 5, 6]] * 2 + [[0, -1, -1, -1, -1]] * 4)
     agent = CuriousAgent(space, InstantPlant(space.robot), "depleting")

@@ -109,7 +109,7 @@ def test_joints_are_read_in_the_lattice_s_order_and_a_pose_of_the_part_in_the_pa
     assert [space.state_of(space.target(s)) for s in range(27)] == list(range(27))
 
 
-def test_settings_tell_spaces_apart():
+def test_different_spaces_have_different_settings():
     assert arm().settings == arm().settings
     assert len({repr(s.settings) for s in (arm(), arm(tie_seed=1), arm(neighbours="equidistant"), arm(side="r"), torso())}) == 5
 

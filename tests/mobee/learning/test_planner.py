@@ -51,7 +51,7 @@ def test_a_plan_goes_round_what_fails_and_names_it():
     assert plan.distrusted == {(12, 13): pytest.approx(0.1)}
 
 
-def test_an_action_is_distrusted_where_the_state_before_it_is_passed_another_way():
+def test_an_action_is_distrusted_if_a_path_passes_the_state_before_it_by_another_action():
     plan = Planner(SPACE, Table(SPACE, {(13, 14): 0.9}), [14]).plan(12)
     assert (len(plan.actions), plan.shortest) == (4, 2)
     plan = Planner(SPACE, Table(SPACE, {(13, 14): 0.9, **{(12, int(g)): 0.95 for g in SPACE.actions(12) if g != 13}}), [14]).plan(12)

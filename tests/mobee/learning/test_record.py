@@ -101,7 +101,7 @@ def test_a_record_of_before_there_were_other_settings_is_read(run):
     assert np.array_equal(learned.model.reward, agents[0].model.reward)
 
 
-def test_what_cannot_be_rebuilt_is_named(run, tmp_path):
+def test_a_record_that_cannot_be_rebuilt_is_refused(run, tmp_path):
     path, _ = run
     with pytest.raises(MobeeError, match="several agents: name one of left_arm, torso"):
         load_learned(path, robot=toy_robot())

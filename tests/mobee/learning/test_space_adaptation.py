@@ -50,7 +50,7 @@ def test_shortcuts_join_what_is_often_passed_one_after_the_other():
     assert set(edges_of(shorter.goals)) - set(edges_of(space().goals)) == {(0, 2), (2, 0)}
 
 
-def test_there_and_back_again_is_no_way():
+def test_a_path_back_to_its_start_makes_no_shortcut():
     assert np.array_equal(with_shortcuts(space(), walked(0, 1, 0, 1, 0), count=3).goals, space().goals)
 
 

@@ -173,7 +173,7 @@ def test_a_model_that_forgets_is_interested_again_and_unlearns_what_changed():
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda model: pickle.loads(pickle.dumps(model))])
-def test_a_copy_goes_its_own_way(copied):
+def test_a_copy_is_independent(copied):
     model = TransitionModel(arm(neighbours="equidistant"))
     model.debiased()
     for outcome in OTHERS:

@@ -79,7 +79,7 @@ def test_depths_are_the_same(compared: Compared) -> None:
     assert max(differences) < 1e-6
 
 
-def test_the_normal_leads_out_and_no_shorter_way_along_it_does(compared: Compared) -> None:
+def test_the_depth_along_the_normal_separates_and_a_shorter_one_does_not(compared: Compared) -> None:
     rows = np.flatnonzero(compared.ours.depth > GRAZE)
     depth = compared.ours.depth
     assert [row for row in rows if compared.touches_when_moved(row, depth[row] + CLEAR)] == []

@@ -101,7 +101,7 @@ def test_forces_between_rounded_volumes_have_no_jump(steps: tuple[int, Steps]) -
     assert (jump <= found.moved * found.radii / (found.radii - depth) + 1e-12)[rounded].all()
 
 
-def test_forces_of_boxes_jump_only_where_the_shortest_way_out_switches(steps: tuple[int, Steps]) -> None:
+def test_forces_of_boxes_jump_only_where_the_smallest_separation_switches(steps: tuple[int, Steps]) -> None:
     found = steps[1]
     jump = np.linalg.norm(found.force[:, 1] - found.force[:, 0], axis=1)
     assert (jump <= 2.0 * found.depth.max(axis=1) + found.moved).all()

@@ -36,7 +36,7 @@ def drawn(rng: np.random.Generator, kind: str, scale: float) -> Solid:
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_of_volumes_of_any_size_a_depth_is_the_shortest_way_out(first: str, second: str, rng: np.random.Generator) -> None:
+def test_for_volumes_of_any_size_the_depth_is_the_smallest_separation(first: str, second: str, rng: np.random.Generator) -> None:
     touching = 0
     for scales, deep in product(product(SCALES, SCALES), [False, True] * 4):
         a, b = drawn(rng, first, scales[0]), drawn(rng, second, scales[1])

@@ -23,7 +23,7 @@ def test_projections_are_the_contacts_through_the_jacobians(seed: int, joints: i
 
 
 @pytest.mark.parametrize("name", ["icub", "icub_2014"])
-def test_parts_of_a_humanoid_feel_their_own_contacts_only_when_cut(name: str, rng: np.random.Generator) -> None:
+def test_with_cut_a_contact_acts_on_its_own_part_only(name: str, rng: np.random.Generator) -> None:
     robot = loaded(name)
     model = mobee.Model(robot, random_world(rng, robot, 30, 0.5))
     differ = 0

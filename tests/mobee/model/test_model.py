@@ -59,7 +59,7 @@ def test_batches_equal_their_poses_one_by_one(model, rng):
         assert jacobian[index] == pytest.approx(model.jacobian(q[index], "tip"), abs=1e-15)
 
 
-def test_the_arm_feels_itself_where_its_pairs_say(model):
+def test_the_arm_has_contacts_of_its_tested_pairs(model):
     assert model.evaluate(STRETCHED).contacts == ()
     pose = model.evaluate(FOLDED)
     assert _names(pose) == [("solid", "segment0", "segment2"), ("field", "field0", "field2")]
@@ -89,7 +89,7 @@ def test_the_base_stands_on_its_table(model):
     assert _names(mobee.Model(without, model.world).evaluate(STRETCHED)) == [("solid", "post", "table")]
 
 
-def test_ghosts_are_felt_by_nothing(model):
+def test_ghosts_have_no_contacts(model):
     model.world.add("ghost", mobee.sphere(0.1), position=(TIP, 0.0, 0.0), role="ghost")
     assert model.evaluate(STRETCHED).contacts == ()
     model.world.set_role("ghost", "obstacle")
@@ -138,7 +138,7 @@ def test_an_attached_object_moves_with_the_link_and_does_not_touch_it(model):
     assert _names(model.evaluate([np.pi / 2, 0.0, 0.0])) == [("solid", "segment2", "cup"), ("field", "field2", "cup")]
 
 
-def test_a_carried_object_is_felt_by_the_other_links(model):
+def test_a_carried_object_has_contacts_with_the_other_links(model):
     model.world.add("cup", mobee.sphere(0.04), position=(TIP, 0.12, 0.0))
     model.attach("cup", "link3", STRETCHED)
     triangle = [0.0, np.deg2rad(120), np.deg2rad(120)]  # the tip is back at the first joint, the cup below the first segment

@@ -34,7 +34,7 @@ def walk(rng: Rng, robot: Robot, step: float, count: int, motors: float = 1.0) -
 
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("name", ["icub", "katana"])
-def test_a_walk_of_a_shipped_robot_feels_what_single_poses_feel(name: str, step: float, rng: Rng) -> None:
+def test_a_track_of_a_shipped_robot_has_the_contacts_of_single_poses(name: str, step: float, rng: Rng) -> None:
     model = mobee.Model(loaded(name), random_world(rng, loaded(name), 60))
     track = model.track()
     for motors in (1.0, 0.1):
@@ -43,7 +43,7 @@ def test_a_walk_of_a_shipped_robot_feels_what_single_poses_feel(name: str, step:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_a_walk_of_any_robot_in_any_world_feels_what_single_poses_feel(seed: int) -> None:
+def test_a_track_of_any_robot_in_any_world_has_the_contacts_of_single_poses(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, int(rng.integers(0, 12)), int(rng.integers(0, 25)))
     model = mobee.Model(robot, random_world(rng, robot, int(rng.choice([0, 3, 150]))))
@@ -54,7 +54,7 @@ def test_a_walk_of_any_robot_in_any_world_feels_what_single_poses_feel(seed: int
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_edits_of_the_world_are_felt_at_once(seed: int) -> None:
+def test_edits_of_the_world_take_effect_at_once(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, 8, 16)
     model = mobee.Model(robot, random_world(rng, robot, 12))
@@ -118,7 +118,7 @@ def test_two_tracks_of_one_model_do_not_disturb_each_other(rng: Rng) -> None:
             assert same(track.evaluate(q), model.evaluate(q))
 
 
-def test_what_a_pose_has_felt_stays_when_the_robot_moves_on(rng: Rng) -> None:
+def test_the_contacts_of_a_pose_stay_when_the_robot_moves_on(rng: Rng) -> None:
     model = mobee.Model(loaded("icub"), mobee.load_world("table"))
     track, path = model.track(), walk(rng, model.robot, 1e-2, 30)
     kept = [track.evaluate(q) for q in path]

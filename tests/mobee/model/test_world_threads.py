@@ -61,7 +61,7 @@ def test_of_threads_that_want_one_name_exactly_one_gets_it():
     assert {name: thing.position[0] for name, thing in world.objects.items()} == {f"thing{i}": n for i, n in winners.items()}
 
 
-def test_the_next_evaluation_feels_what_another_thread_has_just_done():
+def test_the_next_evaluation_has_the_edits_of_another_thread():
     model = mobee.Model(planar_arm())
     done, go = threading.Semaphore(0), threading.Semaphore(0)
 

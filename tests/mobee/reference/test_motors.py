@@ -85,7 +85,7 @@ def run(parameters: MotorParameters, mode: str, reference_: float, seconds: floa
     return s
 
 
-def test_ideal_motors_do_what_they_are_told_at_once() -> None:
+def test_ideal_motors_follow_commands_at_once() -> None:
     assert run(MotorParameters.ideal(), "velocity", 0.5, 0.1).q == pytest.approx(np.full(3, 0.05))
 
 
@@ -100,7 +100,7 @@ def test_the_joint_rests_until_the_play_is_taken_up() -> None:
     assert run(MotorParameters(lag=0.0, delay=0.0, backlash=0.01), "velocity", 0.1, 1.0).q == pytest.approx(np.full(3, 0.1 - 0.005))
 
 
-def test_friction_holds_what_is_told_less_and_slows_what_is_told_more() -> None:
+def test_friction_holds_slow_commands_and_slows_fast_ones() -> None:
     sticky = MotorParameters(lag=0.05, delay=0.0, backlash=0.0, friction=0.2)
     assert not run(sticky, "velocity", 0.15, 1.0).q.any()
     assert run(sticky, "velocity", 0.5, 1.0).velocity == pytest.approx(np.full(3, 0.3))

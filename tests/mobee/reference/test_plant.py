@@ -26,7 +26,7 @@ PRESS = {"torso": (0.5, 0.5, 0.9), "left_arm": (0.6, 0.3, 0.5, 0.4), "right_arm"
 
 @BOTH
 @pytest.mark.parametrize("dt", [0.01, 0.02])
-def test_the_offline_plant_goes_this_way(gains: Gains, dt: float) -> None:
+def test_the_offline_plant_follows_the_same_path(gains: Gains, dt: float) -> None:
     """Hands into the table, two seconds.  To rounding, which the springs keep from growing; a tick adds the forces in another order."""
     model = Model(ICUB, load_world("table"))
     compiled, mine = OfflinePlant(model, 5, gains, dt=dt), Plant(model, 5, gains, dt=dt)

@@ -114,7 +114,7 @@ def test_a_target_in_reach_is_reached_and_one_out_of_reach_approached() -> None:
     assert np.linalg.norm(drawn_to(tip_target(0.0, 1.1), bent) - [0.0, 1.1, 0.0]) == pytest.approx(0.2, abs=0.01)
 
 
-def test_a_way_leads_out_of_a_stretched_arm() -> None:
+def test_there_is_an_escape_direction_for_a_stretched_arm() -> None:
     assert drawn_to(tip_target(0.5, 0.0), ZERO) == pytest.approx([0.5, 0.0, 0.0], abs=2e-3)
 
 

@@ -118,7 +118,7 @@ def test_a_cloud_has_a_point_where_the_marker_is_in_each_pose_coloured_by_its_va
     assert points[0].color == points[2].color != points[1].color
 
 
-def test_a_cloud_is_written_and_needs_one_value_a_pose(model: mobee.Model, tmp_path: Path) -> None:
+def test_a_cloud_is_written_and_needs_one_value_per_pose(model: mobee.Model, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     q = np.tile(model.robot.home, (4, 1))
     assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=("top",), height=30).stat().st_size > 0

@@ -48,7 +48,7 @@ def test_after_a_change_the_edges_are_as_if_all_were_checked(model: mobee.Model,
     assert 0 < min(again) and max(again) < len(EDGES)
 
 
-def test_without_a_change_nothing_is_looked_at_again(model: mobee.Model, poses: np.ndarray) -> None:
+def test_without_a_change_nothing_is_checked_again(model: mobee.Model, poses: np.ndarray) -> None:
     watch = EdgeWatch(model, poses, EDGES, STEP)
     assert len(watch.update()) == 0
     model.world.add("far", mobee.sphere(0.1), position=(5.0, 0.0, 0.0))

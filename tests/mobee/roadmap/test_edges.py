@@ -77,7 +77,7 @@ def test_no_edges_are_no_trouble(model: mobee.Model, poses: np.ndarray) -> None:
     assert check_edges(model, poses[:1], np.zeros((1, 2), dtype=np.intp)).shape == (1,)
 
 
-def test_bad_steps_and_markers_are_told(model: mobee.Model, poses: np.ndarray) -> None:
+def test_invalid_steps_and_markers_are_refused(model: mobee.Model, poses: np.ndarray) -> None:
     with pytest.raises(InvalidValue, match=r"step 0.0 m"):
         check_edges(model, poses, EDGES, 0.0)
     with pytest.raises(UnknownName, match="right_palm"):
@@ -94,6 +94,6 @@ def test_any_number_of_threads_finds_the_same(model: mobee.Model, poses: np.ndar
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.0, True, 10**6, None])
-def test_numbers_of_threads_that_are_none_are_told(model: mobee.Model, poses: np.ndarray, threads: object) -> None:
+def test_invalid_numbers_of_threads_are_refused(model: mobee.Model, poses: np.ndarray, threads: object) -> None:
     with pytest.raises(InvalidValue, match="whole number from 1"):
         check_edges(model, poses, EDGES, STEP, threads=threads)

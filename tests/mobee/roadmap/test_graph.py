@@ -18,7 +18,7 @@ from mobee.roadmap.roadmap import Roadmap
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 25), st.integers(0, 60))
-def test_the_way_is_as_short_as_dijkstra_says(seed: int, count: int, edges: int) -> None:
+def test_the_path_is_as_short_as_by_dijkstra(seed: int, count: int, edges: int) -> None:
     rng = np.random.default_rng(seed)
     q = rng.normal(size=(count, 3))
     pairs = np.sort(rng.integers(0, count, (edges, 2)), axis=1)

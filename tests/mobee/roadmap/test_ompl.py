@@ -27,7 +27,7 @@ def between(way: np.ndarray) -> np.ndarray:
     return np.concatenate([one + np.linspace(0, 1, 30)[:, None] * (other - one) for one, other in zip(way, way[1:], strict=False)])
 
 
-def test_rrt_connect_finds_a_way_around_what_is_between_and_the_same_for_a_seed():
+def test_rrt_connect_finds_a_path_around_an_obstacle_and_the_same_for_a_seed():
     known = model()
     assert known.evaluate(between(np.array([HOME, BEHIND]))).count.any()
     way = rrt_connect(known, HOME, BEHIND, seed=1)
@@ -41,7 +41,7 @@ def test_motors_that_may_not_move_stay_where_they_are():
     assert np.allclose(way[:, 1], 0.2)
 
 
-def test_where_there_is_no_way_it_says_none():
+def test_without_a_path_the_result_is_none():
     world = mobee.World()
     world.add("wall", mobee.box(0.2, 0.2, 0.2), position=(0.4, 0.35, 0.0))
     world.add("other", mobee.box(0.2, 0.2, 0.2), position=(0.4, -0.35, 0.0))

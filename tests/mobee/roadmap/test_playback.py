@@ -41,7 +41,7 @@ def test_it_is_faster_at_a_higher_speed(free: mobee.Model, path: np.ndarray) -> 
     assert play(free, path, speed=0.9).times[-1] < play(free, path, speed=0.4).times[-1]
 
 
-def test_what_is_in_the_way_is_told_and_keeps_it_off_the_path(icub: mobee.Robot, path: np.ndarray) -> None:
+def test_an_obstacle_on_the_path_is_reported_and_pushes_the_robot_off_it(icub: mobee.Robot, path: np.ndarray) -> None:
     world = mobee.World()
     model = mobee.Model(icub, world)
     at = model.evaluate(path[-1]).position("right_palm")
@@ -66,7 +66,7 @@ def test_only_parts_that_move_are_moved(icub: mobee.Robot, path: np.ndarray) -> 
     assert moving(icub, path) == ("torso", "right_arm")
 
 
-def test_bad_paths_are_told(free: mobee.Model, path: np.ndarray) -> None:
+def test_invalid_paths_are_refused(free: mobee.Model, path: np.ndarray) -> None:
     beyond = path.copy()
     beyond[1, free.robot.motor_index("r_elbow")] = 3.0
     for given, text in ((path[:, :3], r"path has shape \(5, 3\)"), (path[:1], "leads nowhere"), (beyond, "r_elbow beyond its limits")):

@@ -59,7 +59,7 @@ def test_the_place_outside_the_body_is_free_near_and_can_be_come_to() -> None:
     assert nearest_outside(MODEL, "right_arm", "right_palm", np.array([5.0, 0.0, 0.1]), ROBOT.home) is None
 
 
-def test_what_does_not_fit_together_is_told_with_what_does() -> None:
+def test_a_part_that_does_not_move_the_marker_is_refused_with_the_valid_ones() -> None:
     with pytest.raises(InvalidValue, match="right_arm does not move the marker 'left_palm'. Valid: .*right_palm"):
         nearest_posture(MODEL, "right_arm", "left_palm", np.zeros(3), ROBOT.home)
     with pytest.raises(UnknownName, match="right_palm"):

@@ -58,7 +58,7 @@ def test_rounded_corners_are_passed_without_a_stop() -> None:
     assert found.times[-1] < reference(path, SPEEDS, ACCELERATIONS, 0.0, DT).times[-1]
 
 
-def test_a_long_way_is_gone_at_full_speed() -> None:
+def test_a_long_path_is_followed_at_full_speed() -> None:
     found = reference([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]], SPEEDS, ACCELERATIONS, 0.1, DT)
     assert found.velocity[:, 0].max() == pytest.approx(0.3, rel=0.03)
     assert found.times[-1] == pytest.approx(3.0 / 0.3 + 0.3 / 1.0, rel=0.05)
@@ -71,7 +71,7 @@ def test_a_path_of_one_place_is_a_motion_that_stays() -> None:
         assert found.times.tolist() == [0.0] and not found.velocity.any()
 
 
-def test_a_way_back_and_forth_is_possible() -> None:
+def test_a_path_may_go_back_and_forth() -> None:
     found = reference([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.0, 0.0]], SPEEDS, ACCELERATIONS, 0.1, DT)
     assert found.q[:, 0].max() == pytest.approx(0.25, abs=0.003)  # turned round at half of the rounding before the corner
     assert np.linalg.norm(np.diff(rounded([[0.0], [1.0], [0.0]], 0.1), axis=0), axis=1).max() < 0.005
@@ -86,6 +86,6 @@ def test_a_way_back_and_forth_is_possible() -> None:
         ({"rounding": -0.1}, "rounding -0.1"),
     ],
 )
-def test_bad_input_is_told(change: dict, text: str) -> None:
+def test_invalid_input_is_refused(change: dict, text: str) -> None:
     with pytest.raises(InvalidValue, match=text):
         reference(**({"path": walk(0, 3, 0.1), "speeds": SPEEDS, "accelerations": ACCELERATIONS} | change))

@@ -67,7 +67,7 @@ def test_the_exit_is_the_nearest_in_spacings() -> None:
     assert trm.exit([-0.14, 0.0]) == 0
 
 
-def test_a_goal_that_the_map_does_not_have_is_told_with_the_nearest_vertex() -> None:
+def test_a_goal_outside_of_the_map_is_refused_with_the_nearest_vertex() -> None:
     trm = square(table())
     with pytest.raises(InvalidValue, match=r"the map has no vertex near up -0.2, side 1: .* 2.0 spacings away, is at up 0, side 1;"):
         trm.path(trm.q[0], [-0.2, 1.0])
@@ -77,7 +77,7 @@ def test_a_goal_that_the_map_does_not_have_is_told_with_the_nearest_vertex() -> 
         trm.path([0.0, 0.0], [0.0, 0.0])
 
 
-def test_parts_that_are_not_connected_are_told() -> None:
+def test_unconnected_parts_are_reported() -> None:
     trm = square(table(), cut=True)
     with pytest.raises(MobeeError, match="the map has 2 unconnected parts, and the two vertices are in parts of 18 and 18 vertices"):
         trm.path(trm.q[0], trm.y[-1])

@@ -94,7 +94,7 @@ def test_equal_names_are_refused() -> None:
         join_robots({"a": inner, "a_b": KATANA})
 
 
-def test_a_place_of_nobody_or_no_pose_is_refused() -> None:
+def test_a_place_without_a_robot_or_without_a_pose_is_refused() -> None:
     with pytest.raises(UnknownName, match="unknown robot 'katna'. Did you mean 'katana'"):
         join_robots({"katana": KATANA}, {"katna": (AT, TURN)})
     with pytest.raises(InvalidValue, match="place of robot 'katana': rotation"):

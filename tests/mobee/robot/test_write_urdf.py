@@ -44,7 +44,7 @@ def test_a_urdf_is_read_back_as_it_was(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FOREIGN)
-def test_a_urdf_by_way_of_xml_is_the_same_urdf(tmp_path: Path, name: str) -> None:
+def test_a_urdf_written_as_xml_and_back_is_the_same_urdf(tmp_path: Path, name: str) -> None:
     robot = load_robot(foreign(name))
     assert_same_robot(robot, read_back(load_robot(write_xml(robot, tmp_path / "x.xml")), tmp_path))
 
@@ -66,7 +66,7 @@ def test_coupled_motors_are_mimic_joints_and_markers_fixed_links(tmp_path: Path)
     assert {"left_palm", "right_palm", "head_marker"} <= fixed  # there is a link head already
 
 
-def test_clauses_are_told_in_a_comment(tmp_path: Path) -> None:
+def test_clauses_are_written_in_a_comment(tmp_path: Path) -> None:
     text = write_urdf(load_robot("icub"), tmp_path / "i.urdf").read_text()
     comment = text[text.index("<!--") : text.index("-->")]
     assert "clause 0, left_arm: 1.71 l_shoulder_pitch + -1.71 l_shoulder_roll + 6.056" in comment

@@ -51,7 +51,7 @@ def test_a_motor_that_is_named_again_is_the_one_that_was_defined_before(tmp_path
     np.testing.assert_allclose(np.rad2deg(matrix @ [np.deg2rad(40)] + offset), [40, 25])
 
 
-def test_what_is_said_of_a_motor_a_second_time_does_not_count_and_is_warned_of(tmp_path: Path) -> None:
+def test_attributes_of_a_second_element_of_a_motor_are_ignored_with_a_warning(tmp_path: Path) -> None:
     robot, said = load(old(tmp_path, EYE.replace('"eye"', '"eye" minPos="-500" maxPos="90"')))
     np.testing.assert_allclose(np.rad2deg(robot.limits), [[-10, 90]])
     assert said == ["4: <motor>: the motor 'eye' is defined in line 3; what is said of it here does not count (minPos). Remove it"]

@@ -110,7 +110,7 @@ def test_faults_of_form_are_errors_in_newer_files(tmp_path: Path, version: str) 
         read(tmp_path, text)
 
 
-def test_a_world_without_a_version_turns_its_boxes_the_shortest_way_and_says_so(tmp_path: Path) -> None:
+def test_a_world_without_a_version_turns_its_boxes_by_the_smallest_rotation_with_a_warning(tmp_path: Path) -> None:
     path = tmp_path / "world.xml"
     box = '<box name="b" width="1" height="2" depth="3" hz="1" hy="1"/>'
     path.write_text(f"<World>{box}</World>")

@@ -61,7 +61,7 @@ def test_the_chest_boxes_of_2014_are_turned_as_published() -> None:
     np.testing.assert_allclose(rotation, [[-0.258819, 0, 0.965926], [0.965926, 0, 0.258819], [0, 1, 0]], atol=1e-6)
 
 
-def test_a_cylinder_stands_along_y_unless_told_otherwise() -> None:
+def test_a_cylinder_is_along_y_by_default() -> None:
     attributes = {"radius": "0.1", "height": "1"}
     upright = read_volume(Node(Path("toy.xml"), 1, "cylinder", attributes))
     np.testing.assert_allclose(upright.rotation[:, 2], [0, 1, 0], atol=1e-12)

@@ -23,7 +23,7 @@ JOINTS = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
 
 @pytest.mark.parametrize("name", ["icub", "icub_2014"])
 @pytest.mark.parametrize("active", [JOINTS, ("torso",), ("torso", "left_arm"), ("head", "r_*")])
-def test_a_stiffened_robot_feels_what_the_whole_one_feels(name: str, active: tuple[str, ...]) -> None:
+def test_a_stiffened_robot_has_the_forces_of_the_whole_one(name: str, active: tuple[str, ...]) -> None:
     robot = load_robot(name)
     plant = OfflinePlant(Model(robot), active=active)
     alive = np.isin(np.arange(len(robot.motors)), plant.motors.living)
@@ -67,7 +67,7 @@ def test_an_arm_without_noise_moves_as_in_a_whole_robot_without_noise() -> None:
     assert found[0].duration == found[1].duration
 
 
-def test_what_an_active_arm_carries_is_felt() -> None:
+def test_objects_that_an_active_arm_carries_cause_forces() -> None:
     robot = load_robot("icub")
     model = Model(robot, load_world("table"))
     plant = OfflinePlant(model, active=["left_arm"])

@@ -225,7 +225,7 @@ def test_what_cannot_go_together_is_refused_before_anything_moves(together: Any)
     assert together([*good, calling(katanas(1)[0]), reaching()]), "each in a world of its own"
 
 
-def test_who_does_not_act_is_refused_and_so_are_odd_numbers_of_ticks() -> None:
+def test_a_plant_without_an_action_and_invalid_numbers_of_ticks_are_refused() -> None:
     good = katanas(1)
     with pytest.raises(InvalidValue, match=r"plants\[1\]: no part of it is acting"):
         advance_together([*good, *katanas(1, acting=False)])

@@ -53,7 +53,7 @@ def test_a_position_is_approached_as_fast_as_it_can_be_braked_and_reached_at_res
 
 
 @given(seed=seeds)
-def test_what_cannot_stop_in_time_is_told(seed: int) -> None:
+def test_a_motor_that_cannot_stop_in_time_is_detected(seed: int) -> None:
     rng = np.random.default_rng(seed)
     q, moving = rng.uniform(LOWER, UPPER), rng.uniform(-1.3, 1.3, N)
     late = (moving > brakeable(UPPER - q) + CHANGE) | (moving < -brakeable(q - LOWER) - CHANGE)

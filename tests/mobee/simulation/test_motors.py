@@ -226,7 +226,7 @@ def test_torques_move_a_joint_through_its_play_and_a_block_stops_the_motor_behin
     assert m.motor_velocities.tolist() == [0.0] * 3
 
 
-def test_another_substep_keeps_what_is_on_its_way() -> None:
+def test_another_substep_keeps_the_commands_in_the_delay_line() -> None:
     m = motors(replace(IDEAL, delay=0.02))
     m.command(ALL, "velocity", np.full(3, 0.5))
     m.move(2, 0.005)

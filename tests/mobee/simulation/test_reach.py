@@ -51,7 +51,7 @@ def test_a_reach_is_drawn_to_the_target_and_back(gains: Gains) -> None:
 
 
 @BOTH
-def test_who_stays_is_not_drawn_back(gains: Gains) -> None:
+def test_with_stay_the_part_is_not_drawn_back(gains: Gains) -> None:
     plant = bent(gains=gains)
     plant.present(NEAR)
     outcome = plant.reach("arm", "tip", stay=True)
@@ -190,7 +190,7 @@ def test_tick_by_tick_a_reach_is_the_same_as_at_once(gains: Gains) -> None:
     assert outcomes[0] == outcomes[1] == outcomes[2]
 
 
-def test_the_hand_that_reaches_does_not_feel_the_target_and_the_arm_does() -> None:
+def test_the_target_repels_the_arm_but_not_the_reaching_hand() -> None:
     """A target in the hand pushes the arm away until the hand reaches for it; one at the elbow goes on pushing."""
 
     def pushed(target: Array, reaching: bool) -> float:
@@ -222,7 +222,7 @@ def test_both_hands_reach_at_once() -> None:
     assert all(plant.reached(part).missing < 0.25 for part in ended)
 
 
-def test_who_is_called_now_and_then_moves_the_target_and_the_hand_follows() -> None:
+def test_a_callback_moves_the_target_and_the_hand_follows() -> None:
     plant = bent()
     plant.present(NEAR)
     called = []

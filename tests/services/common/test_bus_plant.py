@@ -118,7 +118,7 @@ def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeSer
     client.leave()  # nobody need hear of it
 
 
-def test_a_target_that_somebody_else_has_taken_away_is_not_missed(service: FakeService, client: ReachClient) -> None:
+def test_a_target_that_another_client_has_removed_causes_no_error(service: FakeService, client: ReachClient) -> None:
     client.present(ReachTarget(np.array(AT)))
     service.failure = CallFailed("world", "unknown world object 'reach_target'")
     client.present(None)

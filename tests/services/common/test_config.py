@@ -49,7 +49,7 @@ def test_the_file_may_be_given_with_an_equals_sign_and_the_help_speaks_of_it(tmp
     assert "--config FILE" in capsys.readouterr().out
 
 
-def test_an_unknown_field_is_told_with_file_line_and_nearest_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_field_is_refused_with_file_line_and_nearest_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write(tmp_path, "# settings\nseed = 1\ninject_test_dealy = 2.0\n")
     text = line(["--config", file], capsys)
     assert f"{file}:3: " in text
@@ -68,7 +68,7 @@ def test_an_unknown_field_is_told_with_file_line_and_nearest_name(tmp_path: Path
         ("posture = 3", "posture", "Expected `object`, got `int`"),
     ],
 )
-def test_a_wrong_value_is_told_with_file_line_and_field(
+def test_a_wrong_value_is_refused_with_file_line_and_field(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str, field: str, says: str
 ) -> None:
     file = write(tmp_path, f"robot = 'icub'\n\n{wrong}\n")
@@ -77,20 +77,20 @@ def test_a_wrong_value_is_told_with_file_line_and_field(
     assert says in text
 
 
-def test_a_wrong_value_in_a_table_is_told_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_value_in_a_table_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = write(tmp_path, "seed = 1\n[posture]\ntorso = [0.0]\nhead = ['up']\n")
     text = line(["--config", file], capsys)
     assert f"{file}:2: posture" in text  # of the table: which of its entries is wrong msgspec does not say
     assert "Expected `float`, got `str`" in text
 
 
-def test_a_file_that_is_no_toml_is_told_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_no_toml_is_refused_with_its_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = line(["--config", write(tmp_path, "seed = 1\nrobot icub\n")], capsys)
     assert "not TOML" in text
     assert "line 2" in text
 
 
-def test_a_missing_an_unreadable_and_a_binary_file_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_an_unreadable_and_a_binary_file_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "No such file" in line(["--config", str(tmp_path / "none.toml")], capsys)
     assert "Is a directory" in line(["--config", str(tmp_path)], capsys)
     binary = tmp_path / "binary.toml"
@@ -99,7 +99,7 @@ def test_a_missing_an_unreadable_and_a_binary_file_are_told(tmp_path: Path, caps
     assert "--config needs a file" in line(["--config"], capsys)
 
 
-def test_a_flag_out_of_its_bounds_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_flag_out_of_its_bounds_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "share" in line(["--share", "3"], capsys)
 
 

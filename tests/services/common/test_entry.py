@@ -38,7 +38,7 @@ def test_a_service_that_was_started_early_waits_until_it_is_released(tmp_path: P
         child.kill()
 
 
-def test_a_service_that_is_started_by_hand_waits_for_nobody() -> None:
+def test_a_service_that_is_started_by_hand_does_not_wait() -> None:
     environment = {name: value for name, value in os.environ.items() if name != HELD}
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, text=True
@@ -57,5 +57,5 @@ def test_a_full_disk_puts_no_traceback_on_the_screen() -> None:
     assert said_of("'a line'") == ""
 
 
-def test_a_mistake_in_a_log_call_is_still_told() -> None:
+def test_an_error_in_a_log_call_is_still_reported() -> None:
     assert "TypeError" in said_of("'a line', 'too much'")

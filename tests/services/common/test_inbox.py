@@ -39,7 +39,7 @@ def test_a_timer_beyond_the_time_waits_for_the_next_spin() -> None:
     assert seen == [1]
 
 
-def test_a_timer_that_was_cancelled_does_nothing_and_wakes_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cancelled_timer_does_nothing_and_wakes_no_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     inbox, seen, start = Inbox(), [], now()
     cancelled = [inbox.at(start + after, lambda: seen.append("cancelled")) for after in (0.01, 0.02)]
     inbox.at(start + 0.03, lambda: seen.append("due"))
@@ -180,7 +180,7 @@ def _end() -> None:
     raise SystemExit
 
 
-def test_while_the_inbox_is_served_who_brings_something_handles_it() -> None:
+def test_while_the_inbox_is_served_the_thread_that_brings_a_message_handles_it() -> None:
     with Serving() as inbox:
         seen: list[int] = []
         for _ in range(100):
@@ -228,7 +228,7 @@ def test_two_threads_never_handle_at_a_time_and_each_keeps_its_order() -> None:
         assert [i for by, i in seen if by == who] == list(range(2000))
 
 
-def test_a_timer_set_by_who_handles_for_the_server_is_in_time() -> None:
+def test_a_timer_set_by_another_thread_in_a_handler_is_in_time() -> None:
     with Serving() as inbox:
         rang, start = threading.Event(), now()
         inbox.handle(lambda: inbox.at(now() + 0.02, rang.set))
@@ -244,7 +244,7 @@ def test_what_goes_wrong_in_another_thread_ends_the_server() -> None:
     assert seen == []
 
 
-def test_without_a_server_who_brings_something_leaves_it() -> None:
+def test_without_a_server_the_thread_that_brings_a_message_queues_it() -> None:
     inbox, seen = Inbox(), []
     inbox.handle(lambda: seen.append(1))
     assert seen == []

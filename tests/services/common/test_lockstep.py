@@ -68,7 +68,7 @@ def test_it_begins_when_everybody_has_come(bench: Bench) -> None:
     assert bench.told == []
 
 
-def test_who_is_not_busy_must_answer_and_is_told_that_it_is_its_turn(bench: Bench) -> None:
+def test_a_participant_that_is_not_busy_gets_its_turn_and_must_answer(bench: Bench) -> None:
     bench.begun().service.turns.clear()
     bench.done("model", 1)
     bench.done("controller", 1)
@@ -85,7 +85,7 @@ def test_an_answer_counts_for_those_whose_answers_it_includes(bench: Bench) -> N
     assert bench.barrier.missing(3) == ["agent", "controller", "model", "newcomer"]
 
 
-def test_who_is_busy_is_left_alone(bench: Bench) -> None:
+def test_a_busy_participant_need_not_answer(bench: Bench) -> None:
     bench.begun().service.turns.clear()
     bench.done("model", 1)
     assert bench.barrier.missing(1) == ["agent", "controller"]
@@ -100,7 +100,7 @@ def test_an_answer_to_an_older_tick_does_not_count(bench: Bench) -> None:
     assert bench.barrier.missing(1) == ["agent", "controller", "model"]
 
 
-def test_who_is_late_is_dropped_and_named_and_comes_back_with_its_next_answer(bench: Bench) -> None:
+def test_a_late_participant_is_dropped_reported_and_returns_with_its_next_answer(bench: Bench) -> None:
     bench.begun().service.waits = lambda: bench.done("model", 1)
     assert bench.barrier.wait(1) == ["agent", "controller"]
     assert [who for who, _ in bench.told] == ["agent", "controller"]
@@ -113,7 +113,7 @@ def test_who_is_late_is_dropped_and_named_and_comes_back_with_its_next_answer(be
     assert bench.barrier.missing(3) == ["agent", "model"]
 
 
-def test_a_process_that_dies_releases_the_barrier_and_is_told(bench: Bench) -> None:
+def test_a_process_that_dies_releases_the_barrier_and_is_reported(bench: Bench) -> None:
     bench.begun()
     bench.done("model", 1)
     bench.done("agent", 1)
@@ -136,7 +136,7 @@ def test_without_a_controller_all_are_asked(bench: Bench) -> None:
     assert (Turn.stream.key("agent"), 2) in bench.service.turns
 
 
-def test_who_says_that_it_was_its_last_answer_is_not_missed(bench: Bench) -> None:
+def test_a_participant_may_leave_with_its_last_answer(bench: Bench) -> None:
     bench.begun()
     bench.done("agent", 1, last=True)
     bench.done("model", 1)
@@ -147,12 +147,12 @@ def test_who_says_that_it_was_its_last_answer_is_not_missed(bench: Bench) -> Non
     assert bench.barrier.absent() == []
 
 
-def test_an_answer_for_want_of_something_is_told(bench: Bench) -> None:
+def test_an_answer_without_an_input_is_reported(bench: Bench) -> None:
     bench.begun().done("controller", 1, ok=False)
     assert bench.told == [("controller", "lacked an input at tick 1")]
 
 
-def test_whoever_answers_takes_part(bench: Bench) -> None:
+def test_a_process_that_answers_becomes_a_participant(bench: Bench) -> None:
     bench.begun().done("stranger", 1)
     assert "stranger" in bench.barrier.missing(2)
 

@@ -84,7 +84,7 @@ def send(bus: Rig, key: str, request: Any) -> list[tuple[bool, bytes, str]]:
 # What every service answers
 
 
-def test_stat_tells_who_and_how_the_service_is(bus: Rig, probe: Program) -> None:
+def test_stat_has_name_and_status_of_the_service(bus: Rig, probe: Program) -> None:
     stat = bus.stat("probe")
     assert (stat.who, stat.pid, stat.ready, stat.text) == ("probe", probe.process.pid, True, "a probe")
     assert {stat.instance} == bus.instances("probe")
@@ -164,7 +164,7 @@ def test_a_bad_request_is_counted_and_answered_with_its_reason(bus: Rig, probe: 
     assert rejected(bus) == {"decode": 3, "type": 2, "version": 2, "token": 1}
 
 
-def test_a_call_to_nobody_fails_at_once_and_says_so(bus: Rig) -> None:
+def test_a_call_without_a_server_fails_at_once_with_a_reason(bus: Rig) -> None:
     start = time.monotonic()
     with pytest.raises(CallFailed, match="nobody/rpc/stat: no service answers") as caught:
         bus.call("nobody/rpc/stat", Empty, Stat, timeout=30.0)
@@ -223,7 +223,7 @@ def test_a_new_run_is_announced_once_and_its_messages_are_heard(bus: Rig, clock:
     assert "r1" in wait_for(lambda: [e.text for e in events if e.code == "new_run"], "the event")[0]
 
 
-def test_a_refusal_is_told_on_the_bus_at_most_once_a_second(bus: Rig, clock: Any) -> None:
+def test_a_refusal_is_reported_on_the_bus_at_most_once_per_second(bus: Rig, clock: Any) -> None:
     events = bus.record(Event, "probe")
     bus.call(keys.service_rpc("probe", "mark"), Empty, Done)
     start = time.monotonic()
@@ -238,7 +238,7 @@ def test_a_refusal_is_told_on_the_bus_at_most_once_a_second(bus: Rig, clock: Any
     assert 1 <= len(wait_for(told, "an event")) <= 2 + time.monotonic() - start
 
 
-def test_random_bytes_on_every_key_harm_nobody(bus: Rig, clock: Any, rng: np.random.Generator) -> None:
+def test_random_bytes_on_every_key_do_no_harm(bus: Rig, clock: Any, rng: np.random.Generator) -> None:
     streams = [
         Clock.stream.key(),
         Forces.stream.key("model"),
@@ -348,7 +348,7 @@ def test_two_signals_end_it_as_well_as_one(bus: Rig) -> None:
     assert timed_end(program) == 0
 
 
-def test_an_error_in_a_handler_is_counted_reported_and_logged_and_the_process_goes_on(tmp_path: Path, bus: Rig) -> None:
+def test_an_error_in_a_handler_is_counted_reported_and_logged_and_the_process_continues(tmp_path: Path, bus: Rig) -> None:
     with rig(tmp_path, bus.robot) as alone:
         program, events = another(alone), alone.record(Event, "probe")
         with pytest.raises(CallFailed, match="RuntimeError: the probe is broken") as caught:
@@ -398,7 +398,7 @@ def test_without_a_router_it_gives_up_in_one_line_that_names_the_endpoint_and_th
     assert "Traceback" not in program.says
 
 
-def test_a_robot_that_is_not_there_is_told_in_one_line(bus: Rig) -> None:
+def test_a_missing_robot_is_refused_in_one_line(bus: Rig) -> None:
     program = bus.spawn(*PROBE, "--endpoint", bus.endpoint, "--robot", "icup")
     assert program.wait(20.0) == 2
     assert "Did you mean 'icub'?" in program.says

@@ -22,7 +22,7 @@ def test_a_router_is_found_by_its_local_endpoint_and_by_its_endpoint() -> None:
         wait_for(lambda: heard == ["this"], "the message")
 
 
-def test_nobody_else_may_use_the_local_endpoint_and_nothing_of_it_is_left() -> None:
+def test_the_local_endpoint_is_private_and_is_removed() -> None:
     with local_endpoint() as local:
         folder = Path(local.removeprefix("unixsock-stream/")).parent
         with open_router(free_endpoint(), local_endpoint=local):

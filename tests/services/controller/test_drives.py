@@ -93,7 +93,7 @@ def test_a_part_whose_state_stands_still_is_not_under_control(run: Stage) -> Non
     wait_for(lambda: any("no fresh state" in e.text for e in events if e.code == "held"), "the event")
 
 
-def test_a_new_run_resets_everything_but_who_owns_the_goals(run: Stage) -> None:
+def test_a_new_run_resets_everything_except_the_owners_of_goals(run: Stage) -> None:
     _, epoch = run.own("left_arm")
     run.force("left_arm", epoch, f=[5.0] + [0.0] * 15)
     run.goal("left_arm", epoch, near("left_arm", 0.8), "old")

@@ -48,7 +48,7 @@ def test_terms_are_imported_by_name() -> None:
         load_terms([f"{HERE}:lift", f"{HERE}:lift"])
 
 
-def test_told_contacts_push_as_those_of_a_model_that_knows_the_world(rng: np.random.Generator) -> None:
+def test_published_contacts_push_as_those_of_a_model_with_the_world(rng: np.random.Generator) -> None:
     model, blind = Model(ROBOT, load_world("table")), Model(ROBOT)
     for q in rng.uniform(*ROBOT.limits.T, (20, len(ROBOT.motors))):
         seen, told = model.evaluate(q), blind.evaluate(q)
@@ -70,7 +70,7 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
         yield stage
 
 
-def test_a_live_controller_adds_them_and_tells_them(lifted: Stage) -> None:
+def test_a_live_controller_adds_and_publishes_user_defined_terms(lifted: Stage) -> None:
     told: list[Forces] = lifted.rig.record(Forces, "controller")
     lifted.model.contacts = TOUCHES
     lifted.under_control()
@@ -107,7 +107,7 @@ def test_a_term_that_fails_ends_the_controller_with_its_name(tmp_path_factory: p
         assert "Traceback" not in stage.controller.says
 
 
-def test_a_term_that_is_not_there_is_told_in_one_line(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_missing_term_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory) -> None:
     with rig(tmp_path_factory.mktemp("missing"), ROBOT) as made:
         program = made.spawn("-m", "services.controller", "--endpoint", made.endpoint, "--terms", "nowhere:lift")
         assert program.wait(20.0) == 2

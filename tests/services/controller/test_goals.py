@@ -37,7 +37,7 @@ def _try(call: Callable[[], Any]) -> Any:
         return None
 
 
-def test_nobody_takes_a_goal_without_a_token(run: Stage) -> None:
+def test_a_goal_cannot_be_taken_without_a_token(run: Stage) -> None:
     refused("token", lambda: run.rig.call(keys.goal("torso", "take"), Take, Taken, who="ghost", instance="n0"))
 
 

@@ -88,7 +88,7 @@ def test_it_answers_tick_0_when_all_is_armed_and_has_not_moved(started: Bench) -
     assert (started.answers[-1].re_k, started.answers[-1].ok) == (0, True)
 
 
-def test_its_answer_comes_after_its_commands_and_names_who_is_under_way(bench: Bench) -> None:
+def test_its_answer_comes_after_its_commands_and_names_the_busy_services(bench: Bench) -> None:
     _, epoch = bench.stage.own("torso", "agent_torso")
     bench.stage.goal("torso", epoch, near("torso"))
     assert bench.answers[-1].busy == []
@@ -138,7 +138,7 @@ def test_it_does_not_answer_while_a_part_is_being_armed(bench: Bench) -> None:
     assert bench.stage.sim.gates["torso"].state == "armed"
 
 
-def test_a_part_under_way_tells_of_it_now_and_then_and_of_its_end_at_once(bench: Bench) -> None:
+def test_a_moving_part_is_published_at_intervals_and_its_end_at_once(bench: Bench) -> None:
     _, epoch = bench.stage.own("torso", "agent_torso")
     bench.stage.goal("torso", epoch, ROBOT.home[ROBOT.part("torso").slice])
     told: list[Motion] = bench.stage.motions["torso"]

@@ -51,7 +51,7 @@ def test_position_commands_begin_at_the_measured_posture(tmp_path: Path) -> None
         ("head = [9.0, 0.0, 0.0, 0.0, 0.0, 0.0]", "neck_pitch at 9 rad, its range is"),
     ],
 )
-def test_a_posture_that_the_robot_cannot_take_is_told_in_one_line(stage: Stage, tmp_path: Path, posture: str, says: str) -> None:
+def test_an_impossible_posture_is_refused_in_one_line(stage: Stage, tmp_path: Path, posture: str, says: str) -> None:
     settings = tmp_path / "controller.toml"
     settings.write_text(f"[posture]\n{posture}\n")
     program = stage.rig.spawn("-m", "services.controller", "--endpoint", stage.rig.endpoint, "--config", str(settings))

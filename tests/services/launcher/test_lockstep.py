@@ -19,14 +19,14 @@ def participants(scenario: Scenario) -> tuple[str, ...]:
     return sim.config.participants
 
 
-def test_robot_sim_waits_for_all_who_compute_what_the_robot_does() -> None:
+def test_robot_sim_waits_for_all_services_that_affect_the_robot() -> None:
     scenario = read_scenario("lockstep")
     assert scenario.is_locked
     assert participants(scenario) == ("model", "controller", "agent_torso", "agent_left_arm", "agent_right_arm")
     assert all(part.config.mode == "lock" for part in scenario.parts)
 
 
-def test_any_scenario_may_be_run_in_lockstep_without_those_who_look_in_their_own_time() -> None:
+def test_any_scenario_runs_in_lockstep_without_its_real_time_services() -> None:
     scenario = read_scenario("default", ["shared.mode=lock"])
     check_lockstep(scenario)
     names = [part.who for part in scenario.parts]
@@ -35,13 +35,13 @@ def test_any_scenario_may_be_run_in_lockstep_without_those_who_look_in_their_own
     assert "monitor" not in participants(scenario)
 
 
-def test_in_free_mode_nobody_is_waited_for() -> None:
+def test_in_free_mode_no_service_is_waited_for() -> None:
     scenario = read_scenario("default")
     assert not scenario.is_locked
     assert participants(scenario) == ()
 
 
-def test_who_takes_part_may_be_said() -> None:
+def test_the_participants_may_be_set() -> None:
     assert participants(read_scenario("lockstep", ['services.robot_sim.participants=["model"]'])) == ("model",)
 
 

@@ -263,7 +263,7 @@ def test_a_unix_socket_is_gone_after_the_run(launch: Launch, tmp_path: Path) -> 
     assert list(tmp_path.glob("*.sock*")) == []
 
 
-def test_a_runs_folder_that_cannot_be_written_is_said_in_one_line(tmp_path: Path, endpoint: str) -> None:
+def test_a_runs_folder_that_cannot_be_written_is_refused_in_one_line(tmp_path: Path, endpoint: str) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "toys.toml").write_text(toys(one="healthy"))
     done = mobee("launch", str(tmp_path / "toys.toml"), "--endpoint", endpoint, "--runs", str(tmp_path / "file" / "runs"))

@@ -81,7 +81,7 @@ def test_parts_come_in_the_order_of_their_start() -> None:
     ]
 
 
-def test_an_agent_is_told_its_part_and_shared_settings_reach_whom_they_concern(scenario: Path) -> None:
+def test_an_agent_gets_its_part_and_services_get_their_shared_settings(scenario: Path) -> None:
     parts = {part.who: part.config for part in read_scenario(str(scenario)).parts}
     assert parts["agent_torso"].part == "torso"
     assert parts["model"].gains == "published_2014"

@@ -51,7 +51,7 @@ def test_figures_of_a_run_come_from_the_services_that_measure_them() -> None:
     assert summary["restarts"] == {"robot_sim": 1, "model": 0, "agent_left_arm": 0}
 
 
-def test_what_nobody_measured_is_null_not_minus_one() -> None:
+def test_a_number_that_was_not_measured_is_null() -> None:
     summary = summarise([child("robot_sim", ROBOT)])
     assert summary["closest_gap_m"] is None
     assert summary["table_contact_ticks"] is None

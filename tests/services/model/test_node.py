@@ -36,7 +36,7 @@ def test_forces_answer_every_tick_and_equal_the_librarys(run: Stage, rng: np.ran
             np.testing.assert_allclose(force, expected[name], atol=1e-12)
 
 
-def test_the_table_is_felt_and_pushes_the_arm_off(run: Stage) -> None:
+def test_the_table_causes_contacts_and_pushes_the_arm_off(run: Stage) -> None:
     q = on_the_table()
     answer = run.at(q)
     model = library()
@@ -63,7 +63,7 @@ def test_markers_are_where_the_library_has_them(run: Stage, rng: np.random.Gener
         np.testing.assert_allclose(matrix_from_quaternion(np.array(marker.quaternion)), pose.rotation(marker.name), atol=1e-9)
 
 
-def test_nothing_is_said_before_every_part_has_reported(run: Stage) -> None:
+def test_nothing_is_published_before_every_part_has_reported(run: Stage) -> None:
     run.sim.new_run()
     run.sim.silent = {"head"}
     before = len(run.forces)
@@ -75,7 +75,7 @@ def test_nothing_is_said_before_every_part_has_reported(run: Stage) -> None:
     run.tick()
 
 
-def test_each_parts_age_is_told_and_grows_while_it_is_silent(run: Stage) -> None:
+def test_the_age_of_each_part_is_published_and_grows_while_it_is_silent(run: Stage) -> None:
     fresh = run.tick().part_age
     assert fresh == dict.fromkeys(run.rig.robot.parts, TICK // 2)
     run.sim.silent = {"torso"}

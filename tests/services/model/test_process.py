@@ -13,7 +13,7 @@ from tests.services.harness import rig
 from tests.services.model.stage import Stage, library, on_the_table, staged
 
 
-def test_without_contact_forces_contacts_are_told_and_not_felt(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_without_contact_forces_contacts_are_published_but_cause_no_force(tmp_path_factory: pytest.TempPathFactory) -> None:
     with rig(tmp_path_factory.mktemp("numb"), load_robot("icub")) as made:
         numb = staged(made, "--no-contact-forces")
         answer = numb.at(on_the_table())
@@ -33,14 +33,14 @@ def test_the_published_propagation_spares_the_torso(tmp_path_factory: pytest.Tem
         np.testing.assert_allclose(answer.terms["collision"], expected.collision, atol=1e-12)
 
 
-def test_the_contacts_are_told_along_with_the_forces_where_terms_need_them(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_contacts_are_published_with_the_forces_if_terms_need_them(tmp_path_factory: pytest.TempPathFactory) -> None:
     with rig(tmp_path_factory.mktemp("terms"), load_robot("icub")) as made:
         telling = staged(made, "--terms", "elsewhere:viscous")
         answer = telling.at(on_the_table())
         assert answer.contacts and answer.contacts == telling.contacts[-1].contacts
 
 
-def test_a_world_that_is_not_there_is_told_in_one_line(stage: Stage) -> None:
+def test_a_missing_world_is_refused_in_one_line(stage: Stage) -> None:
     start = time.monotonic()
     program = stage.rig.spawn("-m", "services.model", "--endpoint", stage.rig.endpoint, "--world", "tabel")
     assert program.wait(20.0) == 2

@@ -66,7 +66,7 @@ def reacher(run: Stage) -> Iterator[Reacher]:
     wait_for(lambda: TARGET not in run.world(), "the target to be taken away")
 
 
-def test_the_reaching_hand_alone_does_not_feel_the_target_and_only_while_it_reaches(reacher: Reacher) -> None:
+def test_the_target_does_not_repel_the_hand_while_it_reaches(reacher: Reacher) -> None:
     reacher.present()
     assert reacher.is_felt()
     reacher.tell("reaching")
@@ -79,7 +79,7 @@ def test_the_reaching_hand_alone_does_not_feel_the_target_and_only_while_it_reac
     reacher.tell("over", "right_arm", "right_palm")
 
 
-def test_where_the_target_is_is_told_in_every_tick_while_somebody_reaches_for_it(reacher: Reacher) -> None:
+def test_the_position_of_the_target_is_published_in_every_tick_of_a_reach(reacher: Reacher) -> None:
     reacher.present()
     reacher.stage.tick()
     assert reacher.targets == []
@@ -114,13 +114,13 @@ def test_a_reach_ends_with_the_controller_and_with_the_run(reacher: Reacher) -> 
     assert reacher.is_felt()
 
 
-def test_the_target_is_taken_away_when_who_presented_it_is_gone(reacher: Reacher) -> None:
+def test_the_target_is_removed_when_the_service_that_presented_it_has_ended(reacher: Reacher) -> None:
     reacher.present()
     reacher.stage.rig.drop_token("agent_left_arm", reacher.instance)
     wait_for(lambda: TARGET not in reacher.stage.world(), "the target to be taken away")
 
 
-def test_a_second_who_presents_a_target_is_told_to_wait(reacher: Reacher) -> None:
+def test_a_second_service_that_presents_a_target_is_refused(reacher: Reacher) -> None:
     reacher.present()
     with pytest.raises(CallFailed, match="agent_right_arm can after agent_left_arm has ended. A scenario can have one") as caught:
         reacher.present("agent_right_arm")

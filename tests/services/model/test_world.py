@@ -51,7 +51,7 @@ def test_what_is_perceived_is_known_until_it_was_not_seen_for_long_enough(run: S
     wait_for(lambda: [e for e in events if e.code == "expired"], "the event")
 
 
-def test_a_perceived_object_is_felt(run: Stage) -> None:
+def test_a_perceived_object_causes_contacts(run: Stage) -> None:
     palm = library().evaluate(run.rig.robot.home).position("left_palm")
     assert "ball" not in run.tick().touched.get("left_arm", [])
     run.perceive(palm.tolist())
@@ -100,7 +100,7 @@ def test_the_world_is_edited_by_calls(run: Stage) -> None:
     assert "crate" not in run.world()
 
 
-def test_edits_from_several_callers_are_felt_by_the_very_next_tick_while_ticks_go_on(run: Stage) -> None:
+def test_edits_from_several_callers_take_effect_in_the_next_tick(run: Stage) -> None:
     palm = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
     away = [-0.9, 0.0, 0.9]
 

@@ -182,7 +182,7 @@ def test_one_program_drives_the_robot_and_its_filtered_twin(client: Callable[[st
     assert mine.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=mine.epoch).gate == "idle"
 
 
-def test_a_motion_into_the_table_is_undone_and_its_client_is_told(client: Callable[[str], Client]) -> None:
+def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
     mine.arm()
     mine.go(YAW, 4.0)
@@ -213,7 +213,7 @@ def test_a_waypoint_by_call_is_where_another_modality_goes_back_to(client: Calla
     mine.until(lambda: bool(np.abs(mine.q - here).max() < NEAR), "the robot back at its waypoint")
 
 
-def test_a_robot_in_contact_that_nobody_brought_there_moves_when_somebody_answers_for_it(client: Callable[[str], Client]) -> None:
+def test_a_robot_that_starts_in_contact_moves_when_a_client_accepts_the_pose(client: Callable[[str], Client]) -> None:
     direct = client(ROBOT_ITSELF)
     direct.arm()
     direct.go(PITCH, 10.0)

@@ -57,7 +57,7 @@ def test_local_failures_say_nothing_of_other_targets():
     assert not failures.rewards(THERE).any()
 
 
-def test_a_copy_goes_its_own_way():
+def test_a_copy_is_independent():
     failures = Failures(3, 4, 0.01)
     failures.copy().add(1, 1, HERE, -10.0)
     assert not failures.rewards(HERE).any()
@@ -149,7 +149,7 @@ def test_asking_in_between_changes_nothing():
         np.testing.assert_array_equal(asked.rewards(target), taught(seen).rewards(target))
 
 
-def test_a_copy_and_its_original_go_their_own_ways():
+def test_a_copy_and_its_original_are_independent():
     seen = transitions(2, 64)  # as many as there is room for at first
     failures = taught(seen)
     before = failures.rewards(ORIGIN)

@@ -67,7 +67,7 @@ def test_averages_are_those_of_plain_loops(targets, made, target, scale, prior):
     assert histories.average(target, prior) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_copy_goes_its_own_way():
+def test_a_copy_is_independent():
     histories = Histories(2, 0.01)
     histories.add(0, ORIGIN, 0.5)
     other = histories.copy()

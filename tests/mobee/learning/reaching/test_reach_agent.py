@@ -81,7 +81,7 @@ def test_a_transition_that_does_not_climb_fails_and_the_plan_is_made_anew():
     assert reacher.plan(GOAL, 0).avoided == ((1, 2),)
 
 
-def test_who_comes_to_no_reach_ends_at_the_limit():
+def test_a_problem_try_without_a_reach_ends_at_the_limit():
     reacher = corridor(limit=2)
     reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
     made = reacher.try_problem(GOAL)
@@ -259,7 +259,7 @@ def test_a_try_left_for_another_problem_has_ended():
         ({"discount": 1.0}, InvalidValue, "discount"),
     ],
 )
-def test_what_makes_no_sense_is_refused(options, error, message):
+def test_invalid_arguments_are_refused(options, error, message):
     with pytest.raises(error, match=message):
         agent(**options).try_problem(TARGETS[0])
 

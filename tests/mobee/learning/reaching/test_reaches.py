@@ -23,7 +23,7 @@ def test_the_marker_is_where_the_model_puts_it():
         assert hands[state] == pytest.approx(Model(ROBOT).evaluate(q).position("right_palm"), abs=1e-12)
 
 
-def test_the_jacobians_tell_how_the_joints_move_the_marker():
+def test_the_jacobians_are_the_derivatives_of_the_marker_s_position():
     reaches, step, state = reaches_of(ARM, "right_palm"), 1e-6, 40
     q = np.tile(ROBOT.home, (2, 1))
     q[:, ROBOT.part("right_arm").slice] = ARM.target(state)

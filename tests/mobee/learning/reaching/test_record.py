@@ -51,7 +51,7 @@ def test_what_was_learned_of_the_model_at_the_same_time_is_made_again_too(tmp_pa
     assert loaded.model.counts.tolist() == model.counts.tolist() and model.tries.sum() > 10
 
 
-def test_which_part_has_to_be_said_where_there_are_several(tmp_path):
+def test_the_part_must_be_named_if_there_are_several(tmp_path):
     path = tmp_path / "run.sqlite"
     for part in ("left_arm", "right_arm"):
         with ReachStore(path, part) as store:

@@ -44,7 +44,7 @@ def test_random_wants_one_state_and_all_equally_often():
     assert np.sum(drawn, axis=0) == pytest.approx([100] * 4, abs=35)
 
 
-def test_greedy_wants_what_is_expected():
+def test_greedy_returns_the_expected_rewards():
     assert made("greedy").rewards(HERE, np.random.default_rng(0)).tolist() == [0.1, 0.2, 0.3, 0.4]
 
 

@@ -46,6 +46,6 @@ def test_the_target_blocks_the_share_of_tries_that_the_table_says():
     assert table.state == SPACE.goal(state, action)
 
 
-def test_one_reaches_only_for_what_is_presented():
+def test_a_reach_without_a_presented_target_is_refused():
     with pytest.raises(InvalidValue, match="present a target"):
         plant().reach(SPACE.part, "hand")

@@ -43,7 +43,7 @@ def solids(draw, kind) -> Solid:
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 @settings(max_examples=60)
 @given(data=st.data())
-def test_there_is_always_a_finite_and_shortest_way_out(first, second, data):
+def test_there_is_always_a_finite_smallest_separation(first, second, data):
     a, b = data.draw(solids(first)), data.draw(solids(second))
     way = np.array(data.draw(st.sampled_from([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.2, 0.1)])))
     # At a multiple of 0.5 of a size, faces and edges of these solids just touch.

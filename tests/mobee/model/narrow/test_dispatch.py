@@ -35,7 +35,7 @@ def pair(seed, first, second, spread=0.08):
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 @settings(max_examples=30)
 @given(seed=SEEDS)
-def test_the_way_out_just_separates(first, second, seed):
+def test_the_separation_just_separates(first, second, seed):
     a, b, _ = pair(seed, first, second)
     found = overlap(a, b)
     if found.depth > 0.0:
@@ -71,7 +71,7 @@ def test_no_direction_separates_plates_and_rods_sooner(second, seed):
     assert overlap(a, b).depth <= max(sampled_depth(a, b, rng), 0.0) + 1e-8
 
 
-def test_steps_of_newton_that_circle_about_a_way_out_are_ended():
+def test_newton_steps_that_cycle_about_a_separation_end():
     turn = [[0.91465762, 0.05816297, 0.40002313], [0.40415949, -0.14999197, -0.90230678], [0.00751942, 0.98697491, -0.16069842]]
     other = [[-0.43426384, -0.31458822, 0.84406704], [0.88412026, -0.32826686, 0.33252403], [0.1724711, 0.89065994, 0.42068824]]
     plate = solid("cylinder", [0.0036134, 0.00143178], [0.01798722, 0.01103023, 0.00796064], np.array(other))

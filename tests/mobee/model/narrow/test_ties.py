@@ -86,7 +86,7 @@ def test_faces_are_met_in_the_middle_of_what_they_share():
 
 
 @pytest.mark.parametrize("name", TIES)
-def test_a_tie_is_still_a_way_out(name):
+def test_a_tie_is_still_a_separation(name):
     a, b = TIES[name]
     found = overlap(a, b)
     assert overlap(a.moved(found.normal * (found.depth + 1e-8)), b).depth <= 0.0

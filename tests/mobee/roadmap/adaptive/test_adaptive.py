@@ -37,7 +37,7 @@ def test_the_planner_of_curious_agents_plans_on_it_and_finds_as_few_edges():
         assert len(planner.plan(start).path) == len(roadmap.plan(start, 26))
 
 
-def test_an_edge_that_failed_is_out_and_the_other_way_is_taken_at_once():
+def test_a_failed_edge_is_excluded_and_another_path_is_planned_at_once():
     roadmap = square()
     assert roadmap.plan(0, 1) == (0, 1)
     roadmap.observe(0, 0, 0)
@@ -49,7 +49,7 @@ def test_an_edge_that_failed_is_out_and_the_other_way_is_taken_at_once():
         roadmap.plan(0, 1)
 
 
-def test_what_was_seen_of_an_edge_can_count_for_the_way_back():
+def test_an_observation_can_count_for_both_directions_of_an_edge():
     roadmap = square(both_ways=True)
     roadmap.observe(0, 0, 0)
     assert roadmap.plan(1, 0) == (1, 2, 3, 0)
@@ -63,7 +63,7 @@ def test_an_edge_that_works_again_is_taken_again_in_either_mode():
     assert roadmap.plan(0, 1) == (0, 1)
 
 
-def test_reweighed_a_failure_makes_an_edge_dear_and_is_forgotten_while_others_are_observed():
+def test_with_reweigh_a_failed_edge_is_expensive_until_the_failure_is_forgotten():
     roadmap = square(mode="reweigh", forgetting=0.8)
     roadmap.observe(0, 0, 0)
     assert roadmap.plan(0, 1) == (0, 3, 2, 1)
@@ -96,7 +96,7 @@ def test_targets_are_drawn_in_proportion_to_untried_edges_among_what_can_be_reac
     assert roadmap.next_target(0, rng) is None
 
 
-def test_growing_joins_new_poses_both_ways_and_keeps_what_is_known():
+def test_growing_adds_edges_in_both_directions_and_keeps_beliefs():
     roadmap = square()
     roadmap.observe(0, 0, 0)
     new = roadmap.grow([[0.5, -0.5, 0.0]], neighbours=2)
@@ -105,7 +105,7 @@ def test_growing_joins_new_poses_both_ways_and_keeps_what_is_known():
     assert roadmap.beliefs.tried.sum() == 1 and not roadmap.beliefs.last[0, roadmap.action(0, 1)]
 
 
-def test_a_joined_way_repairs_a_vertex_without_a_way_out():
+def test_a_joined_path_repairs_a_vertex_without_usable_edges():
     roadmap = square()
     roadmap.observe(0, 0, 0)
     roadmap.observe(0, 1, 0)

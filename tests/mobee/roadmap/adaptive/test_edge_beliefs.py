@@ -18,7 +18,7 @@ def roadmap(motors=("m0", "m1")) -> Roadmap:
     return Roadmap(mobee.Model(planar_arm()), Q, Q[:, :1], EDGES, np.array([0.1]), {"motors": list(motors)})
 
 
-def test_states_are_the_poses_of_the_largest_part_and_actions_its_edges_both_ways():
+def test_states_are_the_poses_of_the_largest_part_and_actions_its_edges_in_both_directions():
     space = roadmap_space(roadmap())
     assert np.array_equal(space.samples, Q[:3, :2])  # vertex 5 is the pose of vertex 1
     assert space.goals.tolist() == [[1, -1], [0, 2], [1, -1]]

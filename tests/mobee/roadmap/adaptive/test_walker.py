@@ -51,7 +51,7 @@ def test_beside_the_map_it_goes_to_the_nearest_vertex_first():
     assert walker.go(1).edges == 0
 
 
-def test_it_gives_up_after_so_many_edges_and_where_no_way_is_left():
+def test_it_ends_after_a_number_of_edges_or_without_a_path():
     walker = Walker(square(), BlockedPlant(A, lambda q, target: False))
     assert not walker.go(2, most=1).arrived
     nowhere = Walker(square(), BlockedPlant(A, lambda q, target: np.allclose(q, A)))
@@ -59,7 +59,7 @@ def test_it_gives_up_after_so_many_edges_and_where_no_way_is_left():
         nowhere.go(2)
 
 
-def test_exploring_tells_the_edges_that_work_from_those_that_do_not():
+def test_exploring_distinguishes_free_edges_from_blocked_ones():
     roadmap = mobee.AdaptiveRoadmap(random_map(3).space)
     samples = roadmap.space.samples
 
@@ -77,7 +77,7 @@ def test_exploring_tells_the_edges_that_work_from_those_that_do_not():
             assert roadmap.feasible[state, action] != blocked(samples[state], samples[goal])
 
 
-def test_stuck_it_asks_for_a_single_way_and_joins_it_to_the_map():
+def test_when_stuck_it_queries_a_path_and_joins_it_to_the_map():
     roadmap = square()
     plant = BlockedPlant(A, lambda q, target: np.allclose(q, A) and not np.allclose(target, [0.3, 0.3, 0.0]))
     asked = []
@@ -126,7 +126,7 @@ def test_an_unknown_edge_is_refused():
         Walker(square(), BlockedPlant(A, wall(A, B))).follow(0, 2)
 
 
-def test_pushed_off_the_map_it_goes_back_the_way_it_came_until_a_vertex_holds():
+def test_pushed_off_the_map_it_retraces_its_path_until_it_reaches_a_vertex():
     state = {"blocked": False}
 
     def blocked(q, target):

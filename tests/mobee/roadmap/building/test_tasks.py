@@ -119,7 +119,7 @@ def test_what_is_no_task_space_is_refused() -> None:
             make()
 
 
-def test_unknown_names_and_what_is_no_number_are_told_with_the_robot(free: mobee.Model, icub: mobee.Robot) -> None:
+def test_unknown_names_and_values_that_are_no_numbers_are_refused(free: mobee.Model, icub: mobee.Robot) -> None:
     pose = free.evaluate(icub.home[None])
     for task in (tasks.place("right_plam", "xy", BOX), tasks.motors({"r_elbw": ONE})):
         with pytest.raises(UnknownName, match="Did you mean 'r"):

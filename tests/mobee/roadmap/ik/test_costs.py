@@ -224,7 +224,7 @@ def test_directions_have_length_one_and_nothing_stays_nothing(rng: np.random.Gen
 
 
 @pytest.mark.parametrize("given", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [1.0, np.nan, 0.0]])
-def test_what_is_not_three_finite_numbers_is_told_by_name(given: list[float]) -> None:
+def test_a_vector_that_is_not_three_finite_numbers_is_refused_by_name(given: list[float]) -> None:
     with pytest.raises(InvalidValue, match="place"):
         vector("place", given)
 

@@ -147,7 +147,7 @@ def test_what_moves_no_aim_stays_where_it_was(free: mobee.Model, icub: mobee.Rob
     np.testing.assert_array_equal(found[fingers], icub.home[fingers])
 
 
-def test_what_a_plain_function_feels_is_drawn(free: mobee.Model, icub: mobee.Robot) -> None:
+def test_motors_that_affect_a_plain_function_are_drawn(free: mobee.Model, icub: mobee.Robot) -> None:
     finger = icub.motor_index("r_pinky")
     bent = costs.term(lambda pose, contacts: np.abs(pose.q[..., finger] - 1.0), tolerance=0.3)
     soft = costs.term(lambda pose, contacts: pose.q[..., icub.motor_index("l_pinky")] ** 2, tolerance=None)

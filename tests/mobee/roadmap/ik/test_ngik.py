@@ -103,7 +103,7 @@ def test_what_cannot_be_reached_ends_with_the_nearest(free: mobee.Model) -> None
     assert ik.residuals["position right_palm"] < start
 
 
-def test_contacts_of_a_pose_that_keeps_touching_are_told(icub: mobee.Robot) -> None:
+def test_contacts_that_remain_are_reported(icub: mobee.Robot) -> None:
     world = mobee.World()
     model = mobee.Model(icub, world)
     world.add("wall", mobee.box(0.2, 0.2, 0.2), position=model.evaluate(icub.home).position("right_palm"))
@@ -130,7 +130,7 @@ def test_without_tolerances_it_goes_on_until_it_has_converged(free: mobee.Model)
     np.testing.assert_allclose(ik.q[:3], middle, atol=0.05)
 
 
-def test_equal_names_are_told_apart(free: mobee.Model) -> None:
+def test_terms_with_equal_names_get_numbers(free: mobee.Model) -> None:
     ik = mobee.solve_ik(free, [costs.home(), costs.home()], motors=["torso"], evaluations=100)
     assert list(ik.residuals) == ["home", "home 2"]
 

@@ -88,7 +88,7 @@ def test_flat_meshes_are_given_a_thickness(points: np.ndarray) -> None:
     assert ConvexHull(vertices).volume > 0
 
 
-def test_facets_look_outwards_and_close_the_hull() -> None:
+def test_facets_point_outwards_and_close_the_hull() -> None:
     vertices = convex_hull(np.random.default_rng(2).normal(size=(40, 3)))
     triangles = facets(vertices)
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -31,7 +31,7 @@ def test_a_package_is_found_from_the_urdf_upwards(mesh: Path, tmp_path: Path) ->
     assert named(mesh.parents[1], "package://meshes/m.stl") == mesh  # any folder beside the file is as good as a package
 
 
-def test_a_package_is_found_where_ros_looks_for_it(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_is_found_on_the_ros_path(mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{tmp_path / 'ws'}")
     assert named(elsewhere, "package://toy_description/meshes/m.stl") == mesh
@@ -65,6 +65,6 @@ def test_paths_may_be_relative_absolute_or_addresses(mesh: Path) -> None:
         ("..", "no mesh"),
     ],
 )
-def test_a_mesh_that_is_not_there_is_named_with_the_places_looked_at(tmp_path: Path, filename: str, message: str) -> None:
+def test_a_missing_mesh_is_named_with_the_searched_places(tmp_path: Path, filename: str, message: str) -> None:
     with pytest.raises(RobotFileError, match=message):
         named(tmp_path, filename)

@@ -98,7 +98,7 @@ def surface(shape: Shape) -> np.ndarray:
     return local @ shape.rotation.T + shape.position
 
 
-def test_a_field_reaches_as_far_as_it_is_told_to() -> None:
+def test_a_field_extends_by_the_given_distance() -> None:
     rotation = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
     place = (np.array([1.0, 2.0, 3.0]), rotation, "solid", "all")
     assert grown(Shape("s", 1, "sphere", (0.1,), *place), 0.02, "f").size == pytest.approx((0.12,))

@@ -65,7 +65,7 @@ def test_the_most_likely_parameters_are_less_surprising_than_the_usual_ones():
     assert negative_log_posterior(fitted_parameters(first, *rest), *rest)[0] < negative_log_posterior(first, *rest)[0] - 1.0
 
 
-def test_only_so_many_pairs_are_looked_at(monkeypatch):
+def test_the_fit_uses_a_limited_number_of_pairs(monkeypatch):
     made, reached = reaches(), known(drawn(reaches(), 80))
     monkeypatch.setattr(evidence, "MAX_FITTED", 10)
     few, _ = negative_log_posterior(default_parameters(made), LinearArm(made), joint_squares(made), reached, before(reached))

@@ -8,7 +8,7 @@ from mobee.learning.reaching.predictors.observed import Reached, around
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
 
-def test_the_mean_is_that_of_the_five_nearest_pairs_found_by_looking_at_all():
+def test_the_mean_is_that_of_the_five_nearest_of_all_pairs():
     made, seen = reaches(), drawn(reaches(), 80)
     nearest, known = taught(Nearest(made), seen), Reached()
     for state, target, value in seen:
