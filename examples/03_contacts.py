@@ -17,7 +17,7 @@ def show(what: str, q: np.ndarray, reaching: str | None = None) -> None:
     pose = model.evaluate(q, reaching=reaching)
     print(f"{what}: {pose.count} solid contacts, {len(pose.contacts) - pose.count} of fields")
     for contact in pose.contacts[:2]:
-        print(f"    {contact.kind} {contact.first} in {contact.second}: {1000 * contact.depth:.0f} mm, way out {contact.normal.round(2)}")
+        print(f"    {contact.kind} {contact.first} in {contact.second}: {1000 * contact.depth:.0f} mm, normal {contact.normal.round(2)}")
 
 
 print("the world:", ", ".join(f"{thing.name} ({thing.kind}, {thing.role})" for thing in world.objects.values()))

@@ -200,7 +200,7 @@ class ReachEnv(Env[Any, Any]):
 
 
 class ReachVectorEnv(VectorEnv[Any, Any, Any]):
-    """Several robots that reach, simulated together; each is a `ReachEnv` of its own, to the last bit.
+    """Several robots that reach, simulated together; the results of each are bit-equal to those of a separate `ReachEnv`.
 
     An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
 

@@ -35,7 +35,7 @@ class OutcomeModel(Protocol):
 
 
 class Tabled:
-    """An `OutcomeModel` that caches its tables as the core reads them, and makes them again when its arrays are replaced.
+    """An `OutcomeModel` that caches its tables in the form that the core reads, and builds them again after its arrays are replaced.
 
     The cache belongs to one object: a copy makes its own.
     """

@@ -32,7 +32,7 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """`RobotTables` of core/robot.cpp: S shapes in the order of C clusters, J joints, and the corners of all hulls."""
+    """The tables that core/robot.cpp reads: of S shapes in the order of C clusters, of J joints, and of the corners of all hulls."""
 
     motors: int
     own_shapes: int  # without carried objects
@@ -214,7 +214,10 @@ _CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 
 
 def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
-    """Return indices of shapes, group by group; from `own` on they are carried objects, each a group of its own."""
+    """Return the groups of shapes, each a list of indices.
+
+    A shape with an index of `own` or more is a carried object; each carried object is a separate group.
+    """
     groups = _CACHE.get(robot)  # carried objects change while the robot moves, its own groups never do
     if groups is None:
         groups = _CACHE[robot] = _own_clusters(robot, rows[:own], link[:own], field[:own])

@@ -36,7 +36,7 @@ class Neighbours:
         return self._engine.table(snapshot, numbers, reals), torque
 
     def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
-        """Use this world from now on, with a new list if it changed; return the address of the core's `Neighbours`."""
+        """Use this world in all later calls, with a new list of pairs if it changed; return the address of the core's `Neighbours`."""
         scene = self._engine.scene_of(snapshot)
         known = self._known
         if known is None or known[0] is not scene or known[1] != reaching:

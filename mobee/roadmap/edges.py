@@ -100,7 +100,7 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
 
 
 def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int, reaching: Reaching) -> tuple[Flags, int]:
-    from mobee._core.edges import sweep  # loads the core: not before somebody asks
+    from mobee._core.edges import sweep  # loads the core, so it is imported only when needed
     from mobee.model.track import Neighbours
 
     users = [Neighbours(engine_of(model.robot), SKIN) for _ in range(threads)]

@@ -250,7 +250,7 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
-    """Return the solid contacts of the pose, among q (T, n), with the deepest one; `solid`: depths (T,) m."""
+    """Return the solid contacts of the pose in q (T, n) with the deepest contact; `solid`: depth of each pose's deepest contact, (T,) m."""
     worst = int(solid.argmax())
     if not solid[worst] > 0.0:
         return ()

@@ -262,7 +262,7 @@ class Motors:
         return noisy[where]
 
     def noise(self, dt: float) -> Array:
-        """Return the standard deviations of the encoders at ticks of dt [s], (n,) [rad], or [m] of sliding motors."""
+        """Return the standard deviations of the encoders' noise for ticks of length dt [s], (n,) [rad], or [m] for motors that slide."""
         if self._noise[0] != dt:
             self._noise = dt, float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt)) * fine_units(self._robot)
         return self._noise[1]

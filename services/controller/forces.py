@@ -98,7 +98,7 @@ class PublishedContacts:
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return the contact table, and the sum of J^T (depth * normal) over the contacts of fields, (1, n)."""
-        felt, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
+        projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):
             numbers.append((0, KINDS.index(contact.kind), 2 * at, 2 * at + 1, contact.first_link, contact.second_link))
             reals.append([contact.depth, *contact.normal, *contact.point])
@@ -106,6 +106,6 @@ class PublishedContacts:
                 push, point = contact.depth * np.array(contact.normal), np.array(contact.point)
                 for link, sign in ((contact.first_link, 1.0), (contact.second_link, -1.0)):
                     if link >= 0:
-                        felt[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
+                        projection[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
         names = tuple(name for contact in self._contacts for name in (contact.first, contact.second))
-        return ContactTable(names, (), (np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7))), felt
+        return ContactTable(names, (), (np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7))), projection

@@ -78,7 +78,7 @@ class SimplexRegion:
         return len(self._origins)
 
     def add(self, corners: Array) -> Array | None:
-        """Add the simplex of corners (m + 1, m), the first its origin; return its inverse edges (m, m), or None if it is flat."""
+        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of its edges from the first corner, or None if it is flat."""
         edges = (corners[1:] - corners[0]).T
         if abs(np.linalg.det(edges)) < MIN_DETERMINANT:
             return None

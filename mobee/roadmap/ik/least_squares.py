@@ -63,7 +63,7 @@ class Descent:
 
         `goals`: numbers of the other aims for each start, one row each, see `aim_reals`; None: those of the aims in the constructor.
         """
-        from mobee._core.least_squares import descend  # loads the core: not before somebody asks
+        from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle
 
         robot = self._problem.model.robot

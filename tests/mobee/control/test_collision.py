@@ -9,7 +9,7 @@ import pytest
 from mobee.control.gains import Gains
 from mobee.model.model import Model
 from mobee.model.pose import Pose
-from tests.mobee.control.felt import forces_at
+from tests.mobee.control.posed_forces import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching, two_part_arm
 from tests.mobee.planar import planar_arm
 

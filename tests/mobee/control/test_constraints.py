@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mobee.control import Gains
 from mobee.robot.robot import Clause
-from tests.mobee.control.felt import forces_at
+from tests.mobee.control.posed_forces import forces_at
 from tests.mobee.control.two_parts import two_part_arm
 
 WIDTH, MAXIMUM = 0.2, 30.0

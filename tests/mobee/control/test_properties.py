@@ -18,7 +18,7 @@ from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from tests.mobee.control.felt import forces_at
+from tests.mobee.control.posed_forces import forces_at
 from tests.mobee.control.two_parts import touching, two_part_arm
 
 ICUB = load_robot("icub")

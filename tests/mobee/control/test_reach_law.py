@@ -34,7 +34,7 @@ def poses(robot: Robot, seed: int, count: int = 3) -> Array:
     return np.random.default_rng(seed).uniform(*robot.limits.T, size=(count, len(robot.motors)))
 
 
-def felt(controller: Controller, q: Array) -> Array:
+def constraint_force(controller: Controller, q: Array) -> Array:
     """What the reaches add to the acceleration at q, their attractor, (n,) rad/s^2."""
     total = np.zeros(len(q))
     controller.reaches.add_forces(q, q, 0.01, total)
@@ -97,7 +97,7 @@ def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> N
 def test_only_the_parts_own_motors_are_pulled(gains: Gains) -> None:
     controller = Controller(Model(ICUB), gains)
     controller.reach_toward("right_arm", "right_palm", ReachTarget((-0.3, 0.1, 0.1)))
-    added = felt(controller, ICUB.home)
+    added = constraint_force(controller, ICUB.home)
     moved = {ICUB.motors[i] for i in np.flatnonzero(added)}
     assert moved and moved <= set(ICUB.part("right_arm").motors[:7])
 
@@ -110,12 +110,12 @@ def test_parts_reach_side_by_side_as_each_alone(gains: Gains) -> None:
         alone = Controller(Model(ICUB), gains)
         for one in (alone, both):
             one.reach_toward(part, part.split("_")[0] + "_palm", target)
-        total += felt(alone, ICUB.home)
-    assert felt(both, ICUB.home) == pytest.approx(total, abs=1e-9)
+        total += constraint_force(alone, ICUB.home)
+    assert constraint_force(both, ICUB.home) == pytest.approx(total, abs=1e-9)
     both.end_reach("right_arm")
-    assert not felt(both, ICUB.home)[ICUB.part("right_arm").slice].any()
+    assert not constraint_force(both, ICUB.home)[ICUB.part("right_arm").slice].any()
     both.end_reach("left_arm")
-    assert not felt(both, ICUB.home).any()
+    assert not constraint_force(both, ICUB.home).any()
 
 
 def test_a_reach_goes_on_with_what_it_remembers_when_the_forces_of_clients_end() -> None:
@@ -128,7 +128,7 @@ def test_a_reach_goes_on_with_what_it_remembers_when_the_forces_of_clients_end()
         controller.clear()
         controller.step(ICUB.home, 0.01)
     assert not controller.is_approaching("right_arm")
-    assert felt(controller, ICUB.home).any()
+    assert constraint_force(controller, ICUB.home).any()
 
 
 def test_inside_the_surface_nothing_pulls() -> None:
@@ -136,9 +136,9 @@ def test_inside_the_surface_nothing_pulls() -> None:
     palm = model.evaluate(ICUB.home).position("right_palm")
     controller = Controller(model, PUBLISHED)
     controller.reach_toward("right_arm", "right_palm", ReachTarget(palm + 0.02, 0.1, "surface"))
-    assert not felt(controller, ICUB.home).any()
+    assert not constraint_force(controller, ICUB.home).any()
     controller.reach_toward("right_arm", "right_palm", ReachTarget(palm + 0.02, 0.01, "surface"))
-    assert felt(controller, ICUB.home).any()
+    assert constraint_force(controller, ICUB.home).any()
 
 
 def test_a_part_that_does_not_move_the_marker_cannot_reach_with_it() -> None:

@@ -5,7 +5,7 @@ What must hold, with "moved" for how far a pair's volumes have moved relative to
 - a pair's depth changes by no more than they moved, so that contacts come and go without a jump;
 - between spheres and capsules the force (depth times normal) changes by no more than that times R / (R - depth), R the sum of
   the radii: it has no jump before their cores meet;
-- with a box, whose shortest way out may switch from one face to another, by no more than twice the depth on top of it;
+- with a box, whose least separation may switch from one face to another, by no more than twice the depth on top of it;
 - so that the projection on the motors changes in a step by less than 0.03 m^2/rad without boxes, and 0.1 among them.
 """
 

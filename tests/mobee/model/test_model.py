@@ -266,7 +266,7 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
             pose = model.evaluate(STRETCHED)
             boxes = [name for name in pose.objects if name.startswith("box")]
             touched = [c.second for c in pose.contacts if c.kind == "solid"]
-            assert sorted(touched) == sorted(boxes)  # every box encloses the tip, so each is felt exactly once
+            assert sorted(touched) == sorted(boxes)  # every box encloses the tip, so each is in exactly one contact
             assert pose.count == len(boxes)
             counts.add(len(boxes))
     finally:

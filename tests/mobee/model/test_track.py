@@ -90,13 +90,13 @@ def test_the_link_that_reaches_spares_its_target_from_the_moment_it_is_named(rng
     model = mobee.Model(loaded("icub"))
     track, q = model.track(), model.robot.home
     model.world.add("ball", mobee.sphere(0.05), position=model.evaluate(q).position("left_palm"), role="target")
-    felt = []
+    touched = []
     for marker in (None, "left_palm", None):
         for _ in range(4):
             pose = track.evaluate(q, marker)
             assert same(pose, model.evaluate(q, reaching=marker))
-        felt.append(any("ball" in (c.first, c.second) and c.first_link == model.robot.marker("left_palm").link for c in pose.contacts))
-    assert felt == [True, False, True]
+        touched.append(any("ball" in (c.first, c.second) and c.first_link == model.robot.marker("left_palm").link for c in pose.contacts))
+    assert touched == [True, False, True]
 
 
 def test_a_path_given_at_once_is_its_poses_one_by_one(rng: Rng) -> None:

@@ -33,7 +33,7 @@ from mobee.reference.forces import (
 )
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Clause, Robot
-from tests.mobee.control.felt import forces_at
+from tests.mobee.control.posed_forces import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching
 from tests.mobee.planar import planar_arm
 from tests.mobee.reference.drawn import apart, drawn_gains, drawn_pose, drawn_robot

@@ -69,7 +69,7 @@ class Launched:
 
 
 def is_free(port: int) -> bool:
-    """Whether somebody could listen on that TCP port now."""
+    """Whether the TCP port is free to listen on."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -41,18 +41,18 @@ class Reacher:
         told = {"action_id": "a", "marker": marker, "object": TARGET, "end_k": bus.k, "target": self.at, "position": self.at}
         stream.put(phase=phase, q=q, missing=0.0, settled=False, touched=[], **told)
 
-    def is_felt(self) -> bool:
+    def touches_target(self) -> bool:
         """By the hand, with the fields that the palm is inside."""
         self.stage.tick()
-        felt = {contact.first for contact in self.stage.contacts[-1].contacts if contact.second == TARGET}
-        assert ("l_forearm_field" in felt) == ("l_palm_field" in felt)
-        return "l_palm_field" in felt
+        touching = {contact.first for contact in self.stage.contacts[-1].contacts if contact.second == TARGET}
+        assert ("l_forearm_field" in touching) == ("l_palm_field" in touching)
+        return "l_palm_field" in touching
 
     def hears_at(self, k: int) -> None:
         self.stage.wait_for_answer(self.targets, k)
 
-    def comes_to(self, felt: bool) -> None:
-        wait_for(lambda: self.is_felt() == felt, f"felt: {felt}")
+    def wait_for_contact(self, expected: bool) -> None:
+        wait_for(lambda: self.touches_target() == expected, f"contact: {expected}")
 
 
 @pytest.fixture
@@ -68,14 +68,14 @@ def reacher(run: Stage) -> Iterator[Reacher]:
 
 def test_the_target_does_not_repel_the_hand_while_it_reaches(reacher: Reacher) -> None:
     reacher.present()
-    assert reacher.is_felt()
+    assert reacher.touches_target()
     reacher.tell("reaching")
-    reacher.comes_to(felt=False)
+    reacher.wait_for_contact(expected=False)
     reacher.tell("returning")
-    reacher.comes_to(felt=True)
+    reacher.wait_for_contact(expected=True)
     reacher.tell("reaching", "right_arm", "right_palm")
     wait_for(lambda: reacher.targets, "the reach to be known")
-    assert reacher.is_felt()
+    assert reacher.touches_target()
     reacher.tell("over", "right_arm", "right_palm")
 
 
@@ -84,7 +84,7 @@ def test_the_position_of_the_target_is_published_in_every_tick_of_a_reach(reache
     reacher.stage.tick()
     assert reacher.targets == []
     reacher.tell("reaching")
-    reacher.comes_to(felt=False)
+    reacher.wait_for_contact(expected=False)
     k = reacher.stage.tick().re_k
     reacher.hears_at(k)
     assert reacher.targets[-1].positions == {TARGET: reacher.at}
@@ -105,13 +105,13 @@ def test_a_reach_ends_with_the_controller_and_with_the_run(reacher: Reacher) -> 
     rig.token("controller", "c1")
     reacher.present()
     reacher.tell("reaching")
-    reacher.comes_to(felt=False)
+    reacher.wait_for_contact(expected=False)
     rig.drop_token("controller", "c1")
-    reacher.comes_to(felt=True)
+    reacher.wait_for_contact(expected=True)
     reacher.tell("reaching")
-    reacher.comes_to(felt=False)
+    reacher.wait_for_contact(expected=False)
     reacher.stage.sim.new_run()
-    assert reacher.is_felt()
+    assert reacher.touches_target()
 
 
 def test_the_target_is_removed_when_the_service_that_presented_it_has_ended(reacher: Reacher) -> None:
@@ -134,4 +134,4 @@ def test_a_reach_with_an_unknown_marker_is_refused_and_counted(reacher: Reacher)
     before = reacher.stage.rig.stat("model").rejected.get("value", 0)
     reacher.tell("reaching", marker="left_plam")
     wait_for(lambda: reacher.stage.rig.stat("model").rejected.get("value", 0) == before + 1, "the refusal")
-    assert reacher.is_felt()
+    assert reacher.touches_target()

@@ -104,7 +104,7 @@ def test_edits_from_several_callers_take_effect_in_the_next_tick(run: Stage) -> 
     palm = library().evaluate(run.rig.robot.home).position("left_palm").tolist()
     away = [-0.9, 0.0, 0.9]
 
-    def is_felt(name: str) -> bool:
+    def has_contact(name: str) -> bool:
         """In the answer to the first tick that begins from now on."""
         seen, k = len(run.contacts), run.rig.bus.k
         answer = wait_for(lambda: next((c for c in run.contacts[seen:] if c.re_k > k), None), f"a tick after {k}")
@@ -113,17 +113,17 @@ def test_edits_from_several_callers_take_effect_in_the_next_tick(run: Stage) -> 
     def edit(name: str) -> bool:
         for _ in range(5):
             run.edit("add", AddObject, name=name, geometry=BALL, position=palm, quaternion=UPRIGHT, role="obstacle")
-            assert is_felt(name)
+            assert has_contact(name)
             run.edit("role", SetRole, name=name, role="ghost")
-            assert not is_felt(name)
+            assert not has_contact(name)
             run.edit("role", SetRole, name=name, role="target")
-            assert is_felt(name)
+            assert has_contact(name)
             run.edit("move", MoveObject, name=name, position=away)
-            assert not is_felt(name)
+            assert not has_contact(name)
             run.edit("move", MoveObject, name=name, position=palm)
-            assert is_felt(name)
+            assert has_contact(name)
             run.edit("remove", OneName, name=name)
-            assert not is_felt(name)
+            assert not has_contact(name)
         return True
 
     with ThreadPoolExecutor() as callers:

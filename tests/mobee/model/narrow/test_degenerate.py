@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tiny, huge, flat, touching and concentric volumes: always a number, and always a shortest way out."""
+"""Tiny, huge, flat, touching and concentric volumes: always a number, and always a least separation."""
 
 from __future__ import annotations
 

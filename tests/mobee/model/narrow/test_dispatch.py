@@ -130,7 +130,7 @@ def test_a_rigid_motion_of_both_moves_the_answer_with_them(first, second, seed):
 
 
 def sampled_gap(a, b, found) -> bool:
-    """Whether no direction well away from the normal is nearly as short a way out."""
+    """Whether no direction far from the normal separates the volumes by a motion that is nearly as short."""
     rng = np.random.default_rng(0)
     directions = rng.normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The answer follows the motion of the volumes, as far as the shortest way out does by its nature.
+"""The answer follows the motion of the volumes, as far as the least separation does by its nature.
 
 Let h be how far any point of the pair moves.  The depth never changes by more than h.  While the core of a rounded volume is
 apart from the other by d, depth * normal = (r - d) v / d, and v, the closest point of a convex set that moves by h, changes by
-at most sqrt(h (d + d')).  Deeper than that, the shortest way out jumps from one face to the next, in truth.
+at most sqrt(h (d + d')).  Deeper than that, the least separation jumps from one face to the next, in truth.
 """
 
 from __future__ import annotations

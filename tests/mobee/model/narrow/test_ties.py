@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the deepest point or the shortest way out is not unique, rounding must not choose."""
+"""Where the deepest point or the least separation is not unique, rounding must not choose."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The constraint forces at a pose whose contacts are whatever a test wants."""
+"""Constraint forces at a pose with an arbitrary projection of the contacts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mobee.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Felt:
-    """What of a `Pose` the forces are made of."""
+class PoseWithProjection:
+    """The attributes of a `Pose` that determine the forces."""
 
     robot: Robot
     q: Array  # (n,) rad
@@ -26,5 +26,5 @@ class Felt:
 
 
 def forces_at(robot: Robot, gains: Gains, q: Array, projection: Array | None = None) -> Forces:
-    """Of the compiled law; without contacts if no projection is given."""
-    return constraint_forces(Felt(robot, q, np.zeros(len(q)) if projection is None else projection), gains)
+    """Return the forces by the compiled law; without contacts if no projection is given."""
+    return constraint_forces(PoseWithProjection(robot, q, np.zeros(len(q)) if projection is None else projection), gains)
