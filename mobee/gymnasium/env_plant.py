@@ -21,9 +21,10 @@ class EnvPlant:
 
     Use:  `plant = EnvPlant(env); agent = mobee.CuriousAgent(plant.space, plant, beliefs="debiased"); agent.run(1000)`
 
-    An episode that terminates ends in a state like any other; every action there leads to the first observation of the next episode, and
-    the agent learns so.  An episode that is truncated ends without such a state: the next action raises ActionInterrupted, as on a
-    robot that was stopped, the agent measures the first state of the new episode, and nothing false is learned; `agent.run` does this.
+    The state in which an episode terminates is a state like any other: every action there leads to the first observation of the next
+    episode, and the agent learns this.  An episode that is truncated ends without such a state: the next action raises
+    ActionInterrupted, as on a robot that was stopped; then the agent measures the first state of the new episode, and learns no wrong
+    transition.  `agent.run` does this.
 
     Args:
         env: its observations and actions must be Discrete; wrap others first, for example by position.
@@ -66,11 +67,11 @@ class EnvPlant:
 
     @property
     def q(self) -> Array:
-        """The numbers of the state and of no action, shape (2,)."""
+        """The number of the state, and the number that means no action, shape (2,)."""
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the number of the state, as the position of the part's motors, shape (2,)."""
+        """Return the number of the state in the form of motor positions, shape (2,)."""
         self.robot.part(part)
         return self.q
 

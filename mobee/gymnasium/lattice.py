@@ -132,7 +132,7 @@ class LatticeEnv(Env[Any, Any]):
     """A part of a robot on a lattice; a step is a whole action: the controller moves the part until it has settled or timed out.
 
     Observation: the state, a cell of the lattice.  Action a aims at the sample of the a-th neighbour of the state, in ascending order; an
-    action that the state does not have moves nothing and takes no time, `info["action_mask"]` lists those that it has.  A contact, a
+    action that the state does not have moves nothing and takes no time; `info["action_mask"]` marks the actions that it has.  A contact, a
     cable or a limit may stop the part elsewhere: that is the outcome, and `info` holds it: `q` (n_part,) rad by the encoders, `settled`,
     `duration` in s, `touched`, names of world objects.
 
@@ -192,7 +192,7 @@ class LatticeEnv(Env[Any, Any]):
 
 
 class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
-    """Several robots on one lattice, whose actions are simulated together; each is a `LatticeEnv` of its own, to the last bit.
+    """Several robots on one lattice, whose actions are simulated together; results are bit-equal to those of separate `LatticeEnv`s.
 
     An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
 
@@ -240,7 +240,7 @@ class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
         return self._states(), infos
 
     def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Do a whole action of each robot whose episode goes on; the others begin a new episode."""
+        """Do a whole action of each robot whose episode has not ended; the others begin a new episode."""
         chosen, over = np.asarray(actions).tolist(), self._over.copy()
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
         plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`MoBeE/Reach-v0`: a hand is to reach places; actions move the attractor of an arm, which the controller keeps from collisions."""
+"""`MoBeE/Reach-v0`: reach places with a hand; actions move the attractor of an arm, and the controller prevents collisions."""
 
 from __future__ import annotations
 
@@ -131,10 +131,10 @@ def _contacts(trace: Trace) -> dict[str, float]:
 
 
 class ReachEnv(Env[Any, Any]):
-    """A hand is to reach places; the controller of MoBeE moves the arm to an attractor and keeps it from collisions on the way.
+    """The task is to reach places with a hand; the controller of MoBeE moves the arm to an attractor and prevents collisions on the way.
 
-    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  So whatever an
-    agent tries while it explores, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest
+    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  During
+    every action of the agent, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest
     contacts of the step, in m: `solid_depth`, 0 if nothing collided, and `field_depth`.  Solids are tested against the world, and in
     those pairs of links that have fields against each other.
 

@@ -52,7 +52,7 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 
 @per_robot
 def guarded(robot: Robot) -> Robot:
-    """Return the robot with those pairs of solids alone that its contact fields keep apart.
+    """Return the robot with only those pairs of solids that its contact fields keep apart.
 
     A link without fields, such as a finger, belongs to the next one towards the base that has some.  Pairs of links whose fields
     are not tested against each other, such as upper arm and pelvis of the iCub, whose hulls overlap beside the body, are left out.
@@ -87,6 +87,6 @@ class Portrait:
 
 
 def renewed(rngs: Sequence[np.random.Generator], seed: int | Sequence[int | None] | None) -> list[np.random.Generator]:
-    """Return the generators of a vector after `reset(seed=seed)`: those with a seed are new, as in environments of their own."""
+    """Return the random generators of a vector after `reset(seed=seed)`: those with a seed are new, as in separate environments."""
     seeds = [seed + number for number in range(len(rngs))] if isinstance(seed, int) else seed or [None] * len(rngs)
     return [rng if one is None else np_random(one)[0] for rng, one in zip(rngs, seeds, strict=True)]

@@ -61,8 +61,8 @@ class TableTask(Settings):
 class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo has no type information
     """Several parts of one robot act at once, as live: each begins its next action when its own part has settled.
 
-    An agent is a part.  Its observation is its own state, a cell of its lattice, its action the number of a neighbour of this state; it
-    does not observe the others.  A step begins the action of every agent whose part is at rest, then simulates until one part or
+    Each agent is a part.  Its observation is its own state, a cell of its lattice; its action is the number of a neighbour of this state.
+    It does not observe the other parts.  A step begins the action of every agent whose part is at rest, then simulates until one part or
     more have settled or timed out; so a step takes as long as the shortest of the actions under way.
 
     `infos[agent]["ready"]` says whether the agent's action has ended.  If so, the info has its outcome (`q`, `settled`, `duration`,

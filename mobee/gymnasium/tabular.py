@@ -17,8 +17,8 @@ class TabularEnv(Env[Any, Any]):
 
     Args:
         world: the tables of outcomes, probabilities and rewards; every state has all actions.
-        returning: whether to arrive in state 0 again ends the episode.
-        render_mode: None is the only one.
+        returning: whether an episode ends when the state is 0 again.
+        render_mode: only None is supported.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}

@@ -21,8 +21,8 @@ class DiscreteSpace(Space):
     """Numbered states, each with the same numbered actions, of a decision problem without a robot.
 
     It is a Space of a robot whose two motors are the number of the state and of the action, so that agents and plants of this library
-    work on it.  Where an action leads is not known in advance, so its goal, which is the outcome that a model imagines
-    before the first try, is the state itself: no change.  Plan with `beliefs="debiased"`, where this counts little.
+    work on it.  The result of an action is not known in advance, so its goal, which is the outcome that a model imagines
+    before the first try, is the state itself: no change.  Plan with `beliefs="debiased"`, on which this goal has little influence.
 
     Args:
         states: their number, at least 2.

@@ -35,7 +35,7 @@ class TabularPlant:
         space: the states and actions.
         outcomes: states reached, shape (S, A, B).
         probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state with the same goal
-            cannot be distinguished, and must have the same outcomes; those of a DiscreteSpace can.
+            cannot be distinguished, so they must have the same outcomes; the actions of a DiscreteSpace can be distinguished.
         seed: of the draws.
         start: the first state.
 
@@ -171,10 +171,11 @@ def river_swim(length: int = 6) -> TabularWorld:
 
 
 def deep_sea(depth: int = 10) -> TabularWorld:
-    """Return the triangle in which each action dives a row, to the left (0) or to the right (1) (Osband 2019).
+    """Return the triangular world in which each action moves down by one row, to the left (0) or to the right (1) (Osband 2019).
 
-    State r (r + 1) / 2 + c in row r and column c <= r; certain outcomes; from the last row one is at the top again.  Each dive to the right
-    costs 0.01 / depth; to the right in the last row's last column there is the reward 1, which one of 2^depth sequences of actions finds.
+    State r (r + 1) / 2 + c is in row r and column c <= r.  All outcomes are certain; from the last row every action leads to the top.
+    Each move to the right costs 0.01 / depth.  The reward 1 is given for a move to the right in the last column of the last row; only
+    one of 2^depth sequences of actions leads to it.
     """
     goals = []
     for row in range(depth):

@@ -137,7 +137,7 @@ def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[s
 
 
 def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
-    """Return the arrays and the notes of a file; raises MobeeError for any other file."""
+    """Return the arrays and the notes of a file that `write` wrote; raises MobeeError for a file of another kind."""
     place = Path(path)
     try:
         with place.open("rb") as raw:

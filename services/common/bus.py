@@ -166,7 +166,7 @@ class Bus:
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
 
     def guarded(self, what: str, handle: Callable[[], object]) -> None:
-        """Run a handler; a defect that a message brings to light is counted, reported and logged, and the process goes on.
+        """Run a handler; if it raises an unexpected exception, this is counted, reported and logged, and the process continues.
 
         `what`: the stream or call, for the report.  Errors of the project that a handler does not handle end the process as before.
         """

@@ -48,7 +48,7 @@ class Supervisor:
         self._check_all()
 
     def _spawn(self, child: Child) -> bool:
-        """Start a process; one that the system does not let start has failed, and the launcher goes on."""
+        """Start a process; if the operating system refuses to start it, it counts as failed, and the launcher continues."""
         try:
             child.spawn()
         except OSError as error:

@@ -57,7 +57,7 @@ class Lattice:
         return [tuple(a + b for a, b in zip(point, offset, strict=True)) for offset in self._close]
 
     def nearest(self, y: Array) -> Ints:
-        """Return the approximately nearest lattice points in the box to task coordinates (N, m), (N, m)."""
+        """Return the lattice points in the box that are approximately nearest to task coordinates (N, m); they have the same shape."""
         scaled = np.clip((y - self._origin) / self._spacing, -self._width, self._width)
         edges = 0.5 * scaled @ np.linalg.inv(self._edges)
         whole, inward = (2 * rounded.astype(np.intp)[:, None] for rounded in (np.rint(edges), np.trunc(edges)))

@@ -105,7 +105,7 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <marker>; its normal is +x, or z of its rotation; without a rotation, it gets the smallest one that turns z to the normal."""
+    """Add a <marker>.  The default normal is the z axis of its rotation, or +x; the default rotation turns z to the normal."""
     name = node.text("name")
     if name in draft.markers:
         node.fail("name", f"a second marker {name!r}", "Rename one of the two")
