@@ -84,7 +84,7 @@ class Reach(ctypes.Structure):
 
 
 class Calls:
-    """The functions of these source files."""
+    """The compiled functions of core/law.cpp and core/reach.cpp."""
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)

@@ -73,7 +73,7 @@ STRUCTURES = (
 
 
 class Calls:
-    """The functions of these source files."""
+    """The compiled functions that the plant calls."""
 
     def __init__(self) -> None:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER)

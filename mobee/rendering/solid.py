@@ -69,7 +69,7 @@ def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, grou
 
 
 def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 0.0, group: int = 0) -> list[Solid]:
-    """Return a round line through points (P, 3) m, with a colour for each of its P - 1 pieces."""
+    """Return a tube along the line through points (P, 3) m, with a colour for each of the P - 1 pieces."""
     pieces = []
     for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
         length = float(np.linalg.norm(end - start))
