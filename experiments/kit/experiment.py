@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
 from mobee.errors import UnknownName
 
 Verdict = Literal["confirmed", "refuted", "open"]
+Measured = tuple[str, bool | None]
+"""Our number with its interval as text, and whether the claim holds; None: the measurement does not decide it."""
+Rule = Callable[[Any], Measured | None]
+"""Computes `Measured` from the runs of an experiment, in the form in which the experiment groups them; None: they are too few."""
 MIN_SEEDS = 5  # for a verdict: a bootstrap interval of fewer values is too narrow
 
 
@@ -19,8 +23,9 @@ MIN_SEEDS = 5  # for a verdict: a bootstrap interval of fewer values is too narr
 class Claim:
     """A row of the table of claims.
 
-    An experiment lists its claims as CLAIMS = (Claim(source, text, published), ...), and returns them measured, as dicts, under
-    "claims" in its results.  `source`: where it was published, as "thesis 7.2.1, fig. 7.5".  `ours`: our number with its interval.
+    An experiment lists its claims as CLAIMS, and returns them measured, as dicts, under "claims" in its results; see `judged`.
+    `source`: where it was published, as "thesis 7.2.1, fig. 7.5".  `ours`: our number with its interval.  `rule`: how the experiment
+    measures and judges it, a function of its own below the decorator `claim`, or one of experiments.kit.rules.
     """
 
     source: str
@@ -28,6 +33,7 @@ class Claim:
     published: str
     ours: str = ""
     verdict: Verdict = "open"
+    rule: Rule | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -38,8 +44,23 @@ class Claim:
         return replace(self, ours=ours, verdict="open" if holds is None else "confirmed" if holds else "refuted")
 
     def record(self) -> dict[str, str]:
-        """Return the claim as a dict for JSON."""
-        return asdict(self)
+        """Return the claim as a dict for JSON, without its rule."""
+        return {name: getattr(self, name) for name in ("source", "text", "published", "ours", "verdict")}
+
+
+def claim(source: str, text: str, published: str) -> Callable[[Rule], Claim]:
+    """Return a decorator that makes a rule the claim that it measures."""
+    return lambda rule: Claim(source, text, published, rule=rule)
+
+
+def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, str]]:
+    """Return the claims as dicts, measured by their rules from the runs; none is measured unless the runs are `complete`."""
+    return [(_by_rule(claim, runs) if complete else claim).record() for claim in claims]
+
+
+def _by_rule(claim: Claim, runs: Any) -> Claim:
+    measured = claim.rule(runs) if claim.rule else None
+    return claim.measured(*measured) if measured else claim
 
 
 def open_with_few_seeds(results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:

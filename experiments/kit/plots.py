@@ -29,6 +29,20 @@ def new_figure(width: float, height: float) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
+    """Set labels, limits and scales (as `axes.set`), draw a faint grid, and a legend if it has a font size."""
+    axes.set(**settings)
+    axes.grid(alpha=0.2)
+    if legend:
+        axes.legend(fontsize=legend)
+
+
+def ticks_at(axes: Any, places: Sequence[float], labels: Sequence[str] | None = None) -> None:
+    """Mark only these places on the x axis, by default with their numbers."""
+    axes.set_xticks(places, [f"{place:g}" for place in places] if labels is None else labels)
+    axes.minorticks_off()
+
+
 def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
     """Draw the means of the runs (N, L) at L places as a line, and their intervals as a band."""
     means, low, high = _of(list(runs.T))

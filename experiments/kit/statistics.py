@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Means of few runs with their uncertainty, and rules that decide a claim by them.
+"""Means of few runs with their uncertainty.
 
 Interquartile means and stratified bootstrap intervals as in Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice".
-A verdict is True, False, or None where the numbers leave the claim open.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.kit.experiment import Claim
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 
@@ -98,14 +96,6 @@ def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
-    """Return True for an interval (low, high) within the bounds, False for one outside, None for one that contains a bound."""
-    low, high = span
-    if low >= least and high <= most:
-        return True
-    return False if high < least or low > most else None
-
-
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
     """Return the probability that a run of the first group is above one of the second; ties count half (Mann-Whitney U / nm)."""
     return float(_improvements(_checked(first), _checked(second)))
@@ -148,52 +138,3 @@ def _checked(values: ArrayLike) -> Array:
     if given.ndim != 1 or not len(given) or not np.isfinite(given).all():
         raise InvalidValue(f"values {given.tolist()}: give one or more finite numbers, shape (n,).")
     return given
-
-
-ABOUT_EQUAL = (0.9, 1.1)
-Verdicts = list[bool | None]
-
-
-def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
-    """Combine verdicts: False if one is False, else None if one is open, else True."""
-    given = list(verdicts)
-    return False if False in given else None if None in given else True
-
-
-def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> tuple[str, Verdicts]:
-    """Compare the runs of one group with those of each rival; return a text, and a verdict for each rival.
-
-    The verdict is True if the group is above the rival (or, with `worse`, below it): the interval of the probability of improvement
-    lies above one half.  It is False if that lies below, or if the interval of the ratio lies within a tenth of 1.
-    """
-    parts, verdicts = [f"{name} {estimate(values[name], digits)}"], Verdicts()
-    for rival in rivals:
-        first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
-        chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
-        parts.append(f"{rival} {estimate(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
-        verdicts.append(True if low > 0.5 else False if high < 0.5 or _about_equal(first, second) else None)
-    return ", ".join(parts), verdicts
-
-
-def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
-    """Return whether the interval of the ratio lies within a tenth of 1; False if a value is not above 0."""
-    if min(np.min(first), np.min(second)) <= 0.0:
-        return False
-    return decides(ratio_interval(first, second), *ABOUT_EQUAL) is True
-
-
-def rises(change: ArrayLike) -> bool | None:
-    """Return whether the change of the runs is above 0; None if its interval contains 0."""
-    low, high = interval(change)
-    return True if low > 0.0 else False if high < 0.0 else None
-
-
-def changes(before: Array, after: Array) -> str:
-    """Return the means before and after and the mean change of a run as text."""
-    return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"
-
-
-def published_ratio(claim: Claim, above: ArrayLike, below: ArrayLike, bounds: tuple[float, float], note: str = "") -> Claim:
-    """Return the claim with the measured ratio of two groups of runs; it holds if the ratio lies within the bounds."""
-    low, high = span = ratio_interval(above, below)
-    return claim.measured(f"{ratio(above, below):.2f} [{low:.2f}, {high:.2f}]{note}", decides(span, *bounds))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from experiments.kit.cells import Cell, CellResult, Work, cell_path, load_cells, write_cell
 from experiments.kit.command_line import Progress, positive_whole
@@ -44,6 +44,7 @@ class Condition(NamedTuple):
 
 Trial = Callable[[dict[str, Any], int], dict[str, Any]]
 Cells = Mapping[str, CellResult]
+Run = TypeVar("Run")
 
 
 def grid(**settings: Sequence[Any]) -> list[Condition]:
@@ -121,11 +122,16 @@ def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[
     return {value: values for value, values in groups.items() if values}
 
 
-def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[CellResult]]:
-    """Group the finished cells by the values of several settings; each group is sorted by seed."""
-    groups: dict[tuple[Any, ...], list[CellResult]] = {}
+def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[dict[str, Any]]]:
+    """Group the values of the finished cells by the values of several settings; each group is sorted by seed."""
+    return runs_by(found, lambda result: result.values, *settings)
+
+
+def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> dict[tuple[Any, ...], list[Run]]:
+    """Group what `of` returns for each finished cell, as `grouped_by` does."""
+    groups: dict[tuple[Any, ...], list[Run]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
-        groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(result)
+        groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(of(result))
     return groups
 
 

@@ -23,7 +23,8 @@ from experiments.bench.nes import FUNCTIONS, MAX_EVALUATIONS, STRATEGIES, search
 from experiments.bench.peers import load_cma
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import draw_curve, new_figure
-from experiments.kit.statistics import decides, estimate, interval, ratio, ratio_interval
+from experiments.kit.rules import decides
+from experiments.kit.statistics import estimate, interval, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array
 

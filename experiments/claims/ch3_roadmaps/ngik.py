@@ -26,7 +26,8 @@ from experiments.bench.ik import MAX_EVALUATIONS, MOTORS, Solve, library, rival,
 from experiments.bench.peers import load_cma
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, estimate, ratio, ratio_interval
+from experiments.kit.rules import decides
+from experiments.kit.statistics import estimate, ratio, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
 from mobee.arrays import Array

@@ -17,7 +17,7 @@ reward above a bound: with 0.8 the action with most outcomes keeps the highest r
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import product
@@ -27,13 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.kit.cells import CellResult
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space, robot
 from experiments.kit.learning.exploration import explore
 from experiments.kit.learning.truth import Truth, l1, truth_of, walk
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import estimate, interval, mean_over
-from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
+from experiments.kit.rules import of_each, row, texts
+from experiments.kit.statistics import estimate, interval
+from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, Gains, Model, MotorParameters, OfflinePlant, World, sphere
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
@@ -53,28 +54,6 @@ TIMEOUT = 8.0  # s, of an action with friction: the controller continues to driv
 TRIES, WALK = 4, 9001  # tries of each action in a walk; its seed, which no run has
 MAX_WALK = 3_000  # actions of a walk where not every state can be reached any more
 DIFFERENT, SAME = 1.0, 0.2  # L1 distance between an action's outcomes before and after, from which or up to which it counts as such
-
-VALUE = Claim(
-    "thesis 7.2.6",
-    "the value of actions whose outcome suddenly changes shoots up: highest value soon after over the value before",
-    "shot up",
-)
-TRIED = Claim(
-    "thesis 7.2.6",
-    f"the curious agent tries actions with changed outcomes more often: tries over the mean of all in the next {WINDOW} transitions",
-    "a few times",
-)
-CORRECTED = Claim(
-    "thesis 7.2.6",
-    "the curious agent corrects its model of changed outcomes: L1 error at the end over that at the change",
-    "qualitative",
-)
-_UNTIL = "transitions until the error of changed outcomes is halved"
-SOONER = Claim("aim of this reproduction", f"a curious agent that forgets old counts (factor 0.95) relearns sooner: {_UNTIL}", "sooner")
-FORGETTER = Claim(
-    "aim of this reproduction", f"a least-tried agent that forgets old counts (factor 0.8) relearns sooner: {_UNTIL}", "sooner"
-)
-CLAIMS = (VALUE, TRIED, CORRECTED, SOONER, FORGETTER)
 
 
 def plant_of(change: str, is_after: bool, seed: int) -> OfflinePlant:
@@ -226,17 +205,28 @@ class Run:
 
 
 Runs = Mapping[tuple[str, str, float], list[Run]]  # by change, explorer and forgetting
+Number = Callable[[Run], float]
 
 
 def runs_of(found: Cells) -> Runs:
     """Return the finished runs of each condition."""
-    return {key: [_run(result) for result in results] for key, results in grouped_by(found, "change", "explorer", "forgetting").items()}
+
+    def of(result: CellResult) -> Run:
+        values = result.values
+        changed, same = (values[name].astype(bool) for name in ("changed", "same"))
+        return Run(values["seen"].astype(np.intp), values["series"], values["at_change"], changed, same)
+
+    return runs_by(found, of, "change", "explorer", "forgetting")
 
 
-def _run(result: CellResult) -> Run:
-    values = result.values
-    changed, same = (values[name].astype(bool) for name in ("changed", "same"))
-    return Run(values["seen"].astype(np.intp), values["series"], values["at_change"], changed, same)
+COLUMNS: dict[str, Number] = {
+    "number_of_changed_actions": lambda run: float(run.changed.sum()),
+    "relative_tries_before": lambda run: run.tries_before,
+    "relative_tries_after": lambda run: run.tries_after,
+    "value_after_over_before": lambda run: run.value_jump,
+    "relative_error_at_end": lambda run: run.error_left,
+    "transitions_until_error_is_halved": lambda run: run.relearned_within,
+}
 
 
 def findings(found: Cells) -> dict[str, Any]:
@@ -244,68 +234,84 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]
     whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * TRANSITIONS // CHECK_PERIOD
-    rows = {
-        f"{CHANGES[change]}; {_agent(explorer, forgetting)}": _row(runs[change, explorer, forgetting])
-        for change, explorer, forgetting in keys
-        if (change, explorer, forgetting) in runs
-    }
-    return {"agents": rows, "claims": [claim.record() for claim in (measured(runs) if whole else CLAIMS)]}
+    rows = {f"{CHANGES[key[0]]}; {_agent(*key[1:])}": row(runs[key], COLUMNS) for key in keys if key in runs}
+    return {"agents": rows, "claims": judged(CLAIMS, runs, whole)}
 
 
-def _row(runs: Sequence[Run]) -> dict[str, float]:
-    return {
-        "seeds": len(runs),
-        "number_of_changed_actions": mean_over(runs, lambda run: float(run.changed.sum())),
-        "relative_tries_before": mean_over(runs, lambda run: run.tries_before),
-        "relative_tries_after": mean_over(runs, lambda run: run.tries_after),
-        "value_after_over_before": mean_over(runs, lambda run: run.value_jump),
-        "relative_error_at_end": mean_over(runs, lambda run: run.error_left),
-        "transitions_until_error_is_halved": mean_over(runs, lambda run: run.relearned_within),
-    }
+def _above(number: Number, control: Number, rival: str, text: str) -> Rule:
+    """Return the rule that a number of the curious agent is above 1, and above the rival's control, with both changes."""
+
+    def of_runs(runs: Runs) -> Measured:
+        parts, holds = [], True
+        for change in CHANGES:
+            here, there = [number(run) for run in runs[change, "curious", 1.0]], [control(run) for run in runs[change, rival, 1.0]]
+            parts.append(text.format(CHANGES[change], estimate(here), estimate(there)))
+            holds = holds and interval(here)[0] > max(1.0, interval(there)[1])
+        return "; ".join(parts), holds
+
+    return of_runs
 
 
-def measured(runs: Runs) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all conditions."""
-    curious, least = ({change: runs[change, explorer, 1.0] for change in CHANGES} for explorer in ("curious", "least_tried"))
-    left = {change: [run.error_left for run in group] for change, group in curious.items()}
-    text = ", ".join(f"{CHANGES[change]}: {estimate(errors)}" for change, errors in left.items())
-    return [
-        _above(VALUE, curious, curious, lambda run: run.value_jump, lambda run: run.value_jump_before, "{}: {}, without a change {}"),
-        _above(TRIED, curious, least, lambda run: run.tries_after, lambda run: run.tries_after, "{}: curious {}, least tried {}"),
-        CORRECTED.measured(text, all(interval(errors)[1] <= RELEARNED for errors in left.values())),
-        _sooner(SOONER, runs, "curious", 0.95),
-        _sooner(FORGETTER, runs, "least_tried", 0.8),
-    ]
+def _sooner(explorer: str, forgetting: float) -> Rule:
+    """Return the rule that an agent that forgets relearns sooner than one that does not, with both changes."""
+
+    def of_runs(runs: Runs) -> Measured:
+        parts, holds = [], True
+        for change in CHANGES:
+            groups = [runs[change, explorer, factor] for factor in (forgetting, 1.0)]
+            values = [[run.relearned_within for run in group] for group in groups]
+            never = [sum(np.isinf(run.relearned) for run in group) for group in groups]
+            with_, without = (f"{estimate(group, 0)} ({count} runs not relearned)" for group, count in zip(values, never, strict=True))
+            parts.append(f"{CHANGES[change]}: {with_}, without forgetting {without}")
+            holds = holds and interval(values[0])[1] < interval(values[1])[0]
+        return "; ".join(parts), holds
+
+    return of_runs
 
 
-ByChange = Mapping[str, list[Run]]
-Number = Callable[[Run], float]
+value = Claim(
+    "thesis 7.2.6",
+    "the value of actions whose outcome suddenly changes shoots up: highest value soon after over the value before",
+    "shot up",
+    rule=_above(lambda run: run.value_jump, lambda run: run.value_jump_before, "curious", "{}: {}, without a change {}"),
+)
+tried = Claim(
+    "thesis 7.2.6",
+    f"the curious agent tries actions with changed outcomes more often: tries over the mean of all in the next {WINDOW} transitions",
+    "a few times",
+    rule=_above(lambda run: run.tries_after, lambda run: run.tries_after, "least_tried", "{}: curious {}, least tried {}"),
+)
 
 
-def _above(claim: Claim, ours: ByChange, theirs: ByChange, number: Number, control: Number, text: str) -> Claim:
-    """Judge whether a number of our runs is above 1 and above the control in theirs, by the intervals, with both changes."""
-    parts, holds = [], True
-    for change in CHANGES:
-        here, there = [number(run) for run in ours[change]], [control(run) for run in theirs[change]]
-        parts.append(text.format(CHANGES[change], estimate(here), estimate(there)))
-        holds = holds and interval(here)[0] > max(1.0, interval(there)[1])
-    return claim.measured("; ".join(parts), holds)
+@claim(
+    "thesis 7.2.6",
+    "the curious agent corrects its model of changed outcomes: L1 error at the end over that at the change",
+    "qualitative",
+)
+def corrected(runs: Runs) -> Measured:
+    left = of_each({name: runs[change, "curious", 1.0] for change, name in CHANGES.items()}, lambda run: run.error_left)
+    return texts(left, form="{}: {}"), all(interval(errors)[1] <= RELEARNED for errors in left.values())
 
 
-def _sooner(claim: Claim, runs: Runs, explorer: str, forgetting: float) -> Claim:
-    parts, holds = [], True
-    for change in CHANGES:
-        forgot, kept = runs[change, explorer, forgetting], runs[change, explorer, 1.0]
-        values = [[run.relearned_within for run in group] for group in (forgot, kept)]
-        never = [sum(np.isinf(run.relearned) for run in group) for group in (forgot, kept)]
-        with_, without = (f"{estimate(group, 0)} ({count} runs not relearned)" for group, count in zip(values, never, strict=True))
-        parts.append(f"{CHANGES[change]}: {with_}, without forgetting {without}")
-        holds = holds and interval(values[0])[1] < interval(values[1])[0]
-    return claim.measured("; ".join(parts), holds)
+CLAIMS = (
+    value,
+    tried,
+    corrected,
+    *(
+        Claim(
+            "aim of this reproduction",
+            f"a {agent} agent that forgets old counts (factor {factor:g}) relearns sooner: "
+            "transitions until the error of changed outcomes is halved",
+            "sooner",
+            rule=_sooner(agent.replace("-", "_"), factor),
+        )
+        for agent, factor in (("curious", 0.95), ("least-tried", 0.8))
+    ),
+)
 
 
 STYLES = dict(zip(AGENTS, (("C3", "-"), ("C1", "--"), ("C3", ":"), ("C0", "-"), ("C0", ":")), strict=True))
-COLUMNS = ("relative tries of changed actions", "value of changed actions [nats]", "L1 error of changed actions")
+TITLES = ("relative tries of changed actions", "value of changed actions [nats]", "L1 error of changed actions")
 
 
 def _agent(explorer: str, forgetting: float) -> str:
@@ -317,23 +323,23 @@ def plot(found: Cells) -> Any:
     runs = runs_of(found)
     changes = [change for change in CHANGES if any(key[0] == change for key in runs)]
     drawing = new_figure(16.0, 4.0 * len(changes))
-    for row, change in zip(drawing.subplots(len(changes), 3, squeeze=False), changes, strict=True):
+    for panels, change in zip(drawing.subplots(len(changes), 3, squeeze=False), changes, strict=True):
         for (explorer, forgetting), style in STYLES.items():
             if group := runs.get((change, explorer, forgetting)):
-                _curves(row, group, style, _agent(explorer, forgetting))
+                _curves(panels, group, style, _agent(explorer, forgetting))
         before = next(group[0].checks_before for key, group in runs.items() if key[0] == change)
-        for axes, title in zip(row, COLUMNS, strict=True):
+        for axes, title in zip(panels, TITLES, strict=True):
             axes.axvline(CHECK_PERIOD * before, color="k", linewidth=0.6)
             axes.set_title(f"{CHANGES[change]}: {title}", fontsize=9)
             axes.set(xlabel="transitions", ylim=(0.0, None))
-        row[0].legend(fontsize=7)
+        panels[0].legend(fontsize=7)
     return drawing
 
 
-def _curves(row: Any, runs: list[Run], style: tuple[str, str], label: str) -> None:
+def _curves(panels: Any, runs: list[Run], style: tuple[str, str], label: str) -> None:
     tries = np.mean([_smooth(run.tries) for run in runs], axis=0)
     errors, values = (np.mean([run.series[:, column] for run in runs], axis=0) for column in (0, 2))
-    for axes, curve in zip(row, (tries, values, errors), strict=True):
+    for axes, curve in zip(panels, (tries, values, errors), strict=True):
         axes.plot(CHECK_PERIOD * (np.arange(len(curve)) + 1), curve, style[1], color=style[0], label=label, linewidth=1.0)
 
 

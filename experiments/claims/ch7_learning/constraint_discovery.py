@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -24,22 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.cells import CellResult
+from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import exists_in, failures_of, uncertain_in, visits_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
-from experiments.kit.statistics import (
-    decides,
-    estimate,
-    interquartile_mean,
-    interval,
-    mean_over,
-    ratio_estimate,
-    ratio_interval,
-    relative_spread,
-)
-from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
+from experiments.kit.rules import decides, of_each, row, texts
+from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, ratio_interval, relative_spread
+from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, Lattice
 from mobee.arrays import Array, Ints
 
@@ -52,49 +45,6 @@ TOLERANCE = 0.1  # of a published number of actions
 HARD = (24, 51, 78)  # the thesis' states that are hard to enter: pitch low, roll and yaw high, any elbow
 FAILING = ((15, 24), (42, 51), (69, 78))  # (source, goal), in red in fig. 7.4
 ENTERING = ((21, 24), (48, 51), (75, 78))  # actions into the same states that succeed
-
-NUMBERS = {
-    initial: Claim(
-        f"thesis 7.2.2, fig. {figure}",
-        f"prior {initial}: number of actions until every state-action was tried 5 times, within 10 %",
-        f"{actions}",
-    )
-    for (initial, actions), figure in zip(PUBLISHED.items(), ("7.6", "7.7"), strict=True)
-}
-SOONER = Claim(
-    "thesis 7.2.2, figs. 7.6, 7.7",
-    "with the prior 60-40 fewer actions are needed until each was tried 5 times than with 50-50: their ratio",
-    "0.89 (2651 / 2987)",
-)
-LEAST_VISITED = Claim("thesis 7.2.5", "the least visited of the 81 states are 24, 51 and 78", "those three")
-FAIL = Claim(
-    "thesis 7.2.5, fig. 7.4", "the actions 15->24, 42->51 and 69->78 (from state -> to state) fail: share of failures", "infeasible"
-)
-ENTER = Claim("thesis 7.2.5", "other actions into the states 24, 51 and 78 succeed: share of failures", "succeed")
-SPIKES = Claim(
-    "thesis 7.2.5, fig. 7.6",
-    "prior 50-50: the actions that succeed in entering 24, 51 and 78 are tried more often than the average action, and more so with a "
-    "larger discount",
-    "spikes",
-)
-DIPS = Claim(
-    "thesis 7.2.5, fig. 7.6",
-    "prior 50-50: actions from 24, 51 and 78 are tried less often than the average action, and less so with a larger discount",
-    "dips",
-)
-PEAKS = Claim(
-    "thesis 7.2.5, fig. 7.7",
-    "prior 60-40: the failing actions into 24, 51 and 78 are tried more often than the average action, at every discount",
-    "peaks at 80, 230, 378",
-)
-DEGREE = Claim(
-    "thesis 7.2.3", "states into which more actions lead are visited more often: correlation of visits and number of actions", "qualitative"
-)
-UNIFORM = Claim("thesis 7.2.4", "tries of state-actions are fairly uniform, more so than visits of states", "qualitative")
-STOCHASTIC = Claim(
-    "thesis 7.2.5", "static constraints make outcomes uncertain: some actions sometimes fail and sometimes succeed", "qualitative"
-)
-CLAIMS = (*NUMBERS.values(), SOONER, LEAST_VISITED, FAIL, ENTER, SPIKES, DIPS, PEAKS, DEGREE, UNIFORM, STOCHASTIC)
 
 Action = tuple[int, int]  # source and goal state
 
@@ -179,140 +129,180 @@ Groups = Mapping[tuple[str, float], list[Run]]  # by prior and discount
 
 def groups(found: Cells) -> Groups:
     """Return the runs of each setting, by seed."""
-    space = arm_space()
-    return {
-        key: [Run(space, *(result.values[name] for name in ("seen", "tries", "values"))) for result in results]
-        for key, results in sorted(grouped_by(found, "initial", "discount").items())
-    }
+
+    def of(result: CellResult) -> Run:
+        return Run(arm_space(), *(result.values[name] for name in ("seen", "tries", "values")))
+
+    return dict(sorted(runs_by(found, of, "initial", "discount").items()))
+
+
+COLUMNS: dict[str, Callable[[Run], float]] = {
+    "relative_visits_of_24_51_78": lambda run: run.hard_visits,
+    "relative_tries_from_24_51_78": lambda run: run.relative_tries(run.out_of_hard),
+    "relative_tries_of_failing_actions": lambda run: run.relative_tries(FAILING),
+    "relative_tries_of_entering_actions": lambda run: run.relative_tries(ENTERING),
+    "failing_actions_fail": lambda run: run.share_failed(FAILING),
+    "entering_actions_fail": lambda run: run.share_failed(ENTERING),
+    "mean_value": lambda run: float(run.values[run.exists].mean()),
+}
 
 
 def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each setting, and the claims if all settings were run."""
-    grouped = groups(found)
-    rows = {f"{initial}, discount {discount:g}": _row(runs) for (initial, discount), runs in grouped.items()}
-    complete = all(setting in grouped for setting in product(INITIAL, DISCOUNTS))
-    return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
+    grouped, rows = groups(found), {}
+    for (initial, discount), runs in grouped.items():
+        actions = [run.transitions for run in runs]
+        low, high = interval(actions)
+        made = {"seeds": len(runs), "actions": interquartile_mean(actions), "low": low, "high": high}
+        rows[f"{initial}, discount {discount:g}"] = made | row(runs, COLUMNS)
+    return {"runs": rows, "claims": judged(CLAIMS, grouped, set(product(INITIAL, DISCOUNTS)) <= set(grouped))}
 
 
-def _row(runs: list[Run]) -> dict[str, Any]:
-    low, high = interval([run.transitions for run in runs])
-    return {
-        "seeds": len(runs),
-        "actions": mean_over(runs, lambda run: run.transitions),
-        "low": low,
-        "high": high,
-        "relative_visits_of_24_51_78": mean_over(runs, lambda run: run.hard_visits),
-        "relative_tries_from_24_51_78": mean_over(runs, lambda run: run.relative_tries(run.out_of_hard)),
-        "relative_tries_of_failing_actions": mean_over(runs, lambda run: run.relative_tries(FAILING)),
-        "relative_tries_of_entering_actions": mean_over(runs, lambda run: run.relative_tries(ENTERING)),
-        "failing_actions_fail": mean_over(runs, lambda run: run.share_failed(FAILING)),
-        "entering_actions_fail": mean_over(runs, lambda run: run.share_failed(ENTERING)),
-        "mean_value": mean_over(runs, lambda run: float(run.values[run.exists].mean())),
-    }
+def _with_prior(grouped: Groups, initial: str, number: Callable[[Run], float]) -> dict[float, list[float]]:
+    """Return a number of the runs with a prior, by discount."""
+    return of_each({discount: grouped[initial, discount] for discount in DISCOUNTS}, number)
 
 
-def measured(grouped: Groups) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all settings."""
-    every = [run for runs in grouped.values() for run in runs]
-    return [
-        *(_number(grouped, initial) for initial in INITIAL),
-        SOONER.measured(*_sooner(_actions(grouped, "60-40"), _actions(grouped, "50-50"))),
-        _least_visited(every),
-        _share(FAIL, every, FAILING, lambda low, high: low > 0.5),
-        _share(ENTER, every, ENTERING, lambda low, high: high < 0.1),
-        _by_discount(SPIKES, grouped, lambda run: run.relative_tries(ENTERING), lambda low, high: low > 1.0),
-        _by_discount(DIPS, grouped, lambda run: run.relative_tries(run.out_of_hard), lambda low, high: high < 1.0),
-        _peaks(grouped),
-        _degree(every),
-        _uniform(every),
-        _stochastic(every),
-    ]
+def _every(grouped: Groups) -> list[Run]:
+    return [run for runs in grouped.values() for run in runs]
 
 
-def _actions(grouped: Groups, initial: str) -> list[float]:
-    return [run.transitions for discount in DISCOUNTS for run in grouped[initial, discount]]
-
-
-def _by_discounts(values: Mapping[float, list[float]], digits: int = 2) -> list[str]:
-    return [f"{estimate(numbers, digits)} at discount {discount:g}" for discount, numbers in values.items()]
-
-
-def _number(grouped: Groups, initial: str) -> Claim:
-    actions = {discount: [run.transitions for run in grouped[initial, discount]] for discount in DISCOUNTS}
+def _number(initial: str, grouped: Groups) -> Measured:
+    actions = _with_prior(grouped, initial, lambda run: run.transitions)
     strata = [discount for discount, counts in actions.items() for _ in counts]
-    span = interval(_actions(grouped, initial), strata=strata)
-    least, most = PUBLISHED[initial] * (1.0 - TOLERANCE), PUBLISHED[initial] * (1.0 + TOLERANCE)
-    return NUMBERS[initial].measured("; ".join(_by_discounts(actions, 0)), decides(span, least, most))
+    span = interval(sum(actions.values(), []), strata=strata)
+    text = "; ".join(f"{estimate(counts, 0)} at discount {discount:g}" for discount, counts in actions.items())
+    return text, decides(span, PUBLISHED[initial] * (1.0 - TOLERANCE), PUBLISHED[initial] * (1.0 + TOLERANCE))
 
 
-def _sooner(optimistic: list[float], even: list[float]) -> tuple[str, bool]:
+numbers = [
+    Claim(
+        f"thesis 7.2.2, fig. {figure}",
+        f"prior {initial}: number of actions until every state-action was tried 5 times, within 10 %",
+        f"{actions}",
+        rule=partial(_number, initial),
+    )
+    for (initial, actions), figure in zip(PUBLISHED.items(), ("7.6", "7.7"), strict=True)
+]
+
+
+@claim(
+    "thesis 7.2.2, figs. 7.6, 7.7",
+    "with the prior 60-40 fewer actions are needed until each was tried 5 times than with 50-50: their ratio",
+    "0.89 (2651 / 2987)",
+)
+def sooner(grouped: Groups) -> Measured:
+    optimistic, even = (sum(_with_prior(grouped, prior, lambda run: run.transitions).values(), []) for prior in ("60-40", "50-50"))
     return ratio_estimate(optimistic, even), ratio_interval(optimistic, even)[1] < 1.0
 
 
-def _least_visited(every: list[Run]) -> Claim:
+@claim("thesis 7.2.5", "the least visited of the 81 states are 24, 51 and 78", "those three")
+def least_visited(grouped: Groups) -> Measured:
+    every = _every(grouped)
     hits = [len(set(np.argsort(run.visits, kind="stable")[:3].tolist()) & set(HARD)) for run in every]
     together = np.argsort(sum(run.visits for run in every), kind="stable")[:3].tolist()
     text = (
         f"{', '.join(map(str, sorted(together)))} in all runs together, {np.mean(hits):.1f} of the three in a single run; "
         f"their visits over the mean of all states: {estimate([run.hard_visits for run in every])}"
     )
-    return LEAST_VISITED.measured(text, set(together) == set(HARD))
+    return text, set(together) == set(HARD)
 
 
-def _share(claim: Claim, every: list[Run], actions: Sequence[Action], holds: Callable[[float, float], bool]) -> Claim:
+def _share(actions: Sequence[Action], holds: Callable[[float, float], bool], grouped: Groups) -> Measured:
     """Judge the share of failures of each action by its interval."""
-    shares = {action: [run.share_failed([action]) for run in every] for action in actions}
-    text = ", ".join(f"{source}->{goal}: {estimate(values)}" for (source, goal), values in shares.items())
-    return claim.measured(text, all(holds(*interval(values)) for values in shares.values()))
+    shares = {f"{s}->{g}": [run.share_failed([(s, g)]) for run in _every(grouped)] for s, g in actions}
+    return texts(shares, form="{}: {}"), all(holds(*interval(values)) for values in shares.values())
 
 
-def _by_discount(claim: Claim, grouped: Groups, number: Callable[[Run], float], stands_out: Callable[[float, float], bool]) -> Claim:
+fail = Claim(
+    "thesis 7.2.5, fig. 7.4",
+    "the actions 15->24, 42->51 and 69->78 (from state -> to state) fail: share of failures",
+    "infeasible",
+    rule=partial(_share, FAILING, lambda low, high: low > 0.5),
+)
+enter = Claim(
+    "thesis 7.2.5",
+    "other actions into the states 24, 51 and 78 succeed: share of failures",
+    "succeed",
+    rule=partial(_share, ENTERING, lambda low, high: high < 0.1),
+)
+_TRIES = "tries over the mean of all actions: "
+
+
+def _by_discount(number: Callable[[Run], float], stands_out: Callable[[float, float], bool], grouped: Groups) -> Measured:
     """Judge whether tries stand out at the smallest discount, and grow with the discount; open where the ends do not differ."""
-    values = {discount: [number(run) for run in grouped["50-50", discount]] for discount in DISCOUNTS}
+    values = _with_prior(grouped, "50-50", number)
     first, *_, last = values.values()
     means = [interquartile_mean(numbers) for numbers in values.values()]
     holds = stands_out(*interval(first)) and means == sorted(means)
     grows = decides(ratio_interval(last, first), least=1.0)
-    return claim.measured("tries over the mean of all actions: " + ", ".join(_by_discounts(values)), grows if holds else False)
+    return _TRIES + texts(values, form="{1} at discount {0}"), grows if holds else False
 
 
-def _peaks(grouped: Groups) -> Claim:
-    values = {discount: [run.relative_tries(FAILING) for run in grouped["60-40", discount]] for discount in DISCOUNTS}
-    even = [run.relative_tries(FAILING) for discount in DISCOUNTS for run in grouped["50-50", discount]]
-    text = "tries over the mean of all actions: " + ", ".join(_by_discounts(values)) + f"; prior 50-50: {estimate(even)}"
-    return PEAKS.measured(text, all(interval(numbers)[0] > 1.0 for numbers in values.values()))
+spikes = Claim(
+    "thesis 7.2.5, fig. 7.6",
+    "prior 50-50: the actions that succeed in entering 24, 51 and 78 are tried more often than the average action, and more so with a "
+    "larger discount",
+    "spikes",
+    rule=partial(_by_discount, lambda run: run.relative_tries(ENTERING), lambda low, high: low > 1.0),
+)
+dips = Claim(
+    "thesis 7.2.5, fig. 7.6",
+    "prior 50-50: actions from 24, 51 and 78 are tried less often than the average action, and less so with a larger discount",
+    "dips",
+    rule=partial(_by_discount, lambda run: run.relative_tries(run.out_of_hard), lambda low, high: high < 1.0),
+)
 
 
-def _degree(every: list[Run]) -> Claim:
-    goals = every[0].space.goals
-    degree = np.bincount(goals[goals >= 0], minlength=len(goals))
-    correlations = [float(spearmanr(degree, run.visits).statistic) for run in every]
-    return DEGREE.measured(f"rank correlation {estimate(correlations)}", interval(correlations)[0] > 0.5)
+@claim(
+    "thesis 7.2.5, fig. 7.7",
+    "prior 60-40: the failing actions into 24, 51 and 78 are tried more often than the average action, at every discount",
+    "peaks at 80, 230, 378",
+)
+def peaks(grouped: Groups) -> Measured:
+    values, even = (_with_prior(grouped, prior, lambda run: run.relative_tries(FAILING)) for prior in ("60-40", "50-50"))
+    text = f"{_TRIES}{texts(values, form='{1} at discount {0}')}; prior 50-50: {estimate(sum(even.values(), []))}"
+    return text, all(interval(numbers)[0] > 1.0 for numbers in values.values())
 
 
-def _uniform(every: list[Run]) -> Claim:
+@claim(
+    "thesis 7.2.3", "states into which more actions lead are visited more often: correlation of visits and number of actions", "qualitative"
+)
+def degree(grouped: Groups) -> Measured:
+    goals = arm_space().goals
+    actions = np.bincount(goals[goals >= 0], minlength=len(goals))
+    correlations = [float(spearmanr(actions, run.visits).statistic) for run in _every(grouped)]
+    return f"rank correlation {estimate(correlations)}", interval(correlations)[0] > 0.5
+
+
+@claim("thesis 7.2.4", "tries of state-actions are fairly uniform, more so than visits of states", "qualitative")
+def uniform(grouped: Groups) -> Measured:
+    every = _every(grouped)
     tries, visits = [relative_spread(run.tries[run.exists]) for run in every], [relative_spread(run.visits) for run in every]
     text = f"standard deviation over mean: tries {estimate(tries)}, visits {estimate(visits)}"
-    return UNIFORM.measured(text, decides(ratio_interval(tries, visits), most=1.0))
+    return text, decides(ratio_interval(tries, visits), most=1.0)
 
 
-def _stochastic(every: list[Run]) -> Claim:
-    counts = [float(uncertain_in(run.space, run.seen)) for run in every]
-    text = f"{estimate(counts, 1)} of 432 actions per run fail in 10 to 90 % of their tries"
-    return STOCHASTIC.measured(text, interval(counts)[0] >= 1.0)
+@claim("thesis 7.2.5", "static constraints make outcomes uncertain: some actions sometimes fail and sometimes succeed", "qualitative")
+def stochastic(grouped: Groups) -> Measured:
+    counts = [float(uncertain_in(run.space, run.seen)) for run in _every(grouped)]
+    return f"{estimate(counts, 1)} of 432 actions per run fail in 10 to 90 % of their tries", interval(counts)[0] >= 1.0
+
+
+CLAIMS = (*numbers, sooner, least_visited, fail, enter, spikes, dips, peaks, degree, uniform, stochastic)
 
 
 def plot(found: Cells) -> Any:
     """Draw tries and values of every state-action as in figs. 7.6 and 7.7: one row per prior and discount, one colour per run."""
     grouped = groups(found)
     drawing = new_figure(15.0, 2.3 * len(grouped))
-    for row, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):
+    for panels, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):
         mean = np.mean([run.transitions for run in runs])
-        _bars(row[0], runs, [run.tries for run in runs])
-        row[0].set_title(f"tries, {initial}, discount {discount:g}: {len(runs)} runs of {mean:.0f} actions on average", fontsize=9)
-        _bars(row[1], runs, [np.maximum(run.values, 0.0) for run in runs])
-        row[1].set_title(f"values, {initial}, discount {discount:g}", fontsize=9)
-    for axes in row:
+        _bars(panels[0], runs, [run.tries for run in runs])
+        panels[0].set_title(f"tries, {initial}, discount {discount:g}: {len(runs)} runs of {mean:.0f} actions on average", fontsize=9)
+        _bars(panels[1], runs, [np.maximum(run.values, 0.0) for run in runs])
+        panels[1].set_title(f"values, {initial}, discount {discount:g}", fontsize=9)
+    for axes in panels:
         axes.set_xlabel("state-action; grey: from states 24, 51, 78; triangles: the failing 15->24, 42->51, 69->78")
     return drawing
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -26,21 +27,13 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import shortest_path
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import first_places, first_tries, goals_of
-from experiments.kit.plots import new_figure
-from experiments.kit.statistics import (
-    decides,
-    estimate,
-    interval,
-    mean_over,
-    probability_of_improvement,
-    ratio,
-    ratio_estimate,
-    ratio_interval,
-)
+from experiments.kit.plots import finish, new_figure
+from experiments.kit.rules import all_hold, decides, of_each, texts, within
+from experiments.kit.statistics import estimate, interval, mean_over, probability_of_improvement, ratio, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent
 from mobee.arrays import Array, Ints
@@ -64,37 +57,6 @@ EARLY = 220  # transitions, before which the published figure shows no differenc
 ABOUT_HALF = (0.4, 0.6)
 FLOORS = {"free": 1.05, "constrained": 1.08}  # our aims: transitions over those of the shortest walk
 SLACK = 0.01  # share by which "depleting" may need more transitions than "nearest untried"
-
-_WHERE = "paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5"
-RATIO = {
-    world: Claim(
-        _WHERE, f"the curious agent has tried every action in about half the transitions of the least-tried agent ({text})", "about 1/2"
-    )
-    for world, text in (("constrained", "arm with cable constraints and self-contacts"), ("free", "arm without constraints and contacts"))
-}
-BEST = Claim(_WHERE, "the curious agent tries every action far sooner than the least-tried and the random agent", "figure only")
-NOVEL = Claim(
-    _WHERE,
-    f"in the first {EARLY} transitions the curious and the least-tried agent try only new actions; the random agent repeats actions",
-    "up to about 220 transitions",
-)
-AGGRESSIVE = Claim(
-    _WHERE, f"in the first {EARLY} transitions the curious agent visits more new states than the least-tried agent", "figure only"
-)
-FLOOR = {
-    world: Claim(
-        "aim of this reproduction",
-        f"to try every action the curious agent needs at most {most} times the transitions of the shortest possible walk ({world} arm)",
-        f"at most {most}",
-    )
-    for world, most in FLOORS.items()
-}
-DEPLETES = Claim(
-    "aim of this reproduction",
-    "curiosity that uses up rewards along its plan needs no more transitions than going to the nearest untried action: their ratio",
-    "at most 1.01",
-)
-CLAIMS = (*RATIO.values(), BEST, NOVEL, AGGRESSIVE, *FLOOR.values(), DEPLETES)
 
 Runs = Sequence[Mapping[str, Any]]  # values by seed, of one condition
 Published = Mapping[tuple[str, str], Runs]  # runs on the published graph, by world and explorer
@@ -162,19 +124,12 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
     return distance
 
 
-def groups(found: Cells) -> dict[tuple[str, str, str], Runs]:
-    """Return the values of the runs of each graph, world and explorer."""
-    return {key: [result.values for result in results] for key, results in grouped_by(found, "graph", "world", "explorer").items()}
-
-
 def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each condition, and the claims about the published graph."""
-    grouped = groups(found)
-    results: dict[str, Any] = {"runs": {" ".join(key): _row(runs) for key, runs in sorted(grouped.items())}}
+    grouped = grouped_by(found, "graph", "world", "explorer")
+    results: dict[str, Any] = {"runs": {" ".join(key): row(runs) for key, runs in sorted(grouped.items())}}
     published = {key[1:]: runs for key, runs in grouped.items() if key[0] == "nearest"}
-    if published:
-        results["claims"] = [claim.record() for claim in measured(published)]
-    return results
+    return results | ({"claims": judged(CLAIMS, published)} if published else {})
 
 
 def covered(runs: Runs) -> Array:
@@ -199,7 +154,8 @@ def states_seen(run: Mapping[str, Any], transitions: int) -> int:
     return int((run["new_states"] <= transitions).sum())
 
 
-def _row(runs: Runs) -> dict[str, Any]:
+def row(runs: Runs) -> dict[str, Any]:
+    """Return the numbers of a condition."""
     low, high = interval(covered(runs))
     return {
         "seeds": len(runs),
@@ -214,63 +170,85 @@ def _row(runs: Runs) -> dict[str, Any]:
     }
 
 
-def measured(published: Published) -> list[Claim]:
-    """Return the claims with our numbers, from the runs on the published graph."""
-    times = {key: covered(runs) for key, runs in published.items()}
-    return [
-        *(_half(claim, times[world, "curious"], times[world, "least_tried"]) for world, claim in RATIO.items()),
-        _best(times, unfinished(published["constrained", "random"])),
-        _novel(published),
-        _aggressive(published),
-        *(_near_floor(claim, published[world, "curious"], FLOORS[world]) for world, claim in FLOOR.items()),
-        _depletes(times),
-    ]
+_WHERE = "paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5"
 
 
-def _half(claim: Claim, curious: Array, least: Array) -> Claim:
+def _half(world: str, published: Published) -> Measured:
+    curious, least = (covered(published[world, name]) for name in ("curious", "least_tried"))
     span = ratio_interval(curious, least)
     better = ", better than published" if span[1] < ABOUT_HALF[0] else ""
-    return claim.measured(ratio_estimate(curious, least) + better, decides(span, *ABOUT_HALF))
+    return ratio_estimate(curious, least) + better, decides(span, *ABOUT_HALF)
 
 
-def _best(times: Mapping[tuple[str, str], Array], unfinished_random: int) -> Claim:
-    worst = min(
-        probability_of_improvement(times[world, rival], times[world, "curious"]) for world in FLOORS for rival in ("least_tried", "random")
+half = {
+    world: Claim(
+        _WHERE,
+        f"the curious agent has tried every action in about half the transitions of the least-tried agent ({text})",
+        "about 1/2",
+        rule=partial(_half, world),
     )
+    for world, text in (("constrained", "arm with cable constraints and self-contacts"), ("free", "arm without constraints and contacts"))
+}
+
+
+@claim(_WHERE, "the curious agent tries every action far sooner than the least-tried and the random agent", "figure only")
+def best(published: Published) -> Measured:
+    times = {key: covered(runs) for key, runs in published.items()}
+    worst = min(probability_of_improvement(times[w, rival], times[w, "curious"]) for w in FLOORS for rival in ("least_tried", "random"))
     by_random = ratio(times["constrained", "curious"], times["constrained", "random"])
-    bound = "at most " if unfinished_random else ""
+    bound = "at most " if unfinished(published["constrained", "random"]) else ""
     text = f"probability that a curious run is sooner: at least {worst:.2f}; transitions over the random agent's: {bound}{by_random:.2f}"
-    return BEST.measured(text, worst > 0.95)
+    return text, worst > 0.95
 
 
-def _novel(published: Published) -> Claim:
-    repeats = {name: [first_repeat(run) for run in published["constrained", name]] for name in ("curious", "least_tried", "random")}
+@claim(
+    _WHERE,
+    f"in the first {EARLY} transitions the curious and the least-tried agent try only new actions; the random agent repeats actions",
+    "up to about 220 transitions",
+)
+def novel(published: Published) -> Measured:
+    repeats = of_each({name: published["constrained", name] for name in ("curious", "least_tried", "random")}, first_repeat)
     holds = all(interval(repeats[name])[0] >= EARLY for name in ("curious", "least_tried")) and interval(repeats["random"])[1] < EARLY
-    text = ", ".join(f"{name.replace('_', ' ')} {estimate(firsts, 0)}" for name, firsts in repeats.items())
-    return NOVEL.measured(f"transition of the first repeated action: {text}", holds)
+    return f"transition of the first repeated action: {texts(repeats, 0)}", holds
 
 
-def _aggressive(published: Published) -> Claim:
+@claim(_WHERE, f"in the first {EARLY} transitions the curious agent visits more new states than the least-tried agent", "figure only")
+def aggressive(published: Published) -> Measured:
     curious, least = ([states_seen(run, EARLY) for run in published["constrained", name]] for name in ("curious", "least_tried"))
     text = f"of 81 states visited: curious {estimate(curious, 1)}, least tried {estimate(least, 1)}"
-    return AGGRESSIVE.measured(text, interval(curious)[0] > interval(least)[1])
+    return text, interval(curious)[0] > interval(least)[1]
 
 
-def _near_floor(claim: Claim, runs: Runs, most: float) -> Claim:
-    shares = [run["transitions"] / run["floor"] for run in runs]
-    return claim.measured(estimate(shares, 3), decides(interval(shares), most=most))
+def _near_floor(world: str, published: Published) -> Measured:
+    return within([run["transitions"] / run["floor"] for run in published[world, "curious"]], 3, most=FLOORS[world])
 
 
-def _depletes(times: Mapping[tuple[str, str], Array]) -> Claim:
+near_floor = {
+    world: Claim(
+        "aim of this reproduction",
+        f"to try every action the curious agent needs at most {most} times the transitions of the shortest possible walk ({world} arm)",
+        f"at most {most}",
+        rule=partial(_near_floor, world),
+    )
+    for world, most in FLOORS.items()
+}
+
+
+@claim(
+    "aim of this reproduction",
+    "curiosity that uses up rewards along its plan needs no more transitions than going to the nearest untried action: their ratio",
+    "at most 1.01",
+)
+def depletes(published: Published) -> Measured | None:
     """Compare the two explorers in both worlds; open where an interval does not decide, or a world was not run."""
-    pairs = [(times.get((world, "depleting")), times.get((world, "nearest_untried"))) for world in FLOORS]
-    parts, each = [], []
-    for world, (ours, theirs) in zip(FLOORS, pairs, strict=True):
-        if ours is None or theirs is None:
-            return DEPLETES
-        parts.append(f"{ratio_estimate(ours, theirs, 3)} {world}")
-        each.append(decides(ratio_interval(ours, theirs), most=1.0 + SLACK))
-    return DEPLETES.measured(", ".join(parts), False if False in each else None if None in each else True)
+    if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
+        return None
+    pairs = {world: [covered(published[world, name]) for name in ("depleting", "nearest_untried")] for world in FLOORS}
+    text = ", ".join(f"{ratio_estimate(*pair, 3)} {world}" for world, pair in pairs.items())
+    return text, all_hold(decides(ratio_interval(*pair), most=1.0 + SLACK) for pair in pairs.values())
+
+
+CLAIMS = (*half.values(), best, novel, aggressive, *near_floor.values(), depletes)
 
 
 COLORS = dict(zip(LABELS, ("tab:red", "tab:blue", "0.5", "tab:green", "tab:purple"), strict=True))
@@ -280,7 +258,7 @@ MIN_DETOUR = 1e-3  # that is drawn
 
 def plot(found: Cells) -> Any:
     """Draw untried state-actions over transitions (fig. 4), states seen early, and each run's detour: one row per graph."""
-    grouped = groups(found)
+    grouped = grouped_by(found, "graph", "world", "explorer")
     graphs = [graph for graph in TITLES if any(key[0] == graph for key in grouped)]
     drawing = new_figure(16.0, 3.8 * len(graphs))
     for row, graph in zip(drawing.subplots(len(graphs), 4, squeeze=False), graphs, strict=True):
@@ -305,8 +283,7 @@ def _untried(axes: Any, group: Mapping[str, Runs]) -> None:
         axes.fill_between(times, left.min(axis=0), left.max(axis=0), color=COLORS[name], alpha=0.15, linewidth=0.0)
     floor = np.median([run["floor"] for runs in group.values() for run in runs])
     axes.axvline(floor, color="k", linestyle=":", linewidth=0.8, label="shortest walk")
-    axes.set(xlabel="transitions", ylabel="state-actions never tried", xlim=(0.0, last), ylim=(0.0, None))
-    axes.grid(alpha=0.2)
+    finish(axes, xlabel="transitions", ylabel="state-actions never tried", xlim=(0.0, last), ylim=(0.0, None))
 
 
 def _states(axes: Any, group: Mapping[str, Runs]) -> None:
@@ -315,8 +292,7 @@ def _states(axes: Any, group: Mapping[str, Runs]) -> None:
         seen = np.array([np.searchsorted(run["new_states"], times, side="right") for run in group[name]])
         axes.plot(times, seen.mean(axis=0), color=COLORS[name], linewidth=1.2, label=LABELS[name])
     axes.axvline(EARLY, color="k", linestyle=":", linewidth=0.8)
-    axes.set(xlabel="transitions", ylabel="states visited, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
-    axes.grid(alpha=0.2)
+    finish(axes, xlabel="transitions", ylabel="states visited, mean", xlim=(0.0, times[-1]), ylim=(0.0, None))
 
 
 def _detours(axes: Any, group: Mapping[tuple[str, ...], Runs]) -> None:
@@ -332,8 +308,7 @@ def _detours(axes: Any, group: Mapping[tuple[str, ...], Runs]) -> None:
     axes.set_yticks(ticks := (0.1, 1, 10, 100, 1000), [f"{tick:g} %" for tick in ticks])
     axes.set_xticks(range(len(names)), ["\n".join(LABELS[name].rsplit(" ", 1)) for name in names], fontsize=7)
     axes.set_title("transitions beyond the shortest walk", fontsize=10)
-    axes.legend(fontsize=7)
-    axes.grid(alpha=0.2)
+    finish(axes, legend=7)
 
 
 EXPERIMENT = Experiment(

@@ -13,29 +13,20 @@ constraints are those that fail in more than half of the tries of all explorers 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
-from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
+from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, draw_tries, explored, relative_tries_of
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import (
-    decides,
-    estimate,
-    gini,
-    interquartile_mean,
-    interval,
-    mean_over,
-    ratio,
-    ratio_interval,
-    relative_spread,
-)
+from experiments.kit.rules import decides, of_each, row, texts
+from experiments.kit.statistics import estimate, gini, interquartile_mean, interval, ratio, ratio_interval, relative_spread
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice
 
@@ -44,31 +35,6 @@ GRAPHS = ("nearest", "equidistant")
 TRANSITIONS, FEW = 4000, 1500
 SPIKE = 1.5  # ratio of tries at constraints to tries of other actions that counts as a spike
 AS_UNIFORM = 1.1  # ratio of Gini coefficients up to which one counts as no less uniform
-
-VISITS = Claim(
-    "paper 3.1, fig. 5",
-    "the curious agent visits states more uniformly than the least-tried and the random explorer (one graph)",
-    "qualitative",
-)
-TRIES = Claim(
-    "paper 3.1, fig. 5",
-    "the curious agent tries state-actions more uniformly than the least-tried and the random explorer (one graph)",
-    "qualitative",
-)
-SPIKES = Claim(
-    "paper 3.1, fig. 5",
-    "the curious agent tries actions that run into constraints more often than other actions: ratio of mean tries (one graph)",
-    "spikes",
-)
-NONE = Claim(
-    "paper 3.1, fig. 5", "the least-tried and the random explorer do not try actions that run into constraints more often", "none visible"
-)
-SAME = Claim(
-    "aim of this reproduction",
-    "fig. 5 depends on its graph: with equidistant neighbours the least-tried explorer tries actions as uniformly as the curious one",
-    "-",
-)
-CLAIMS = (VISITS, TRIES, SPIKES, NONE, SAME)
 
 
 @cache
@@ -99,70 +65,95 @@ def groups(found: Cells) -> Groups:
     return explored(found, space_of, "graph", "explorer")
 
 
-def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each graph and explorer, and the claims."""
-    grouped = groups(found)
-    rows = {f"{graph}, {explorer}": _row(grouped, graph, explorer) for graph, explorer in grouped}
-    complete = all((graph, explorer) in grouped for graph in GRAPHS for explorer in EXPLORERS)
-    return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
-
-
-def _row(grouped: Groups, graph: str, explorer: str) -> dict[str, Any]:
-    runs, spikes = grouped[graph, explorer], _spikes(grouped, graph, explorer)
-    return {
-        "seeds": len(runs),
-        "relative_spread_of_tries": mean_over(runs, lambda run: relative_spread(run.tries)),
-        "gini_coefficient_of_tries": mean_over(runs, lambda run: gini(run.tries)),
-        "fewest_tries": min(int(run.tries.min()) for run in runs),
-        "most_tries": max(int(run.tries.max()) for run in runs),
-        "relative_spread_of_visits": mean_over(runs, lambda run: relative_spread(run.visits)),
-        "tries_at_constraints_over_others": interquartile_mean(spikes) if spikes else None,
-        "actions_at_constraints": int(constraint_actions(_all_runs(grouped, graph)).sum()),
-    }
-
-
-def _all_runs(grouped: Groups, graph: str) -> list[Explored]:
-    return [run for explorer in EXPLORERS for run in grouped.get((graph, explorer), [])]
+def _of_graph(grouped: Groups, graph: str) -> dict[str, list[Explored]]:
+    return {explorer: grouped[graph, explorer] for explorer in EXPLORERS if (graph, explorer) in grouped}
 
 
 def _spikes(grouped: Groups, graph: str, explorer: str) -> list[float]:
     """Return for each run the mean tries of actions at constraints, as the other runs found them, over those of other actions."""
-    return relative_tries_of(grouped[graph, explorer], _all_runs(grouped, graph))
+    return relative_tries_of(grouped[graph, explorer], sum(_of_graph(grouped, graph).values(), []))
 
 
-def measured(grouped: Groups) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all explorers on both graphs."""
-    visits = {e: [relative_spread(run.visits) for run in grouped["nearest", e]] for e in EXPLORERS}
-    tries = {e: [gini(run.tries) for run in grouped["nearest", e]] for e in EXPLORERS}
-    other = {e: [gini(run.tries) for run in grouped["equidistant", e]] for e in EXPLORERS}
-    return [
-        VISITS.measured(f"standard deviation over mean: {_each(visits)}", _is_least(visits)),
-        TRIES.measured(f"Gini coefficient: {_each(tries)}", _is_least(tries)),
-        *_spike_claims({e: _spikes(grouped, "nearest", e) for e in EXPLORERS}),
-        SAME.measured(
-            f"Gini coefficient: {_each(other)}", decides(ratio_interval(other["least_tried"], other["curious"]), most=AS_UNIFORM)
-        ),
-    ]
+def _more_uniform(what: str, number: Callable[[Explored], float], grouped: Groups) -> Measured:
+    """Judge whether the ratio of the curious agent's numbers to those of each other explorer is below 1, with its interval."""
+    values = of_each(_of_graph(grouped, "nearest"), number)
+    others = [(values["curious"], values[other]) for other in EXPLORERS[1:]]
+    return f"{what}: {texts(values)}", all(ratio_interval(*pair)[1] < 1.0 and ratio(*pair) < 1.0 for pair in others)
 
 
-def _spike_claims(spikes: Mapping[str, list[float]]) -> list[Claim]:
-    """Judge tries at constraints; open where no action fails."""
-    if not all(spikes.values()):
-        return [claim.measured("no action fails in more than half of its tries", None) for claim in (SPIKES, NONE)]
-    others = "; ".join(f"{e.replace('_', ' ')} {estimate(spikes[e])}" for e in EXPLORERS[1:])
-    return [
-        SPIKES.measured(estimate(spikes["curious"]), interval(spikes["curious"])[0] > SPIKE),
-        NONE.measured(f"ratio of mean tries: {others}", all(interval(spikes[e])[1] < SPIKE for e in EXPLORERS[1:])),
-    ]
+_FIG5 = "paper 3.1, fig. 5"
+_MORE = "more uniformly than the least-tried and the random explorer (one graph)"
+visits = Claim(
+    _FIG5,
+    f"the curious agent visits states {_MORE}",
+    "qualitative",
+    rule=partial(_more_uniform, "standard deviation over mean", lambda run: relative_spread(run.visits)),
+)
+tries = Claim(
+    _FIG5,
+    f"the curious agent tries state-actions {_MORE}",
+    "qualitative",
+    rule=partial(_more_uniform, "Gini coefficient", lambda run: gini(run.tries)),
+)
 
 
-def _is_least(values: Mapping[str, list[float]]) -> bool:
-    """Return whether the ratio of the curious agent's numbers to those of each other explorer is below 1, with its interval."""
-    return all(ratio_interval(values["curious"], values[e])[1] < 1.0 and ratio(values["curious"], values[e]) < 1.0 for e in EXPLORERS[1:])
+def _of_spikes(rule: Rule) -> Rule:
+    """Return a rule that judges tries at constraints by explorer; open where no action fails."""
+
+    def of_runs(grouped: Groups) -> Measured | None:
+        spikes = {explorer: _spikes(grouped, "nearest", explorer) for explorer in EXPLORERS}
+        return rule(spikes) if all(spikes.values()) else ("no action fails in more than half of its tries", None)
+
+    return of_runs
 
 
-def _each(values: Mapping[str, list[float]]) -> str:
-    return ", ".join(f"{explorer.replace('_', ' ')} {estimate(values[explorer])}" for explorer in EXPLORERS)
+@claim(
+    _FIG5,
+    "the curious agent tries actions that run into constraints more often than other actions: ratio of mean tries (one graph)",
+    "spikes",
+)
+@_of_spikes
+def some(spikes: Mapping[str, list[float]]) -> Measured:
+    return estimate(spikes["curious"]), interval(spikes["curious"])[0] > SPIKE
+
+
+@claim(_FIG5, "the least-tried and the random explorer do not try actions that run into constraints more often", "none visible")
+@_of_spikes
+def none(spikes: Mapping[str, list[float]]) -> Measured:
+    others = "; ".join(f"{other.replace('_', ' ')} {estimate(spikes[other])}" for other in EXPLORERS[1:])
+    return f"ratio of mean tries: {others}", all(interval(spikes[other])[1] < SPIKE for other in EXPLORERS[1:])
+
+
+@claim(
+    "aim of this reproduction",
+    "fig. 5 depends on its graph: with equidistant neighbours the least-tried explorer tries actions as uniformly as the curious one",
+    "-",
+)
+def same(grouped: Groups) -> Measured:
+    values = of_each(_of_graph(grouped, "equidistant"), lambda run: gini(run.tries))
+    return f"Gini coefficient: {texts(values)}", decides(ratio_interval(values["least_tried"], values["curious"]), most=AS_UNIFORM)
+
+
+CLAIMS = (visits, tries, some, none, same)
+COLUMNS: dict[str, Callable[[Explored], float]] = {
+    "relative_spread_of_tries": lambda run: relative_spread(run.tries),
+    "gini_coefficient_of_tries": lambda run: gini(run.tries),
+}
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """Return a row for each graph and explorer, and the claims."""
+    grouped, rows = groups(found), {}
+    for (graph, explorer), runs in grouped.items():
+        spikes = _spikes(grouped, graph, explorer)
+        rows[f"{graph}, {explorer}"] = row(runs, COLUMNS) | {
+            "fewest_tries": min(int(run.tries.min()) for run in runs),
+            "most_tries": max(int(run.tries.max()) for run in runs),
+            "relative_spread_of_visits": interquartile_mean([relative_spread(run.visits) for run in runs]),
+            "tries_at_constraints_over_others": interquartile_mean(spikes) if spikes else None,
+            "actions_at_constraints": int(constraint_actions(sum(_of_graph(grouped, graph).values(), [])).sum()),
+        }
+    return {"runs": rows, "claims": judged(CLAIMS, grouped, set(product(GRAPHS, EXPLORERS)) <= set(grouped))}
 
 
 TITLES = {"curious": "curious (AC)", "least_tried": "least tried (LT)", "random": "random (RAND)"}
@@ -170,19 +161,15 @@ TITLES = {"curious": "curious (AC)", "least_tried": "least tried (LT)", "random"
 
 def plot(found: Cells) -> Any:
     """Draw visits and tries of one run of each explorer, as in fig. 5: one row per explorer."""
-    grouped = groups(found)
-    shown = [explorer for explorer in EXPLORERS if ("nearest", explorer) in grouped]
+    shown = _of_graph(groups(found), "nearest")
     drawing = new_figure(13.0, 2.4 * len(shown))
     panels = drawing.subplots(len(shown), 2, squeeze=False, sharex="col", sharey="col", width_ratios=(1, 3))
-    chosen = constraint_actions(_all_runs(grouped, "nearest"))
-    for (left, right), explorer in zip(panels, shown, strict=True):
-        run = grouped["nearest", explorer][0]
+    chosen = constraint_actions(sum(shown.values(), []))
+    for (left, right), (explorer, (run, *_)) in zip(panels, shown.items(), strict=True):
         left.bar(np.arange(len(run.visits)), run.visits, width=1.0, color="0.4")
         left.set_ylabel(TITLES[explorer])
-        number = np.arange(len(run.tries))
-        right.bar(number[~chosen], run.tries[~chosen], width=1.0, color="0.6", label="others")
-        right.bar(number[chosen], run.tries[chosen], width=2.5, color="C3", label="at constraints")
-        right.set_xlim(-1, len(number))
+        draw_tries(right, run.tries, chosen, 2.5, "at constraints")
+        right.set_xlim(-1, len(run.tries))
     panels[0][0].set_title(f"visits of states in {run.tries.sum()} transitions", fontsize=9)
     panels[0][1].set_title("tries of state-actions (16 nearest neighbours)", fontsize=9)
     panels[0][1].legend(fontsize=8, loc="upper right")

@@ -15,17 +15,20 @@ the value of earning the mean reward indefinitely.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import first_tries, goals_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
-from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, relative_spread
+from experiments.kit.rules import of_each, row
+from experiments.kit.statistics import estimate, interquartile_mean, interval, relative_spread
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent, value_iteration
 from mobee.arrays import Array
@@ -38,22 +41,8 @@ TOLERANCE = 1e-9  # nats, of values
 PUBLISHED = 320  # actions
 LIKE_RANDOM = (0.5, 2.0)  # relative variances of tries that count as those of a random choice
 
-SUCCEED = Claim("thesis 7.1", "on a hypercube of 16 states, all actions bring the arm to their goal state", "all")
-ACTIONS = Claim(
-    "thesis 7.1, fig. 7.3", "on the hypercube, every state-action has been tried at least 5 times after 320 actions", "320 (= 64 x 5)"
-)
-UNIFORM = Claim(
-    "thesis 7.1, figs. 7.2, 7.3",
-    "on the hypercube, tries of actions vary like those of a random choice at first, and become increasingly equal",
-    "figures only",
-)
-FLAT = Claim("thesis 7.1, figs. 7.2, 7.3", "on the hypercube, the values of all actions become equal", "figures only")
-PROPORTIONAL = Claim(
-    "thesis 7.1, figs. 7.2, 7.3", "on the hypercube, values are roughly proportional to the discount factor", "figures only"
-)
-CLAIMS = (SUCCEED, ACTIONS, UNIFORM, FLAT, PROPORTIONAL)
-
-Groups = Mapping[float, list[dict[str, Any]]]  # values of the runs by discount
+Run = Mapping[str, Any]  # the values of a cell
+Groups = Mapping[float, list[Run]]  # by discount
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -87,88 +76,90 @@ def _values(agent: CuriousAgent) -> Array:
     return value_iteration(agent.model, agent.model.reward, agent.discount, TOLERANCE)[1]
 
 
-def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each discount, and the claims."""
-    groups = grouped(found, "discount", DISCOUNTS)
-    rows = {f"discount {discount:g}": _row(discount, runs) for discount, runs in groups.items()}
-    return {"runs": rows, "claims": [claim.record() for claim in measured(groups)]}
-
-
-def _row(discount: float, runs: list[dict[str, Any]]) -> dict[str, Any]:
-    actions = [run["transitions"] for run in runs]
-    low, high = interval(actions)
-    return {
-        "seeds": len(runs),
-        "actions_until_all_tried_5_times": interquartile_mean(actions),
-        "low": low,
-        "high": high,
-        "actions_until_all_tried_once": mean_over(runs, lambda run: run["all_once"] or run["transitions"]),
-        "relative_variance_of_tries_early": mean_over(runs, lambda run: relative_variance(run["early_tries"])),
-        "relative_variance_of_tries_at_end": mean_over(runs, lambda run: relative_variance(run["tries"])),
-        "relative_spread_of_values": mean_over(runs, lambda run: relative_spread(run["values"])),
-        "mean_value_over_its_limit": mean_over(runs, lambda run: _share_of_limit(discount, run)),
-        "mean_value": mean_over(runs, _mean_value),
-        "failed_actions": sum(run["failed"] for run in runs),
-    }
-
-
 def relative_variance(tries: Array) -> float:
     """Return the variance of tries over that of a uniformly random choice of state-actions: 1 if random, 0 if all are equal."""
     count, total = tries.size, tries.sum()
     return float(tries.var() / (total / count * (1.0 - 1.0 / count)))
 
 
-def _mean_value(run: Mapping[str, Any]) -> float:
-    return float(run["values"].mean())
-
-
-def _share_of_limit(discount: float, run: Mapping[str, Any]) -> float:
+def _share_of_limit(run: Run, discount: float) -> float:
     """Return the mean value over its limit, the value of earning the mean reward indefinitely."""
     return float(run["values"].mean() * (1.0 - discount) / run["rewards"].mean())
 
 
-def measured(groups: Groups) -> list[Claim]:
-    """Return the claims with our numbers."""
-    every = [run for runs in groups.values() for run in runs]
-    return [_succeed(every), _actions(groups), _uniform(every), _flat(every), _proportional(groups)]
+def _every(groups: Groups, name: str) -> list[Any]:
+    return [run[name] for runs in groups.values() for run in runs]
 
 
-def _succeed(every: list[dict[str, Any]]) -> Claim:
-    failed, total = (sum(run[name] for run in every) for name in ("failed", "transitions"))
-    return SUCCEED.measured(f"{total - failed} of {total} actions", failed == 0)
+@claim("thesis 7.1", "on a hypercube of 16 states, all actions bring the arm to their goal state", "all")
+def succeed(groups: Groups) -> Measured:
+    failed, total = (sum(_every(groups, name)) for name in ("failed", "transitions"))
+    return f"{total - failed} of {total} actions", failed == 0
 
 
-def _actions(groups: Groups) -> Claim:
-    actions = {discount: [run["transitions"] for run in runs] for discount, runs in groups.items()}
-    text = "; ".join(f"{estimate(counts, 0)} at discount {discount:g}" for discount, counts in actions.items())
-    return ACTIONS.measured(text, all(interval(counts)[1] <= 1.05 * PUBLISHED for counts in actions.values()))
+@claim("thesis 7.1, fig. 7.3", "on the hypercube, every state-action has been tried at least 5 times after 320 actions", "320 (= 64 x 5)")
+def actions(groups: Groups) -> Measured:
+    made = of_each(groups, itemgetter("transitions"))
+    text = "; ".join(f"{estimate(counts, 0)} at discount {discount:g}" for discount, counts in made.items())
+    return text, all(interval(counts)[1] <= 1.05 * PUBLISHED for counts in made.values())
 
 
-def _uniform(every: list[dict[str, Any]]) -> Claim:
-    early, end = ([relative_variance(run[name]) for run in every] for name in ("early_tries", "tries"))
+@claim(
+    "thesis 7.1, figs. 7.2, 7.3",
+    "on the hypercube, tries of actions vary like those of a random choice at first, and become increasingly equal",
+    "figures only",
+)
+def uniform(groups: Groups) -> Measured:
+    early, end = (list(map(relative_variance, _every(groups, name))) for name in ("early_tries", "tries"))
     (low, high), (_, end_high) = interval(early), interval(end)
     text = f"variance of tries over that of a random choice: {estimate(early)} after {EARLY} actions, {estimate(end)} at the end"
-    return UNIFORM.measured(text, LIKE_RANDOM[0] <= low and high <= LIKE_RANDOM[1] and end_high < low)
+    return text, LIKE_RANDOM[0] <= low and high <= LIKE_RANDOM[1] and end_high < low
 
 
-def _flat(every: list[dict[str, Any]]) -> Claim:
-    early, end = (max(relative_spread(run[name]) for run in every) for name in ("early_values", "values"))
-    text = f"standard deviation over mean at most {early:.2f} after {EARLY} actions, {end:.3f} at the end"
-    return FLAT.measured(text, end < min(0.1, early))
+@claim("thesis 7.1, figs. 7.2, 7.3", "on the hypercube, the values of all actions become equal", "figures only")
+def flat(groups: Groups) -> Measured:
+    early, end = (max(map(relative_spread, _every(groups, name))) for name in ("early_values", "values"))
+    return f"standard deviation over mean at most {early:.2f} after {EARLY} actions, {end:.3f} at the end", end < min(0.1, early)
 
 
-def _proportional(groups: Groups) -> Claim:
+@claim("thesis 7.1, figs. 7.2, 7.3", "on the hypercube, values are roughly proportional to the discount factor", "figures only")
+def proportional(groups: Groups) -> Measured:
     """Compare the growth of the values with that of the discount; their limit, mean reward / (1 - discount), grows much faster."""
-    means = {discount: mean_over(runs, _mean_value) for discount, runs in groups.items()}
-    shares = [interquartile_mean([_share_of_limit(discount, run) for run in runs]) for discount, runs in groups.items()]
+    means = {discount: interquartile_mean([run["values"].mean() for run in runs]) for discount, runs in groups.items()}
+    shares = [interquartile_mean([_share_of_limit(run, discount) for run in runs]) for discount, runs in groups.items()]
     of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
     low, high = min(means), max(means)
-    grown = means[high] / means[low]
     text = (
         f"mean value {', '.join(f'{1e3 * value:.3g}' for value in means.values())} x 1e-3 nats at {', '.join(f'{d:g}' for d in means)}: "
         f"{of_limit} of mean reward / (1 - discount), to which they are proportional"
     )
-    return PROPORTIONAL.measured(text, abs(grown / (high / low) - 1.0) < 0.5)
+    return text, abs(means[high] / means[low] / (high / low) - 1.0) < 0.5
+
+
+CLAIMS = (succeed, actions, uniform, flat, proportional)
+
+
+def findings(found: Cells) -> dict[str, Any]:
+    """Return a row for each discount, and the claims."""
+    groups = grouped(found, "discount", DISCOUNTS)
+    return {
+        "runs": {f"discount {discount:g}": _row(discount, runs) for discount, runs in groups.items()},
+        "claims": judged(CLAIMS, groups),
+    }
+
+
+def _row(discount: float, runs: list[Run]) -> dict[str, Any]:
+    low, high = interval([run["transitions"] for run in runs])
+    columns: dict[str, Callable[[Run], float]] = {
+        "actions_until_all_tried_once": lambda run: run["all_once"] or run["transitions"],
+        "relative_variance_of_tries_early": lambda run: relative_variance(run["early_tries"]),
+        "relative_variance_of_tries_at_end": lambda run: relative_variance(run["tries"]),
+        "relative_spread_of_values": lambda run: relative_spread(run["values"]),
+        "mean_value_over_its_limit": partial(_share_of_limit, discount=discount),
+        "mean_value": lambda run: float(run["values"].mean()),
+    }
+    actions = row(runs, {"actions_until_all_tried_5_times": itemgetter("transitions")})
+    return {**actions, "low": low, "high": high, **row(runs, columns), "failed_actions": sum(run["failed"] for run in runs)}
 
 
 COLUMNS = (
@@ -183,11 +174,11 @@ def plot(found: Cells) -> Any:
     """Draw tries and values of every state-action as in figs. 7.2 and 7.3: one row per discount, one colour per run."""
     groups = grouped(found, "discount", DISCOUNTS)
     drawing = new_figure(14.0, 2.6 * len(groups))
-    for row, (discount, runs) in zip(drawing.subplots(len(groups), 4, squeeze=False), groups.items(), strict=True):
-        for axes, (name, title) in zip(row, COLUMNS, strict=True):
+    for panels, (discount, runs) in zip(drawing.subplots(len(groups), 4, squeeze=False), groups.items(), strict=True):
+        for axes, (name, title) in zip(panels, COLUMNS, strict=True):
             draw_stacked_bars(axes, [np.maximum(run[name].ravel(), 0.0) for run in runs])
             axes.set_title(f"{title}, discount {discount:g}", fontsize=9)
-    for axes in row:
+    for axes in panels:
         axes.set_xlabel("state-action")
     return drawing
 

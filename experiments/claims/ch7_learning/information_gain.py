@@ -14,23 +14,22 @@ graph.  Failing actions are those that fail in more than half of the tries of al
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, TORSO, arm_plant, arm_space, robot, torso_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
-from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, explored, relative_tries_of
-from experiments.kit.plots import new_figure
+from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, draw_tries, explored, relative_tries_of
+from experiments.kit.plots import finish, new_figure
 from experiments.kit.statistics import estimate, interval, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Gains, Lattice, Model, OfflinePlant, TransitionModel
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array
 
 DIVERGENCES = {"kail": "'Kail'", "kl": "plain KL, uniform prior"}
 PARTS = {"left_arm": "arm, 81 states", "torso": "torso, 27 states"}
@@ -39,31 +38,6 @@ FEW = {"left_arm": 1000, "torso": 300}
 EARLY = 100  # transitions whose mean reward is compared between the parts
 TRIES, REPEATS = 30, 400  # of the computed actions
 SAME_REWARD = 1.05  # ratio of rewards up to which they count as the same
-
-FIRST = Claim(
-    "thesis 6.4.2, 6.4.3",
-    "with 'Kail' divergence fewer tries are needed to prefer a failing action to a reliable one than with plain KL divergence",
-    "many with KL",
-)
-SECOND = Claim(
-    "thesis 6.4.2",
-    "with 'Kail' divergence fewer tries are needed to prefer an uncertain action to a reliable one than with plain KL divergence",
-    "many with KL",
-)
-SPIKES = Claim(
-    "thesis 6.4.3",
-    "with 'Kail' divergence the agent tries failing actions more often than others, and more so than with plain KL divergence",
-    "qualitative",
-)
-SIZE = Claim(
-    "thesis 6.4.2",
-    "with plain KL divergence a learner with 27 states receives more reward than one with 81: ratio for the first transitions",
-    "eqs. 6.6-6.9: falls with size",
-)
-COMPARABLE = Claim(
-    "thesis 6.4.3", "with 'Kail' divergence learners with 27 and 81 states receive comparable rewards: ratio for the first transitions", "1"
-)
-CLAIMS = (FIRST, SECOND, SPIKES, SIZE, COMPARABLE)
 
 
 @cache
@@ -160,58 +134,56 @@ def groups(found: Cells) -> Groups:
 def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each part and divergence, and the claims."""
     grouped = groups(found)
-    rows = {f"{PARTS[part]}, {DIVERGENCES[divergence]}": _row(runs) for (part, divergence), runs in grouped.items()}
-    complete = all(key in grouped for key in product(PARTS, DIVERGENCES))
-    return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
-
-
-def _row(runs: list[Explored]) -> dict[str, Any]:
-    return {
-        "seeds": len(runs),
-        "expected_reward_before_any_try": round(runs[0].values["first_reward"], 5),
-        "mean_reward_of_first_100": round(mean_over(runs, _early_reward), 5),
-        "mean_reward_of_last_100": round(mean_over(runs, lambda run: float(run.values["rewards"][-EARLY:].mean())), 5),
-        "untried_actions": mean_over(runs, lambda run: float((run.tries == 0).sum())),
+    rows = {
+        f"{PARTS[part]}, {DIVERGENCES[divergence]}": {
+            "seeds": len(runs),
+            "expected_reward_before_any_try": round(runs[0].values["first_reward"], 5),
+            "mean_reward_of_first_100": round(mean_over(runs, _early_reward), 5),
+            "mean_reward_of_last_100": round(mean_over(runs, lambda run: float(run.values["rewards"][-EARLY:].mean())), 5),
+            "untried_actions": mean_over(runs, lambda run: float((run.tries == 0).sum())),
+        }
+        for (part, divergence), runs in grouped.items()
     }
+    return {"runs": rows, "claims": judged(CLAIMS, grouped, set(product(PARTS, DIVERGENCES)) <= set(grouped))}
 
 
 def _early_reward(run: Explored) -> float:
     return float(run.values["rewards"][:EARLY].mean())
 
 
-def measured(grouped: Groups) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of both parts with both divergences."""
-    ratios = {divergence: _size_ratios(grouped, divergence) for divergence in DIVERGENCES}
-    kl_ratio, kail_ratio = interval(ratios["kl"]), interval(ratios["kail"])
-    return [
-        _apart(FIRST, "failing"),
-        _apart(SECOND, "uncertain"),
-        _spikes({divergence: relative_tries_of(grouped["left_arm", divergence], _of_arm(grouped)) for divergence in DIVERGENCES}),
-        SIZE.measured(estimate(ratios["kl"]), kl_ratio[0] > 1.5),
-        COMPARABLE.measured(estimate(ratios["kail"]), 0.8 < kail_ratio[0] and kail_ratio[1] < 1.25),
-    ]
+def _apart(kind: str, grouped: Groups) -> Measured:
+    """Judge the computed numbers of tries, in the arm's space."""
+    kail, plain = (tries_to_prefer("left_arm", divergence, kind) for divergence in DIVERGENCES)
+    texts = [f"{count:.1f}" if np.isfinite(count) else "never" for count in (kail, plain)]
+    return f"tries with 'Kail' {texts[0]}, with plain KL {texts[1]}", kail < plain
+
+
+first, second = (
+    Claim(
+        source,
+        f"with 'Kail' divergence fewer tries are needed to prefer {text} action to a reliable one than with plain KL divergence",
+        "many with KL",
+        rule=partial(_apart, kind),
+    )
+    for source, text, kind in (("thesis 6.4.2, 6.4.3", "a failing", "failing"), ("thesis 6.4.2", "an uncertain", "uncertain"))
+)
 
 
 def _of_arm(grouped: Groups) -> list[Explored]:
     return [run for divergence in DIVERGENCES for run in grouped.get(("left_arm", divergence), [])]
 
 
-def _spikes(ratios: Mapping[str, list[float]]) -> Claim:
-    """Judge mean tries of failing actions over those of other actions, by divergence, of each run of the arm."""
-    if not all(ratios.values()):
-        return SPIKES.measured("no action fails in more than half of its tries", None)
-    text = f"tries of failing actions over those of others: 'Kail' {estimate(ratios['kail'])}, plain KL {estimate(ratios['kl'])}"
-    return SPIKES.measured(text, interval(ratios["kail"])[0] > max(interval(ratios["kl"])[1], 1.0))
-
-
-def _apart(claim: Claim, kind: str) -> Claim:
-    """Judge the computed numbers of tries, in the arm's space."""
-    kail, plain = tries_to_prefer("left_arm", "kail", kind), tries_to_prefer("left_arm", "kl", kind)
-    return claim.measured(f"tries with 'Kail' {_tries(kail)}, with plain KL {_tries(plain)}", kail < plain)
-
-
-def _tries(count: float) -> str:
-    return f"{count:.1f}" if np.isfinite(count) else "never"
+@claim(
+    "thesis 6.4.3",
+    "with 'Kail' divergence the agent tries failing actions more often than others, and more so than with plain KL divergence",
+    "qualitative",
+)
+def spikes(grouped: Groups) -> Measured:
+    kail, plain = (relative_tries_of(grouped["left_arm", divergence], _of_arm(grouped)) for divergence in DIVERGENCES)
+    if not kail or not plain:
+        return "no action fails in more than half of its tries", None
+    text = f"tries of failing actions over those of others: 'Kail' {estimate(kail)}, plain KL {estimate(plain)}"
+    return text, interval(kail)[0] > max(interval(plain)[1], 1.0)
 
 
 def _size_ratios(grouped: Groups, divergence: str) -> list[float]:
@@ -220,6 +192,26 @@ def _size_ratios(grouped: Groups, divergence: str) -> list[float]:
     return [torso[seed] / arm[seed] for seed in sorted(torso.keys() & arm.keys())]
 
 
+@claim(
+    "thesis 6.4.2",
+    "with plain KL divergence a learner with 27 states receives more reward than one with 81: ratio for the first transitions",
+    "eqs. 6.6-6.9: falls with size",
+)
+def size(grouped: Groups) -> Measured:
+    ratios = _size_ratios(grouped, "kl")
+    return estimate(ratios), interval(ratios)[0] > 1.5
+
+
+@claim(
+    "thesis 6.4.3", "with 'Kail' divergence learners with 27 and 81 states receive comparable rewards: ratio for the first transitions", "1"
+)
+def comparable(grouped: Groups) -> Measured:
+    ratios = _size_ratios(grouped, "kail")
+    low, high = interval(ratios)
+    return estimate(ratios), 0.8 < low and high < 1.25
+
+
+CLAIMS = (first, second, spikes, size, comparable)
 SMOOTH = 50  # transitions
 
 
@@ -241,18 +233,12 @@ def plot(found: Cells) -> Any:
             title=f"rewards of the agents, mean over {SMOOTH} transitions", xlabel="transition", ylabel="reward [nats]", yscale="log"
         )
         if ("left_arm", divergence) in grouped:
-            _tries_of_arm(tried, grouped["left_arm", divergence][0].tries, constraint_actions(_of_arm(grouped)))
+            tries = grouped["left_arm", divergence][0].tries
+            draw_tries(tried, tries, constraint_actions(_of_arm(grouped)), 3.0, "failing")
+            tried.set(title=f"tries of the arm in {tries.sum()} transitions", xlabel="state-action")
         for axes in (computed, received, tried):
-            axes.legend(fontsize=8)
-            axes.grid(alpha=0.2)
+            finish(axes, legend=8)
     return drawing
-
-
-def _tries_of_arm(axes: Any, tries: Ints, chosen: NDArray[np.bool_]) -> None:
-    number = np.arange(len(tries))
-    axes.bar(number[~chosen], tries[~chosen], width=1.0, color="0.6", label="others")
-    axes.bar(number[chosen], tries[chosen], width=3.0, color="C3", label="failing")
-    axes.set(title=f"tries of the arm in {tries.sum()} transitions", xlabel="state-action")
 
 
 EXPERIMENT = Experiment(

@@ -23,12 +23,13 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch7_learning.planned_queries import TESTS, UP, Queries, TablePlant, roadmaps
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.learning.exploration import explore
-from experiments.kit.plots import draw_curve, draw_points, new_figure
+from experiments.kit.plots import draw_curve, draw_points, finish, new_figure
+from experiments.kit.rules import rises
 from experiments.kit.statistics import estimate, interval
-from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
+from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice, TransitionModel
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
@@ -57,25 +58,6 @@ MEASURES = ROADMAP_MEASURES | {
 }
 MIN_TRIES, CERTAIN = 2, 0.8  # tries from which a state-action counts, and probability from which an outcome is certain
 OPERABLE = 0.9  # success from which a planner works
-
-FATES = Claim(
-    "paper 3.1, fig. 7",
-    "most state-actions of the learned model end in their goal; of the few that do not, some always end elsewhere, some sometimes",
-    "7 lead elsewhere: 4 always, 3 sometimes",
-)
-ADAPTS = Claim("paper 2, 3.2", "the learned MDP planner needs no static workspace: it adapts to a table that enters", "no number")
-INOPERABLE = Claim("paper 3.2", "a PRM planner does not work in an environment that moves", "no number")
-PREDICTABLE = Claim(
-    "paper 3.2.1, thesis 7.4.1",
-    "an MDP planner trained with a moving obstacle avoids unpredictable state-actions: it needs fewer actions per query",
-    "no number",
-)
-AROUND = Claim(
-    "paper 3.2.1, thesis 7.4.1",
-    "an MDP planner trained with a moving obstacle plans around the region where it tends to be: fewer queries meet it",
-    "no number",
-)
-CLAIMS = (FATES, ADAPTS, INOPERABLE, PREDICTABLE, AROUND)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -137,9 +119,9 @@ Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # values by cond
 def runs_of(found: Cells) -> Runs:
     """Return the values of the finished runs of each condition, by seed."""
     runs: dict[tuple[str, float | None], list[dict[str, Any]]] = {}
-    for (condition,), results in grouped_by(found, "training").items():
-        for result in results:
-            runs.setdefault((condition, result.cell.settings.get("forgetting")), []).append(result.values)
+    for result in sorted(found.values(), key=lambda result: result.cell.seed):
+        settings = result.cell.settings
+        runs.setdefault((settings["training"], settings.get("forgetting")), []).append(result.values)
     return runs
 
 
@@ -157,7 +139,7 @@ def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]
 def findings(found: Cells) -> dict[str, Any]:
     """Return the claims, and the tables of plans that were executed."""
     runs = runs_of(found)
-    return {"claims": [claim.record() for claim in measured(runs)], **tables(runs)}
+    return {"claims": judged(CLAIMS, runs), **tables(runs)}
 
 
 def tables(runs: Runs) -> dict[str, Any]:
@@ -182,53 +164,66 @@ def tables(runs: Runs) -> dict[str, Any]:
     return {"plans executed": executed, "after the table entered": entered}
 
 
-def measured(runs: Runs) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all conditions."""
-    return [
-        _fates(runs),
-        _adapts(runs),
-        _inoperable(runs),
-        _less(PREDICTABLE, runs, "actions"),
-        _less(AROUND, runs, "met"),
-    ]
-
-
-def _fates(runs: Runs) -> Claim:
+@claim(
+    "paper 3.1, fig. 7",
+    "most state-actions of the learned model end in their goal; of the few that do not, some always end elsewhere, some sometimes",
+    "7 lead elsewhere: 4 always, 3 sometimes",
+)
+def ends(runs: Runs) -> Measured:
     counts = [run["fates"] for run in runs["still", None]]
     share = np.array([c["goal"] / c["tried"] for c in counts])
     elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
     text = f"of the state-actions tried {MIN_TRIES} times or more a share of {estimate(share)} reaches its goal; "
     text += f"{estimate(elsewhere)} state-actions always end elsewhere, {estimate(sometimes)} sometimes"
-    return FATES.measured(text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0)
+    return text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0
 
 
-def _adapts(runs: Runs) -> Claim:
+@claim("paper 2, 3.2", "the learned MDP planner needs no static workspace: it adapts to a table that enters", "no number")
+def adapts(runs: Runs) -> Measured:
     after, rows = entering(runs, ENTERS[0])
     success, actions = rows["success"], rows["actions"]
     text = (
         f"success {estimate(success[:, 0])} when it enters, {estimate(success[:, -1])} {after[-1]} transitions later;"
         f" actions per query {estimate(actions[:, 0])} and {estimate(actions[:, -1])}"
     )
-    return ADAPTS.measured(text, interval(success[:, -1] - success[:, 0])[0] > 0.0 and interval(actions[:, 0] - actions[:, -1])[0] > 0.0)
+    return text, rises(success[:, -1] - success[:, 0]) is True and rises(actions[:, 0] - actions[:, -1]) is True
 
 
-def _inoperable(runs: Runs) -> Claim:
+@claim("paper 3.2", "a PRM planner does not work in an environment that moves", "no number")
+def inoperable(runs: Runs) -> Measured:
     once, repairs = (tested(runs, "roadmap", "moving", "success", mode) for mode in ("planned once", "repairs"))
     text = (
         f"success with the moving table: roadmap planned once {estimate(once)}, repaired when a motion fails {estimate(repairs)};"
         f" MDP trained with the moving table {estimate(tested(runs, 'moving', 'moving', 'success'))}"
     )
     low, high = interval(repairs)
-    return INOPERABLE.measured(text, False if low > OPERABLE else True if high < OPERABLE else None)
+    return text, False if low > OPERABLE else True if high < OPERABLE else None
 
 
-def _less(claim: Claim, runs: Runs, measure: str) -> Claim:
-    """Judge whether a measure with the moving table is smaller for the MDP trained with that table than for the one without."""
-    moving, still = (tested(runs, condition, "moving", measure) for condition in ("moving", "still"))
-    low, high = interval(still - moving)
-    text = f"{MEASURES[measure]}, trained with the moving table {estimate(moving)}, without it {estimate(still)}; "
-    text += f"difference {estimate(still - moving)}"
-    return claim.measured(text, True if low > 0.0 else False if high < 0.0 else None)
+def _less(measure: str) -> Rule:
+    """Return the rule that a measure with the moving table is smaller for the MDP trained with that table than for the one without."""
+
+    def of_runs(runs: Runs) -> Measured:
+        moving, still = (tested(runs, condition, "moving", measure) for condition in ("moving", "still"))
+        text = f"{MEASURES[measure]}, trained with the moving table {estimate(moving)}, without it {estimate(still)}; "
+        return text + f"difference {estimate(still - moving)}", rises(still - moving)
+
+    return of_runs
+
+
+predictable = Claim(
+    "paper 3.2.1, thesis 7.4.1",
+    "an MDP planner trained with a moving obstacle avoids unpredictable state-actions: it needs fewer actions per query",
+    "no number",
+    rule=_less("actions"),
+)
+around = Claim(
+    "paper 3.2.1, thesis 7.4.1",
+    "an MDP planner trained with a moving obstacle plans around the region where it tends to be: fewer queries meet it",
+    "no number",
+    rule=_less("met"),
+)
+CLAIMS = (ends, adapts, inoperable, predictable, around)
 
 
 COLORS = dict(zip(PLANNERS, ("tab:gray", "tab:red", "0.75", "tab:cyan", "tab:blue"), strict=True))
@@ -265,17 +260,14 @@ def _moving(axes: Any, runs: Runs, measure: str) -> None:
         style = {"fmt": "o", "color": COLORS[condition, mode], "capsize": 3, "markersize": 5}
         draw_points(axes, np.arange(3) + 0.1 * (number - 2), values, label=name, **style)
     axes.set_xticks(range(3), TESTS)
-    axes.set(ylabel=MEASURES[measure], xlabel="table while the plans are executed")
-    axes.grid(alpha=0.2)
+    finish(axes, ylabel=MEASURES[measure], xlabel="table while the plans are executed")
 
 
 def _entering(axes: Any, runs: Runs, measure: str) -> None:
     for forgetting, color in zip(ENTERS, ("tab:blue", "tab:orange"), strict=True):
         after, rows = entering(runs, forgetting)
         draw_curve(axes, after, rows[measure], color, "no forgetting" if forgetting == 1.0 else f"forgetting {forgetting:g}")
-    axes.set(xlabel="transitions since the table entered", ylabel=MEASURES[measure])
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.2)
+    finish(axes, legend=8, xlabel="transitions since the table entered", ylabel=MEASURES[measure])
 
 
 def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array) -> None:

@@ -18,17 +18,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, judged
 from experiments.kit.learning.arm import RANK3, RANK4, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_nearby, explore
 from experiments.kit.learning.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
-from experiments.kit.plots import new_figure
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
+from experiments.kit.plots import finish, new_figure
+from experiments.kit.rules import decides, within
+from experiments.kit.statistics import interquartile_mean, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent, Lattice, Plant, TransitionModel
 from mobee.arrays import Array, Ints
@@ -58,31 +59,6 @@ MAX_WALK = 40_000  # actions; rank 4 has states that no walk reaches
 SHARES = (0.125, 0.25, 0.375, 0.5, 0.75, 1.0)  # of a world's transitions, after which the error of its models is measured
 MAX_ERROR = 0.04  # L1
 CURIOUS_RATIO, DEPLETING_RATIO, DEBIASED_RATIO = 1.6, 2.0, 8.0  # our aims: the larger error over the smaller one
-
-_AIM = "aim of this reproduction"
-OVERALL = {
-    world: Claim(
-        _AIM,
-        f"after 4000 curious transitions the L1 error of the model with debiased counts is at most {MAX_ERROR} ({text})",
-        f"at most {MAX_ERROR}",
-    )
-    for world, text in (("half-space", "half-space"), ("rank3", "arm, 81 states"))
-}
-STOCHASTIC = {
-    (world, explorer): Claim(
-        _AIM,
-        f"on stochastic actions the {explorer} agent's model has a smaller error than the least-tried agent's: ratio ({text})",
-        f"at least {times} x",
-    )
-    for world, text in (("half-space", "half-space"), ("rank4", "arm, 256 states"))
-    for explorer, times in (("curious", CURIOUS_RATIO), ("depleting", DEPLETING_RATIO))
-}
-WITHOUT = Claim(
-    _AIM,
-    "without imagined outcomes the error of the model is many times smaller: ratio (arm, 81 states)",
-    f"at least {DEBIASED_RATIO:.0f} x",
-)
-CLAIMS = (*OVERALL.values(), *STOCHASTIC.values(), WITHOUT)
 
 COLUMNS = ("L1_with_imagined", "L1_with_imagined_stochastic", "L1_debiased", "L1_debiased_stochastic")
 COUNTS, DEBIASED, DEBIASED_STOCHASTIC = 0, 2, 3
@@ -137,14 +113,14 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
     known: dict[str, OutcomeModel] = {"half-space": half_space_plant(0)}
     for (world, explorer), walks in grouped_by(found, "world", "explorer").items():
         if explorer == WALK:
-            known[world] = truth_of(space_of(world), np.concatenate([one.values["seen"] for one in walks]).astype(np.intp))
+            known[world] = truth_of(space_of(world), np.concatenate([one["seen"] for one in walks]).astype(np.intp))
     return known
 
 
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
     """Return the error curves of every explorer in every world whose true outcomes are known, (seeds, times, columns)."""
     return {
-        (world, explorer): np.array([error_curve(world, known[world], one.values["seen"]) for one in results])
+        (world, explorer): np.array([error_curve(world, known[world], one["seen"]) for one in results])
         for (world, explorer), results in grouped_by(found, "world", "explorer").items()
         if explorer != WALK and world in known
     }
@@ -176,7 +152,7 @@ def findings(found: Cells) -> dict[str, Any]:
         f"{WORLDS[world].text}; {explorer.replace('_', ' ')}": _row(errors, known[world], floors[world])
         for (world, explorer), errors in last.items()
     }
-    return {"runs": rows, "claims": [claim.record() for claim in measured(last, floors)]}
+    return {"runs": rows, "claims": judged(CLAIMS, (last, floors))}
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
@@ -195,34 +171,62 @@ def _row(last: Array, truth: OutcomeModel, floor: float | None) -> dict[str, Any
     return {"seeds": len(last), "stochastic_actions": stochastic, **numbers, "error_of_estimated_truth_stochastic": floor}
 
 
-def measured(last: Mapping[tuple[str, str], Array], floors: Mapping[str, float | None]) -> list[Claim]:
-    """Return the claims, with our numbers as far as their runs are finished, from the errors (seeds, columns) at the last time."""
-
-    def column(world: str, explorer: str, number: int) -> Array | None:
-        rows = last.get((world, explorer))
-        return None if rows is None or not np.isfinite(rows[:, number]).all() else rows[:, number]
-
-    claims = []
-    for world, claim in OVERALL.items():
-        ours = column(world, "curious", DEBIASED)
-        claims.append(claim if ours is None else claim.measured(estimate(ours, 4), decides(interval(ours), most=MAX_ERROR)))
-    for (world, explorer), claim in STOCHASTIC.items():
-        least = CURIOUS_RATIO if explorer == "curious" else DEPLETING_RATIO
-        rival, ours = (column(world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
-        floor = floors.get(world)
-        note = f"; the estimate of the true outcomes has itself an error of {floor:.3f}" if floor else ""
-        claims.append(_ratio(claim, rival, ours, least, note))
-    claims.append(_ratio(WITHOUT, column("rank3", "curious", COUNTS), column("rank3", "curious", DEBIASED), DEBIASED_RATIO))
-    return claims
+Last = tuple[Mapping[tuple[str, str], Array], Mapping[str, float | None]]  # errors at the last time (seeds, columns); of the estimates
 
 
-def _ratio(claim: Claim, above: Array | None, below: Array | None, least: float, note: str = "") -> Claim:
+def _column(found: Last, world: str, explorer: str, number: int) -> Array | None:
+    rows = found[0].get((world, explorer))
+    return None if rows is None or not np.isfinite(rows[:, number]).all() else rows[:, number]
+
+
+def _overall(world: str, found: Last) -> Measured | None:
+    ours = _column(found, world, "curious", DEBIASED)
+    return None if ours is None else within(ours, 4, most=MAX_ERROR)
+
+
+def _ratio(above: Array | None, below: Array | None, least: float, note: str = "") -> Measured | None:
     """Judge whether the ratio of two errors is at least `least`; open if one is not known, or the interval contains `least`."""
     if above is None or below is None:
-        return claim
+        return None
     factor = ratio_estimate(above, below).replace(" ", " x ", 1)
     text = f"{factor} ({interquartile_mean(above):.3f} against {interquartile_mean(below):.3f})"
-    return claim.measured(text + note, decides(ratio_interval(above, below), least))
+    return text + note, decides(ratio_interval(above, below), least)
+
+
+def _stochastic(world: str, explorer: str, least: float, found: Last) -> Measured | None:
+    rival, ours = (_column(found, world, name, DEBIASED_STOCHASTIC) for name in ("least_tried", explorer))
+    floor = found[1].get(world)
+    return _ratio(rival, ours, least, f"; the estimate of the true outcomes has itself an error of {floor:.3f}" if floor else "")
+
+
+_AIM = "aim of this reproduction"
+CLAIMS = (
+    *(
+        Claim(
+            _AIM,
+            f"after 4000 curious transitions the L1 error of the model with debiased counts is at most {MAX_ERROR} ({text})",
+            f"at most {MAX_ERROR}",
+            rule=partial(_overall, world),
+        )
+        for world, text in (("half-space", "half-space"), ("rank3", "arm, 81 states"))
+    ),
+    *(
+        Claim(
+            _AIM,
+            f"on stochastic actions the {explorer} agent's model has a smaller error than the least-tried agent's: ratio ({text})",
+            f"at least {times} x",
+            rule=partial(_stochastic, world, explorer, times),
+        )
+        for world, text in (("half-space", "half-space"), ("rank4", "arm, 256 states"))
+        for explorer, times in (("curious", CURIOUS_RATIO), ("depleting", DEPLETING_RATIO))
+    ),
+    Claim(
+        _AIM,
+        "without imagined outcomes the error of the model is many times smaller: ratio (arm, 81 states)",
+        f"at least {DEBIASED_RATIO:.0f} x",
+        rule=lambda found: _ratio(*(_column(found, "rank3", "curious", which) for which in (COUNTS, DEBIASED)), DEBIASED_RATIO),
+    ),
+)
 
 
 def plot(found: Cells) -> Any:
@@ -238,13 +242,11 @@ def plot(found: Cells) -> Any:
                 above.plot(times(world), counts, "--", color=f"C{number}", linewidth=0.9)
                 above.plot(times(world), debiased, color=f"C{number}", label=label)
                 below.plot(times(world), stochastic, color=f"C{number}", label=label)
-        above.set(title=WORLDS[world].text, ylabel="L1 error, all actions", yscale="log")
+        finish(above, title=WORLDS[world].text, ylabel="L1 error, all actions", yscale="log")
         above.title.set_fontsize(9)
-        below.set(xlabel="transitions", ylabel="L1 error, stochastic actions", ylim=(0.0, None))
+        finish(below, xlabel="transitions", ylabel="L1 error, stochastic actions", ylim=(0.0, None))
         if not any(np.isfinite(curves[key][:, :, DEBIASED_STOCHASTIC]).any() for key in curves if key[0] == world):
             below.text(0.5, 0.5, "no action is stochastic", transform=below.transAxes, ha="center")
-        above.grid(alpha=0.2)
-        below.grid(alpha=0.2)
     drawing.axes[0].legend(fontsize=7, title="debiased; dashed: with imagined outcomes", title_fontsize=7)
     return drawing
 

@@ -15,16 +15,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.cells import CellResult
+from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
-from experiments.kit.plots import draw_points, new_figure
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, mean_over, ratio_interval
-from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
+from experiments.kit.plots import draw_points, finish, new_figure
+from experiments.kit.rules import decides, of_each, texts
+from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, ratio_interval
+from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, OfflinePlant, Space, TransitionModel, value_iteration
 from mobee.errors import InvalidValue
 
@@ -36,16 +39,8 @@ DISCOUNT, TOLERANCE = 0.9, 1e-6  # of plans
 PUBLISHED = 16  # neighbours
 MARGIN = 0.02  # of success: a share at most this much lower counts as equal
 
-SOONER = Claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
-DENSER = Claim(
-    "paper 4.1",
-    "16 neighbours are more than necessary: after 1000 transitions plans in a sparser graph succeed as often and as directly",
-    "an impression",
-)
-LENGTH = Claim("paper 4.1", "with fewer neighbours plans are longer: actions per solved task, after the last transition", "-")
-CLAIMS = (SOONER, DENSER, LENGTH)
-
-Groups = Mapping[int | str, list[dict[str, Any]]]  # values of the runs, with their budgets, by graph
+Run = dict[str, Any]  # the values of a cell, and its budgets
+Groups = Mapping[int | str, list[Run]]  # by graph
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -125,32 +120,32 @@ def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, 
 
 
 def groups(found: Cells) -> Groups:
-    """Return the values of the runs of each graph, by seed, with their budgets."""
-    cells = grouped_by(found, "graph")
-    return {
-        graph: [{**result.values, "budgets": result.cell.settings["budgets"]} for result in cells[graph,]]
-        for graph in GRAPHS
-        if (graph,) in cells
-    }
+    """Return the runs of each graph, by seed."""
+
+    def of(result: CellResult) -> Run:
+        return {**result.values, "budgets": result.cell.settings["budgets"]}
+
+    by_graph = runs_by(found, of, "graph")
+    return {graph: by_graph[graph,] for graph in GRAPHS if (graph,) in by_graph}
 
 
-def success(run: Mapping[str, Any], budget: int) -> float:
+def success(run: Run, budget: int) -> float:
     """Return the share of the tasks that were solved after a budget of transitions."""
     return float(np.mean(run["reached"][run["budgets"].index(budget)]))
 
 
-def direct(run: Mapping[str, Any], budget: int) -> float:
+def direct(run: Run, budget: int) -> float:
     """Return the share of the tasks that were solved with the fewest actions that the graph allows."""
     place = run["budgets"].index(budget)
     return float(np.mean(run["reached"][place] & (run["actions"][place] <= run["fewest"])))
 
 
-def length(run: Mapping[str, Any]) -> float:
+def length(run: Run) -> float:
     """Return the mean number of actions of the solved tasks, after the last budget."""
     return float(run["actions"][-1][run["reached"][-1]].mean())
 
 
-def learning_times(runs: list[dict[str, Any]]) -> list[int]:
+def learning_times(runs: list[Run]) -> list[int]:
     """Return the transitions until every state-action was tried once, of the runs in which all were tried."""
     return [run["covered"] for run in runs if run["covered"] is not None]
 
@@ -159,53 +154,61 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each graph, and the claims if all graphs were run."""
     grouped = groups(found)
     rows = {f"{graph} neighbours": _row(runs) for graph, runs in grouped.items()}
-    complete = all(graph in grouped for graph in GRAPHS)
-    return {"runs": rows, "claims": [claim.record() for claim in (measured(grouped) if complete else CLAIMS)]}
+    return {"runs": rows, "claims": judged(CLAIMS, grouped, set(GRAPHS) <= set(grouped))}
 
 
-def _row(runs: list[dict[str, Any]]) -> dict[str, Any]:
+def _row(runs: list[Run]) -> dict[str, Any]:
     times = learning_times(runs)
     row: dict[str, Any] = {"seeds": len(runs), "state_actions": runs[0]["state_actions"]}
     row["transitions_until_all_tried"] = round(interquartile_mean(times)) if times else None
     for budget in runs[0]["budgets"]:
-        row[f"solved_after_{budget}"] = interquartile_mean([success(run, budget) for run in runs])
-        row[f"solved_directly_after_{budget}"] = interquartile_mean([direct(run, budget) for run in runs])
+        row[f"solved_after_{budget}"] = mean_over(runs, partial(success, budget=budget))
+        row[f"solved_directly_after_{budget}"] = mean_over(runs, partial(direct, budget=budget))
     return row | {"actions_per_solved_task": mean_over(runs, length)}
 
 
-def measured(grouped: Groups) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all graphs."""
-    fewer = {graph: runs for graph, runs in grouped.items() if isinstance(graph, int) and graph <= PUBLISHED}
-    return [
-        _sooner({graph: learning_times(runs) for graph, runs in fewer.items()}, len(grouped[PUBLISHED])),
-        _denser(fewer),
-        LENGTH.measured(", ".join(f"{graph} neighbours: {estimate([length(run) for run in runs])}" for graph, runs in fewer.items()), None),
-    ]
+def _fewer(grouped: Groups) -> dict[int, list[Run]]:
+    """Return the runs of the published graph and of sparser ones."""
+    return {graph: runs for graph, runs in grouped.items() if isinstance(graph, int) and graph <= PUBLISHED}
 
 
-def _sooner(times: Mapping[int, list[int]], seeds: int) -> Claim:
+@claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
+def sooner(grouped: Groups) -> Measured:
     """Compare learning times; the claim is open if a run did not try every action, because the runs that finished are the faster ones."""
+    times = {graph: learning_times(runs) for graph, runs in _fewer(grouped).items()}
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}
     text = ", ".join(f"{graph} neighbours: {time:.0f}" for graph, time in middle.items())
-    unfinished = sum(seeds - len(found) for found in times.values())
+    unfinished = sum(len(grouped[PUBLISHED]) - len(found) for found in times.values())
     if unfinished:
-        return SOONER.measured(f"{text}; {unfinished} runs had not tried every action", None)
+        return f"{text}; {unfinished} runs had not tried every action", None
     fewest, *_, most = times.values()
     ordered = list(middle.values())
-    return SOONER.measured(text, decides(ratio_interval(fewest, most), most=1.0) if ordered == sorted(ordered) else False)
+    return text, decides(ratio_interval(fewest, most), most=1.0) if ordered == sorted(ordered) else False
 
 
-def _denser(fewer: Mapping[int, list[dict[str, Any]]]) -> Claim:
-    """Judge whether plans in a sparser graph succeed as often, and as directly, as in the published one."""
-    shares = {graph: [success(run, JUDGED) for run in runs] for graph, runs in fewer.items()}
-    straight = {graph: [direct(run, JUDGED) for run in runs] for graph, runs in fewer.items()}
+@claim(
+    "paper 4.1",
+    "16 neighbours are more than necessary: after 1000 transitions plans in a sparser graph succeed as often and as directly",
+    "an impression",
+)
+def denser(grouped: Groups) -> Measured:
+    fewer = _fewer(grouped)
+    shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))
     enough = any(
         all(interval(values[graph])[0] >= interquartile_mean(values[PUBLISHED]) - MARGIN for values in (shares, straight))
         for graph in fewer
         if graph < PUBLISHED
     )
     each = (f"{graph} neighbours: solved {estimate(shares[graph])}, directly {estimate(straight[graph])}" for graph in fewer)
-    return DENSER.measured("; ".join(each), enough)
+    return "; ".join(each), enough
+
+
+@claim("paper 4.1", "with fewer neighbours plans are longer: actions per solved task, after the last transition", "-")
+def longer(grouped: Groups) -> Measured:
+    return texts(of_each(_fewer(grouped), length), form="{} neighbours: {}"), None
+
+
+CLAIMS = (sooner, denser, longer)
 
 
 def plot(found: Cells) -> Any:
@@ -227,8 +230,7 @@ def plot(found: Cells) -> Any:
     draw_points(right, list(times), list(times.values()), label="until every action was tried once", **style)
     right.set(ylabel="transitions", xlabel="neighbours per state")
     for axes in (left, middle, right):
-        axes.legend(fontsize=8)
-        axes.grid(alpha=0.2)
+        finish(axes, legend=8)
         axes.tick_params(axis="x", labelrotation=30)
     return drawing
 

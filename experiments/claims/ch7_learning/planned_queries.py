@@ -14,12 +14,12 @@ from experiments.kit.control.plant_runs import place
 from experiments.kit.learning.arm import JOINTS, PART, arm_clauses, arm_plant, clear, whole
 from experiments.kit.learning.arm_planners import PlannedOnce, Repaired, Rival
 from experiments.kit.learning.arm_roadmap import NEIGHBOURS, Belief, make_roadmap, with_goals
-from mobee import Lattice, Outcome, World, box
+from experiments.kit.wrapped_plant import WrappedPlant
+from mobee import Lattice, OfflinePlant, Outcome, World, box
 from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.learning.planner import Plan, Planner
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.robot.robot import Robot
 
 Paths = Sequence[tuple[int, ...]]  # the states of each query, from start to end
 
@@ -31,35 +31,25 @@ MAX_ACTIONS = 20  # actions of a query
 ALONG = np.linspace(0.0, 1.0, 41)  # shares of the straight path between two samples at which it is checked
 
 
-class TablePlant:
+class TablePlant(WrappedPlant[OfflinePlant]):
     """A Plant of the arm with the table; `moves`: the table is moved up or down at random after every PERIOD actions."""
 
     def __init__(self, seed: int, moves: bool = False) -> None:
-        world = World()
-        world.add("table", box(*SIZE), position=_middle(DOWN))
-        self.world, self.inner = world, arm_plant(seed, world=world)
-        self.robot: Robot = self.inner.robot
+        self.world = World()
+        self.world.add("table", box(*SIZE), position=_middle(DOWN))
+        super().__init__(arm_plant(seed, world=self.world))
         self._moves, self._rng, self._actions = moves, np.random.default_rng([seed, 741]), 0
 
     def set_top(self, height: float) -> None:
         """Move the table's top to a height [m]."""
         self.world.move("table", position=_middle(height))
 
-    @property
-    def q(self) -> Array:
-        """See Plant."""
-        return self.inner.q
-
-    def measure(self, part: str) -> Array:
-        """See Plant."""
-        return self.inner.measure(part)
-
     def act(self, part: str, target: Array) -> Outcome:
         """See Plant."""
         if self._moves and self._actions % PERIOD == 0:
             self.set_top(self._rng.choice((DOWN, UP)))
         self._actions += 1
-        return self.inner.act(part, target)
+        return super().act(part, target)
 
 
 def _middle(top: float) -> tuple[float, float, float]:

@@ -26,7 +26,7 @@ import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import FAILING
 from experiments.claims.ch7_learning.unreachable_states import DEFLECTED_TO, HARDLY, NEVER
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import DT, LEFT, RANK3, RANK4, arm_space, robot
 from experiments.kit.learning.exploration import begin_anywhere, newest
 from experiments.kit.learning.outcomes import ends_of, outcome_counts, visits_of
@@ -42,29 +42,6 @@ QUICK = 0.1  # share of the transitions in the short version
 ENTERING = (21, 24)
 MAX_RARE_VISITS = 4.0  # mean visits of each of the hardly reached states in 5000 actions; the published 10 are of 14 597
 MIN_DEFLECTED, MIN_FAILING = 0.9, 0.5  # shares of tries
-
-AIM = "aim of this reproduction"
-REPRODUCED = Claim(
-    AIM,
-    "the published parameters reproduce the findings about the shoulder's cables on 256 states (5000 actions) and on 81 states (3000)",
-    "both",
-)
-ROBUST = Claim(
-    AIM,
-    "the findings about the shoulder's cables depend on no parameter of the motors: delay, lag, backlash, noise from 0.05 to 0.2 deg",
-    "no change loses one",
-)
-MOMENTUM = Claim(
-    "thesis 7.2.5",
-    "the speed below which an action has settled decides whether the states that are hard to enter are entered",
-    "suspected",
-)
-NOISE = Claim(
-    "thesis 7.2.5",
-    "outcomes are uncertain because of noise in sensors and motors: number of actions with several outcomes, by encoder noise",
-    "suspected",
-)
-CLAIMS = (REPRODUCED, ROBUST, MOMENTUM, NOISE)
 
 
 @dataclass(frozen=True)
@@ -261,35 +238,68 @@ def findings(found: Cells) -> dict[str, Any]:
     whole = set(rows) == set(VARIANTS) and all(len(result.values["rank4"]) == ACTIONS["rank4"] for result in found.values())
     return {
         "variants": {variant: row.record() for variant, row in rows.items()},
-        "claims": [claim.record() for claim in (measured(rows) if whole else CLAIMS)],
+        "claims": judged(CLAIMS, rows, whole),
     }
 
 
-def measured(rows: Mapping[str, Row]) -> list[Claim]:
-    """Return the claims with our numbers, from the rows of all variants."""
+Rows = Mapping[str, Row]  # by variant
+
+
+def _changed(rows: Rows, parameter: str) -> dict[str, Row]:
+    """Return the rows of the variants in which a parameter was changed, by its value."""
+    return {variant.rpartition(" ")[2]: row for variant, row in rows.items() if variant.startswith(parameter)}
+
+
+@claim(
+    "aim of this reproduction",
+    "the published parameters reproduce the findings about the shoulder's cables on 256 states (5000 actions) and on 81 states (3000)",
+    "both",
+)
+def reproduced(rows: Rows) -> Measured:
     base = rows[PUBLISHED]
+    found = " and ".join(name for name, is_there in (("256 states", base.rank4), ("81 states", base.rank3)) if is_there)
+    return f"reproduced on {found}" if found else "neither", base.both
+
+
+@claim(
+    "aim of this reproduction",
+    "the findings about the shoulder's cables depend on no parameter of the motors: delay, lag, backlash, noise from 0.05 to 0.2 deg",
+    "no change loses one",
+)
+def robust(rows: Rows) -> Measured:
     motors = {variant: row for variant, row in rows.items() if variant.startswith(MOTORS)}
     lost = [variant for variant, row in motors.items() if not row.both]
-    speeds = {variant.rpartition(" ")[2]: row for variant, row in rows.items() if variant.startswith("settle speed")}
+    text = f"{len(motors) - len(lost)} of {len(motors)} changes reproduce both" + (f"; lost with {', '.join(lost)}" if lost else "")
+    return text, not lost
+
+
+@claim(
+    "thesis 7.2.5",
+    "the speed below which an action has settled decides whether the states that are hard to enter are entered",
+    "suspected",
+)
+def momentum(rows: Rows) -> Measured:
+    speeds = _changed(rows, "settle speed")
     text = "; ".join(
         f"at {speed} deg/s 57->61 ends in {row.where}, 15->24 and like fail in {row.failing:.2f} of the tries"
         for speed, row in speeds.items()
     )
-    changes = f"{len(motors) - len(lost)} of {len(motors)} changes reproduce both" + (f"; lost with {', '.join(lost)}" if lost else "")
-    reproduced = " and ".join(name for name, is_there in (("256 states", base.rank4), ("81 states", base.rank3)) if is_there)
-    return [
-        REPRODUCED.measured(f"reproduced on {reproduced}" if reproduced else "neither", base.both),
-        ROBUST.measured(changes, not lost),
-        MOMENTUM.measured(text, not all(row.both for row in speeds.values())),
-        _noise(rows),
-    ]
+    return text, not all(row.both for row in speeds.values())
 
 
-def _noise(rows: Mapping[str, Row]) -> Claim:
-    levels = {"0.1": rows[PUBLISHED]} | {v.rpartition(" ")[2]: row for v, row in rows.items() if v.startswith("encoder noise")}
+@claim(
+    "thesis 7.2.5",
+    "outcomes are uncertain because of noise in sensors and motors: number of actions with several outcomes, by encoder noise",
+    "suspected",
+)
+def noise(rows: Rows) -> Measured:
+    levels = {"0.1": rows[PUBLISHED]} | _changed(rows, "encoder noise")
     counts = {level: levels[level].uncertain for level in sorted(levels, key=float)}
     text = ", ".join(f"{count:.0f} at {level} deg" for level, count in counts.items())
-    return NOISE.measured(text, counts["0"] < 0.5 * counts["0.1"] < 0.5 * counts["0.4"])
+    return text, counts["0"] < 0.5 * counts["0.1"] < 0.5 * counts["0.4"]
+
+
+CLAIMS = (reproduced, robust, momentum, noise)
 
 
 GOOD, BAD, PLAIN = "#d5f0d5", "#f6cccc", "white"

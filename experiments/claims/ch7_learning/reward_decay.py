@@ -13,38 +13,23 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
+from experiments.kit.rules import of_each, stands_below, texts
+from experiments.kit.statistics import interquartile_mean, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import CuriousAgent
 
 EXPLORERS = ("curious", "least_tried", "random")
 TIMES = (250, 500, 1000, 2000, 4000)  # transitions
 QUICK_TIMES = TIMES[:3]
-
-UNIFORM = Claim(
-    "paper 3.1, fig. 6",
-    "the curious agent's reward decays more uniformly than that of the other explorers: largest over mean reward at the end",
-    "qualitative",
-)
-COLLECTED = Claim(
-    "paper 3.1, fig. 6",
-    "the curious agent goes wherever the reward is high, the other explorers do not: largest remaining reward at the end",
-    "qualitative",
-)
-FASTER = Claim(
-    "paper 3.1",
-    "the curious agent leaves less to learn: its mean remaining reward at the end over that of the other explorers",
-    "qualitative",
-)
-CLAIMS = (UNIFORM, COLLECTED, FASTER)
 
 Groups = Mapping[str, list[dict[str, Any]]]
 
@@ -67,50 +52,52 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     return {"rewards": np.array(snapshots, dtype=np.float32), "times": settings["times"]}
 
 
+def _least(number: Any, digits: int, groups: Groups) -> Measured:
+    """Judge whether a number of the rewards at the end is lower for the curious agent than for the others."""
+    values = of_each(groups, lambda run: float(number(run["rewards"][-1])))
+    return texts(values, digits), stands_below(values, "curious")
+
+
+uniform = Claim(
+    "paper 3.1, fig. 6",
+    "the curious agent's reward decays more uniformly than that of the other explorers: largest over mean reward at the end",
+    "qualitative",
+    rule=partial(_least, lambda rewards: rewards.max() / rewards.mean(), 1),
+)
+collected = Claim(
+    "paper 3.1, fig. 6",
+    "the curious agent goes wherever the reward is high, the other explorers do not: largest remaining reward at the end",
+    "qualitative",
+    rule=partial(_least, np.max, 4),
+)
+
+
+@claim(
+    "paper 3.1",
+    "the curious agent leaves less to learn: its mean remaining reward at the end over that of the other explorers",
+    "qualitative",
+)
+def faster(groups: Groups) -> Measured:
+    left = of_each(groups, lambda run: float(run["rewards"][-1].mean()))
+    text = ", ".join(f"over {other.replace('_', ' ')} {ratio_estimate(left['curious'], left[other])}" for other in EXPLORERS[1:])
+    return text, all(ratio_interval(left["curious"], left[other])[1] < 1.0 for other in EXPLORERS[1:])
+
+
+CLAIMS = (uniform, collected, faster)
+
+
 def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each explorer, and the claims."""
     groups = grouped(found, "explorer", EXPLORERS)
-    numbers = {"mean": np.mean, "largest": np.max}
-    rows = {
-        f"{name} reward, {explorer.replace('_', ' ')}": _row(runs, number)
-        for explorer, runs in groups.items()
-        for name, number in numbers.items()
-    }
-    claims = measured(groups) if len(groups) == len(EXPLORERS) else CLAIMS
-    return {"runs": rows, "claims": [claim.record() for claim in claims]}
-
-
-def _row(runs: list[dict[str, Any]], number: Any) -> dict[str, Any]:
-    row: dict[str, Any] = {"seeds": len(runs)}
-    for place, time in enumerate(runs[0]["times"]):
-        row[f"after_{time}_transitions"] = round(interquartile_mean([float(number(run["rewards"][place])) for run in runs]), 5)
-    return row
-
-
-def measured(groups: Groups) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all explorers."""
-    last = {explorer: [run["rewards"][-1] for run in groups[explorer]] for explorer in EXPLORERS}
-    peak = {explorer: [float(rewards.max() / rewards.mean()) for rewards in last[explorer]] for explorer in EXPLORERS}
-    largest = {explorer: [float(rewards.max()) for rewards in last[explorer]] for explorer in EXPLORERS}
-    mean = {explorer: [float(rewards.mean()) for rewards in last[explorer]] for explorer in EXPLORERS}
-    others = [ratio_interval(mean["curious"], mean[explorer]) for explorer in EXPLORERS[1:]]
-    against = ", ".join(
-        f"over {explorer.replace('_', ' ')} {ratio_estimate(mean['curious'], mean[explorer])}" for explorer in EXPLORERS[1:]
-    )
-    return [
-        UNIFORM.measured(_each(peak, 1), _is_least(peak)),
-        COLLECTED.measured(_each(largest, 4), _is_least(largest)),
-        FASTER.measured(against, all(high < 1.0 for _, high in others)),
-    ]
-
-
-def _each(values: Mapping[str, list[float]], digits: int) -> str:
-    return ", ".join(f"{explorer.replace('_', ' ')} {estimate(values[explorer], digits)}" for explorer in EXPLORERS)
-
-
-def _is_least(values: Mapping[str, list[float]]) -> bool:
-    """Return whether the interval of the curious agent lies below those of the others."""
-    return all(interval(values["curious"])[1] < interval(values[explorer])[0] for explorer in EXPLORERS[1:])
+    rows: dict[str, Any] = {}
+    for explorer, runs in groups.items():
+        rewards = np.array([run["rewards"] for run in runs])  # (seeds, times, state-actions)
+        for name, number in {"mean": rewards.mean(axis=2), "largest": rewards.max(axis=2)}.items():
+            after = {
+                f"after_{time}_transitions": round(interquartile_mean(n), 5) for time, n in zip(runs[0]["times"], number.T, strict=True)
+            }
+            rows[f"{name} reward, {explorer.replace('_', ' ')}"] = {"seeds": len(runs), **after}
+    return {"runs": rows, "claims": judged(CLAIMS, groups, len(groups) == len(EXPLORERS))}
 
 
 def plot(found: Cells) -> Any:

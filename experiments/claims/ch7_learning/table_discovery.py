@@ -17,45 +17,38 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from experiments.claims.ch7_learning import table_measures as measures
 from experiments.claims.ch7_learning.table_measures import (
     ARMS,
     EXPLORERS,
-    FORWARD_STATES,
     LEARNERS,
     PARTS,
     PROPAGATIONS,
-    SCORES,
     WINDOW,
     WORLDS,
     Run,
     Runs,
     agreement,
-    at_second_peak,
-    autocorrelation,
     by_goal,
-    correlations,
-    is_cyclic,
-    is_forward,
-    judged,
+    judged_of,
     low,
-    near_table,
     of_arms,
     runs_of,
     second_peak,
-    share_of_top,
-    spaces,
     with_ghosts,
 )
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import table_agents, table_plant
 from experiments.kit.learning.exploration import explore_together
 from experiments.kit.plots import new_figure
-from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over
+from experiments.kit.rules import of_each, row, stands_above, texts
+from experiments.kit.statistics import estimate, interquartile_mean, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -64,47 +57,6 @@ TRANSITIONS, QUICK = 18_000, 2_000  # per learner
 HANDFUL = 5  # states
 SIMILAR = 0.3  # rank correlation from which the arms' choices are similar
 DAYS = (1.0, 3.0)  # of plant time that count as "a little more than two"
-
-PAPER = "paper 3.2, thesis 7.4"
-TOUCH = Claim(
-    PAPER,
-    "three curious agents of torso and arms begin to touch the table frequently: share of the arms' actions that end at it, second half",
-    "qualitative",
-)
-GROWS = Claim(
-    PAPER, "contact with the table becomes more frequent over time: contact rate of the last third minus that of the first", "qualitative"
-)
-FORWARD = Claim(
-    "paper 3.2, fig. 10",
-    "the torso tries actions that lean forward most: mean tries over those of other actions, second half",
-    "qualitative",
-)
-LOW = Claim(
-    "paper 3.2, fig. 10", "the arms try actions with low goals most: mean tries over those of other actions, second half", "qualitative"
-)
-SIMILAR_ARMS = Claim(
-    "paper 3.2, fig. 10",
-    "the two arms choose very similar actions: rank correlation of tries over those at a table without forces (ghost), by goal",
-    "qualitative",
-)
-CYCLES = Claim(
-    PAPER,
-    "contact with the table alternates in cycles with other exploration: second peak of the contact rate's autocorrelation",
-    "cyclic",
-)
-RICHER = Claim(
-    "paper fig. 9, thesis 7.4",
-    "at the table actions have more outcomes than static constraints cause: number of actions with 3 or more",
-    "qualitative",
-)
-FEW = Claim("thesis 6.4", "at the table no action has more than a handful (5) of outcomes", "a handful")
-DETECTOR = Claim(
-    "paper 4.4",
-    "actions whose tries most exceed those at a table without forces (ghost) depend on other parts: precision, equal to recall",
-    "qualitative",
-)
-TIME = Claim("paper 3.2", "18 000 transitions per learner at the table take so many days of robot time", "a little more than 2")
-CLAIMS = (TOUCH, GROWS, FORWARD, LOW, SIMILAR_ARMS, CYCLES, RICHER, FEW, DETECTOR, TIME)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -139,7 +91,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
         values |= log.arrays(part, count)
     for arm in ARMS:
         poses = np.array(logs[arm].poses[:count])
-        values |= {f"touch_{arm}": near_table(poses, arm), f"forward_{arm}": is_forward(poses)}
+        values |= {f"touch_{arm}": measures.near_table(poses, arm), f"forward_{arm}": measures.is_forward(poses)}
     return values
 
 
@@ -152,7 +104,7 @@ def findings(found: Cells) -> dict[str, Any]:
     whole = all(runs.get(("tree", explorer, world)) for explorer in EXPLORERS for world in WORLDS)
     whole = whole and len(next(iter(runs.values()))[0].seen["torso"]) >= TRANSITIONS
     return {
-        "conditions": {_label(*key): _row(group) for key, group in runs.items()},
+        "conditions": {_label(*key): row(group, ROW) for key, group in runs.items()},
         "tries at the table over those at the ghost": {
             f"{NAMES[explorer]}, forces on the {propagate}": _interest(pairs)
             for propagate, explorer in product(PROPAGATIONS, EXPLORERS)
@@ -160,7 +112,7 @@ def findings(found: Cells) -> dict[str, Any]:
         },
         "number of actions by number of outcomes": {_label(*key): _histogram(group) for key, group in runs.items()},
         "precision of finding actions that depend on other parts": detector(runs),
-        "claims": [claim.record() for claim in (measured(runs) if whole else CLAIMS)],
+        "claims": judged(CLAIMS, runs, whole),
     }
 
 
@@ -178,25 +130,19 @@ ROW: dict[str, Number] = {  # numbers of a run by their labels
 }
 
 
-def _row(runs: list[Run]) -> dict[str, float]:
-    return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in ROW.items()}
-
-
 def _label(propagate: str, explorer: str, world: str) -> str:
     return f"{NAMES[explorer]} at the {world}, forces on the {propagate}"
 
 
 def _interest(pairs: Sequence[tuple[Run, Run]]) -> dict[str, float]:
     ratios = [of_arms(*pair) for pair in pairs]
-    aims_low = low()[spaces()[ARMS[0]].goals]
+    aims_low = low()[measures.spaces()[ARMS[0]].goals]
     return {
-        "correlation_of_arms_by_action": interquartile_mean([agreement(ratio) for ratio in ratios]),
+        "correlation_of_arms_by_action": mean_over(ratios, agreement),
         "correlation_of_arms_by_goal": interquartile_mean([agreement(by_goal(ratio)) for ratio in ratios]),
-        "share_of_low_goals_in_top_5_percent": interquartile_mean([share_of_top(ratio, aims_low) for ratio in ratios]),
+        "share_of_low_goals_in_top_5_percent": mean_over(ratios, partial(measures.share_of_top, chosen=aims_low)),
         "share_of_low_goals_in_all": float(aims_low.mean()),
-        "correlation_of_arms_without_ghost": interquartile_mean(
-            [agreement(np.array([run.tries[arm] for arm in ARMS])) for run, _ in pairs]
-        ),
+        "correlation_of_arms_without_ghost": mean_over(pairs, lambda pair: agreement(np.array([pair[0].tries[arm] for arm in ARMS]))),
     }
 
 
@@ -211,7 +157,7 @@ def detector(runs: Runs) -> dict[str, dict[str, float]]:
     """Return the precision, equal to recall, when as many actions are called dependent as really are, and that of chance."""
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
-        found = {score: judged(runs, explorer, learner, score) for score in SCORES}
+        found = {score: judged_of(runs, explorer, learner, score) for score in measures.SCORES}
         if all(found.values()):
             table[f"{learner}, {NAMES[explorer]}"] = {
                 **{score: mean_over(group, lambda one: one.at_all) for score, group in found.items()},
@@ -220,78 +166,117 @@ def detector(runs: Runs) -> dict[str, dict[str, float]]:
     return table
 
 
-def measured(runs: Runs) -> list[Claim]:
-    """Return the claims with our numbers, from the runs of all conditions with forces on the whole tree."""
-    curious = runs["tree", "curious", "table"]
-    return [
-        _against(TOUCH, runs, lambda run: run.touch),
-        _against(GROWS, runs, lambda run: run.growth, least=0.0),
-        _against(FORWARD, runs, lambda run: run.torso_forward),
-        _against(LOW, runs, lambda run: run.arms_low),
-        _similar(runs),
-        _cyclic(runs),
-        _against(RICHER, runs, lambda run: float((run.outcome_numbers >= 3).sum()), 0),
-        FEW.measured(_most(curious), max(int(run.outcome_numbers.max()) for run in curious) <= HANDFUL),
-        _detects(runs),
-        TIME.measured(
-            f"{estimate([run.hours / 24.0 for run in curious])} days; computed in {estimate([run.result.seconds for run in curious], 0)} s",
-            DAYS[0] <= mean_over(curious, lambda run: run.hours / 24.0) <= DAYS[1],
-        ),
-    ]
+_PAPER = "paper 3.2, thesis 7.4"
 
 
-def _against(claim: Claim, runs: Runs, number: Number, digits: int = 2, least: float = -np.inf) -> Claim:
-    """Judge whether `number`, computed for each run, is larger for the curious agents at the table than for all controls and `least`."""
-    values = {key[1:]: [number(run) for run in group] for key, group in runs.items() if key[0] == "tree"}
-    text = ", ".join(f"{NAMES[explorer]} at the {world} {estimate(group, digits)}" for (explorer, world), group in values.items())
-    ours = interval(values["curious", "table"])[0]
-    controls = (interval(group)[1] for key, group in values.items() if key != ("curious", "table"))
-    return claim.measured(text, ours > max(least, *controls))
+def _against(number: Number, digits: int = 2, least: float = -np.inf) -> Rule:
+    """Return the rule that `number`, computed for each run, is larger for the curious agents at the table than for all controls."""
+
+    def of_runs(runs: Runs) -> Measured:
+        values = of_each({key[1:]: group for key, group in runs.items() if key[0] == "tree"}, number)
+        text = ", ".join(f"{NAMES[explorer]} at the {world} {estimate(group, digits)}" for (explorer, world), group in values.items())
+        return text, stands_above(values, ("curious", "table"), least)
+
+    return of_runs
 
 
-def _similar(runs: Runs) -> Claim:
-    found = {e: [agreement(by_goal(of_arms(*pair))) for pair in with_ghosts(runs, "tree", e)] for e in EXPLORERS}
-    text = ", ".join(f"{NAMES[explorer]} {estimate(values)}" for explorer, values in found.items())
-    ours = interval(found["curious"])[0]
-    return SIMILAR_ARMS.measured(text, ours > SIMILAR and all(ours > interval(found[e])[1] for e in EXPLORERS[1:]))
+touch = Claim(
+    _PAPER,
+    "three curious agents of torso and arms begin to touch the table frequently: share of the arms' actions that end at it, second half",
+    "qualitative",
+    rule=_against(lambda run: run.touch),
+)
+grows = Claim(
+    _PAPER,
+    "contact with the table becomes more frequent over time: contact rate of the last third minus that of the first",
+    "qualitative",
+    rule=_against(lambda run: run.growth, least=0.0),
+)
+forward = Claim(
+    "paper 3.2, fig. 10",
+    "the torso tries actions that lean forward most: mean tries over those of other actions, second half",
+    "qualitative",
+    rule=_against(lambda run: run.torso_forward),
+)
+low_arms = Claim(
+    "paper 3.2, fig. 10",
+    "the arms try actions with low goals most: mean tries over those of other actions, second half",
+    "qualitative",
+    rule=_against(lambda run: run.arms_low),
+)
 
 
-def _cyclic(runs: Runs) -> Claim:
+@claim(
+    "paper 3.2, fig. 10",
+    "the two arms choose very similar actions: rank correlation of tries over those at a table without forces (ghost), by goal",
+    "qualitative",
+)
+def similar(runs: Runs) -> Measured:
+    found = {NAMES[e]: [agreement(by_goal(of_arms(*pair))) for pair in with_ghosts(runs, "tree", e)] for e in EXPLORERS}
+    return texts(found), stands_above(found, "curious", least=SIMILAR)
+
+
+@claim(
+    _PAPER,
+    "contact with the table alternates in cycles with other exploration: second peak of the contact rate's autocorrelation",
+    "cyclic",
+)
+def cycles(runs: Runs) -> Measured:
     pairs = with_ghosts(runs, "tree", "curious")
     if len(pairs) < 2:
-        return CYCLES.measured("two seeds are needed", None)
-    ours, theirs = (correlations([pair[which] for pair in pairs]) for which in (0, 1))
-    here, there = at_second_peak(ours, theirs)
+        return "two seeds are needed", None
+    ours, theirs = (measures.correlations([pair[which] for pair in pairs]) for which in (0, 1))
+    here, there = measures.at_second_peak(ours, theirs)
     text = (
         f"autocorrelation near a lag of {WINDOW * second_peak(ours)} transitions {estimate(here)}, at the ghost {estimate(there)}; "
         f"at a lag of {WINDOW} (contacts come in bouts) {estimate(ours[:, 1])}, at the ghost {estimate(theirs[:, 1])}"
     )
-    return CYCLES.measured(text, is_cyclic(ours, theirs))
+    return text, measures.is_cyclic(ours, theirs)
 
 
-def _most(curious: list[Run]) -> str:
-    most = [int(run.outcome_numbers.max()) for run in curious]
-    many = [float((run.outcome_numbers > HANDFUL).mean()) for run in curious]
-    return f"at most {max(most)}; {100.0 * interquartile_mean(many):.2f} % of the actions have more than {HANDFUL}"
+richer = Claim(
+    "paper fig. 9, thesis 7.4",
+    "at the table actions have more outcomes than static constraints cause: number of actions with 3 or more",
+    "qualitative",
+    rule=_against(lambda run: float((run.outcome_numbers >= 3).sum()), 0),
+)
 
 
-def _detects(runs: Runs) -> Claim:
+@claim("thesis 6.4", "at the table no action has more than a handful (5) of outcomes", "a handful")
+def few(runs: Runs) -> Measured:
+    curious = runs["tree", "curious", "table"]
+    most = max(int(run.outcome_numbers.max()) for run in curious)
+    many = mean_over(curious, lambda run: float((run.outcome_numbers > HANDFUL).mean()))
+    return f"at most {most}; {100.0 * many:.2f} % of the actions have more than {HANDFUL}", most <= HANDFUL
+
+
+@claim(
+    "paper 4.4",
+    "actions whose tries most exceed those at a table without forces (ghost) depend on other parts: precision, equal to recall",
+    "qualitative",
+)
+def detects(runs: Runs) -> Measured:
     parts, holds = [], True
     for learner in LEARNERS:
-        hits = {explorer: judged(runs, explorer, learner, "beside_ghost") for explorer in EXPLORERS}
+        hits = {NAMES[explorer]: judged_of(runs, explorer, learner, "beside_ghost") for explorer in EXPLORERS}
         if not all(hits.values()):
             alone = len({run.seed for group in runs.values() for run in group}) == 1
-            return DETECTOR.measured("two seeds are needed" if alone else f"{learner}: no action depends on other parts", None)
-        values = {explorer: [one.at_all for one in group] for explorer, group in hits.items()}
-        chance = interquartile_mean([one.chance for one in hits["curious"]])
-        parts.append(
-            f"{learner}: "
-            + ", ".join(f"{NAMES[explorer]} {estimate(group)}" for explorer, group in values.items())
-            + f", chance {chance:.2f}"
-        )
-        least = interval(values["curious"])[0]
-        holds = holds and least > 2.0 * chance and all(least > interval(values[explorer])[1] for explorer in EXPLORERS[1:])
-    return DETECTOR.measured("; ".join(parts), holds)
+            return "two seeds are needed" if alone else f"{learner}: no action depends on other parts", None
+        values, chance = of_each(hits, lambda one: one.at_all), mean_over(hits["curious"], lambda one: one.chance)
+        parts.append(f"{learner}: {texts(values)}, chance {chance:.2f}")
+        holds = holds and stands_above(values, "curious", least=2.0 * chance)
+    return "; ".join(parts), holds
+
+
+@claim("paper 3.2", "18 000 transitions per learner at the table take so many days of robot time", "a little more than 2")
+def days(runs: Runs) -> Measured:
+    curious = runs["tree", "curious", "table"]
+    took = [run.hours / 24.0 for run in curious]
+    text = f"{estimate(took)} days; computed in {estimate([run.result.seconds for run in curious], 0)} s"
+    return text, DAYS[0] <= interquartile_mean(took) <= DAYS[1]
+
+
+CLAIMS = (touch, grows, forward, low_arms, similar, cycles, richer, few, detects, days)
 
 
 AtTable = Mapping[tuple[str, str], list[Run]]  # by explorer and world
@@ -331,8 +316,8 @@ def _tries(axes: Any, pairs: list[tuple[Run, Run]], part: str) -> None:
     axes.bar(numbers, table, width=1.0, color="C3", label="table")
     axes.step(numbers, ghost, where="mid", color="k", linewidth=0.5, label="ghost")
     if part == "torso":
-        per_state = spaces()[part].goals.shape[1]
-        axes.axvspan(FORWARD_STATES.start * per_state, FORWARD_STATES.stop * per_state, color="0.9", zorder=0, label="torso leans forward")
+        per_state, forward = measures.spaces()[part].goals.shape[1], measures.FORWARD_STATES
+        axes.axvspan(forward.start * per_state, forward.stop * per_state, color="0.9", zorder=0, label="torso leans forward")
     axes.set(title=f"{part.replace('_', ' ')}: tries of each state-action", xlabel="state-action", xlim=(-0.5, len(table) - 0.5))
     axes.legend(loc="upper left", fontsize=7)
 
@@ -379,7 +364,7 @@ def _autocorrelations(axes: Any, runs: AtTable) -> None:
     for world in ("table", "ghost"):
         group = runs.get(("curious", world), [])
         most = min(LAGS, len(group[0].touch_rate) - 2)
-        curves = np.array([autocorrelation(run.touch_rate, most) for run in group])
+        curves = np.array([measures.autocorrelation(run.touch_rate, most) for run in group])
         axes.plot(WINDOW * np.arange(most + 1), curves.mean(axis=0), STYLES[world], color="C3", label=world)
         axes.fill_between(WINDOW * np.arange(most + 1), curves.min(axis=0), curves.max(axis=0), color="C3", alpha=0.12, linewidth=0)
     axes.axhline(0.0, color="k", linewidth=0.5)
@@ -402,7 +387,7 @@ def _detector(axes: Any, runs: Runs) -> None:
     """Draw precision over recall of tries compared with the ghost's as a detector; dotted lines are chance."""
     for learner, style in zip(LEARNERS, ("-", "--"), strict=True):
         for explorer in EXPLORERS:
-            group = judged(runs, explorer, learner, "beside_ghost")
+            group = judged_of(runs, explorer, learner, "beside_ghost")
             if group:
                 recall, precision = (np.mean([getattr(one, name) for one in group], axis=0) for name in ("recall", "precision"))
                 axes.plot(recall, precision, style, color=COLORS[explorer], label=f"{learner}, {NAMES[explorer]}")

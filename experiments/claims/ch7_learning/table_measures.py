@@ -27,7 +27,7 @@ from experiments.kit.cells import CellResult
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
 from experiments.kit.learning.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
 from experiments.kit.statistics import interval
-from experiments.kit.sweep import Cells, grouped_by
+from experiments.kit.sweep import Cells, runs_by
 from mobee import Lattice, Model, World, box
 from mobee.arrays import Array, Ints
 from mobee.model.contact import links_moved
@@ -202,8 +202,8 @@ Runs = Mapping[tuple[str, str, str], list[Run]]  # by propagation, explorer and 
 
 def runs_of(found: Cells) -> Runs:
     """Return the finished runs of each condition, by seed, in the order of the conditions."""
-    grouped = grouped_by(found, "propagate", "explorer", "world")
-    return {key: [Run(result) for result in grouped[key]] for key in product(PROPAGATIONS, EXPLORERS, WORLDS) if key in grouped}
+    grouped = runs_by(found, Run, "propagate", "explorer", "world")
+    return {key: grouped[key] for key in product(PROPAGATIONS, EXPLORERS, WORLDS) if key in grouped}
 
 
 def with_ghosts(runs: Runs, propagate: str, explorer: str) -> list[tuple[Run, Run]]:
@@ -333,7 +333,7 @@ def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
     return different
 
 
-def judged(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
+def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
     """Judge every run of an explorer; empty if there is no other seed, or no action depends on other parts in the other seeds' runs."""
     found = []
     for run, ghost in with_ghosts(runs, "tree", explorer):

@@ -24,13 +24,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.cells import CellResult
+from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import RANK4, STRETCHED, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.learning.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
 from experiments.kit.plots import new_figure
+from experiments.kit.rules import of_each, texts
 from experiments.kit.statistics import estimate, interval, mean_over
-from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
+from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Lattice, OfflinePlant, Outcome
 from mobee.arrays import Array, Ints
 from mobee.control.gains import SettleTest
@@ -42,27 +45,6 @@ DEFLECTED_TO = {(57, 61): 62, (121, 125): 126, (249, 253): 254}  # (source, goal
 QUICK = 0.2  # share of the transitions in the short version
 MAX_RARE_VISITS, MIN_DEFLECTED, HANDFUL = 10, 100, 10  # times in a run
 MANY_CONTACTS = 0.01  # share of actions with self-contacts from which they are many
-
-_SMALL, _WIDE = "lattice of 256 states, 20-80 % of the ranges", "lattice of 256 states stretched to 12.5-87.5 %"
-UNREACHED = Claim("thesis 7.3, fig. 7.8", f"{_SMALL}: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
-RARE = Claim(
-    "thesis 7.3", f"{_SMALL}: the states 61, 125, 189 and 253 are reached at most 10 times each in 14 597 actions", "2, 3, 0 and 2 times"
-)
-DEFLECTED = Claim(
-    "thesis 7.3",
-    f"{_SMALL}: action 57->61 ends in 62, 121->125 in 126, 249->253 in 254, at least 100 times each with a handful of exceptions",
-    "225 of 228, 238 of 244, 208 of 213",
-)
-RANDOM = Claim("thesis 7.3", f"{_SMALL}: in spite of static constraints some actions sometimes fail and sometimes succeed", "qualitative")
-STRETCH = Claim("thesis 7.3, fig. 7.9", f"{_WIDE}: many more states are never reached", "far too many to discuss")
-CONTACTS = Claim(
-    "thesis 7.3", "arm and body touch each other often on both lattices of 256 states (in more than 1 % of the actions)", "qualitative"
-)
-MORE = Claim("thesis 7.3", f"{_WIDE}: arm and body touch each other much more often", "qualitative")
-DESPITE = Claim(
-    "thesis 7.3", f"{_WIDE}: some contacts of arm and body do not change the outcome, and the arm reaches its goal", "qualitative"
-)
-CLAIMS = (UNREACHED, RARE, DEFLECTED, RANDOM, STRETCH, CONTACTS, MORE, DESPITE)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -110,26 +92,16 @@ class SelfContact:
     depth: float  # m
 
 
-class SelfContactPlant:
+class SelfContactPlant(WrappedPlant[OfflinePlant]):
     """A plant with exactly the same actions, which records in `contacts` a SelfContact, or None, for every action so far."""
 
     def __init__(self, plant: OfflinePlant) -> None:
-        self._plant = plant
-        self.robot = plant.robot
+        super().__init__(plant)
         self.contacts: list[SelfContact | None] = []
-
-    @property
-    def q(self) -> Array:
-        """See Plant."""
-        return self._plant.q
-
-    def measure(self, part: str) -> Array:
-        """See Plant."""
-        return self._plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
         """See Plant; runs the plant from one settle test to the next."""
-        plant, settle = self._plant, self._plant.controller.gains.settle
+        plant, settle = self.inner, self.inner.controller.gains.settle
         where, start = self.robot.part(part).slice, plant.time - plant.dt
         test, ticks = SettleTest(settle, start), _ticks(settle.first_check, plant.dt)
         deepest, pose = 0.0, None
@@ -149,7 +121,7 @@ class SelfContactPlant:
 
     def _pair(self, q: Array) -> tuple[str, str]:
         """Return the links of the deepest overlap of fields in the pose q (n,) rad."""
-        table = self._plant.model.evaluate(q).table
+        table = self.inner.model.evaluate(q).table
         row = int(np.where(table.kind == 1, table.depth, -1.0).argmax())
         first, second = sorted(self.robot.links[int(link[row])] for link in (table.first_link, table.second_link))
         return first, second
@@ -196,16 +168,19 @@ class Run:
         return uncertain_in(self.space, self.seen)
 
 
-def runs_of(found: Cells) -> dict[str, list[Run]]:
+Runs = Mapping[str, list[Run]]  # by lattice
+
+
+def runs_of(found: Cells) -> Runs:
     """Return the finished runs of each lattice."""
-    return {
-        lattice: [_run(arm_space(LEVELS[lattice]), values) for values in group]
-        for lattice, group in grouped(found, "lattice", (*LEVELS,)).items()
-    }
 
+    def of(result: CellResult) -> Run:
+        values = result.values
+        kept = (values[name] for name in ("values", "pairs", "touching", "depths"))
+        return Run(arm_space(LEVELS[result.cell.settings["lattice"]]), values["seen"].astype(np.intp), *kept)
 
-def _run(space: Lattice, values: Mapping[str, Any]) -> Run:
-    return Run(space, values["seen"].astype(np.intp), values["values"], values["pairs"], values["touching"], values["depths"])
+    by_lattice = runs_by(found, of, "lattice")
+    return {lattice: by_lattice[lattice,] for lattice in LEVELS if (lattice,) in by_lattice}
 
 
 def findings(found: Cells) -> dict[str, Any]:
@@ -219,7 +194,7 @@ def findings(found: Cells) -> dict[str, Any]:
             {f"{s}->{g}": _ends(runs["small"], s, g) for s, g in DEFLECTED_TO} if "small" in runs else {}
         ),
         "self-contacts": {lattice: contacts_by_pair(group) for lattice, group in runs.items()},
-        "claims": [claim.record() for claim in (measured(runs["small"], runs["stretched"]) if whole else CLAIMS)],
+        "claims": judged(CLAIMS, runs, whole),
     }
 
 
@@ -271,65 +246,86 @@ def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
     return dict(sorted(table.items(), key=lambda item: -item[1]["actions_per_run"]))
 
 
-def measured(small: list[Run], stretched: list[Run]) -> list[Claim]:
-    """Return the claims with our numbers, from the runs on both lattices."""
-    uncertain, wide = [run.uncertain for run in small], [run.uncertain for run in stretched]
-    text = f"{estimate(uncertain, 0)} actions (stretched lattice {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
-    return [
-        _never(small),
-        _rare(small),
-        _deflected(small),
-        RANDOM.measured(text, interval(uncertain)[0] >= 1.0),
-        _stretch(small, stretched),
-        *_self_contacts(small, stretched),
-    ]
+_SMALL, _WIDE = "lattice of 256 states, 20-80 % of the ranges", "lattice of 256 states stretched to 12.5-87.5 %"
 
 
-def _never(small: list[Run]) -> Claim:
-    never = sum(set(NEVER) <= set(run.unreached) for run in small)
+@claim("thesis 7.3, fig. 7.8", f"{_SMALL}: the states 60, 124, 188 and 252 are never reached", "never; 189 neither")
+def never(runs: Runs) -> Measured:
+    small = runs["small"]
+    count = sum(set(NEVER) <= set(run.unreached) for run in small)
     too = sorted(_unreached(small).keys() - set(NEVER))
     also = f"; in some also {', '.join(map(str, too))}" if too else ""
-    return UNREACHED.measured(f"all four unreached in {never} of {len(small)} runs{also}", never == len(small))
+    return f"all four unreached in {count} of {len(small)} runs{also}", count == len(small)
 
 
-def _rare(small: list[Run]) -> Claim:
-    visits = np.array([run.visits[list(HARDLY)] for run in small])
-    others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in small)
+@claim(
+    "thesis 7.3", f"{_SMALL}: the states 61, 125, 189 and 253 are reached at most 10 times each in 14 597 actions", "2, 3, 0 and 2 times"
+)
+def rare(runs: Runs) -> Measured:
+    visits = np.array([run.visits[list(HARDLY)] for run in runs["small"]])
+    others = min(int(np.delete(run.visits, (*NEVER, *HARDLY)).min()) for run in runs["small"])
     text = f"{estimate(visits.ravel(), 1)} times each, at most {visits.max()}; every other state at least {others} times"
-    return RARE.measured(text, bool(visits.max() <= MAX_RARE_VISITS))
+    return text, bool(visits.max() <= MAX_RARE_VISITS)
 
 
-def _deflected(small: list[Run]) -> Claim:
+@claim(
+    "thesis 7.3",
+    f"{_SMALL}: action 57->61 ends in 62, 121->125 in 126, 249->253 in 254, at least 100 times each with a handful of exceptions",
+    "225 of 228, 238 of 244, 208 of 213",
+)
+def deflected(runs: Runs) -> Measured:
     parts, holds = [], True
     for (source, goal), end in DEFLECTED_TO.items():
-        ends = [ends_of(run.space, run.seen, source, goal) for run in small]
+        ends = [ends_of(run.space, run.seen, source, goal) for run in runs["small"]]
         aside = [found.get(end, 0) for found in ends]
         others = [sum(found.values()) - found.get(end, 0) for found in ends]
         parts.append(f"{source}->{goal}: {estimate(aside, 0)} times in {end}, and {np.mean(others):.1f} (at most {max(others)}) elsewhere")
         holds = holds and min(aside) >= MIN_DEFLECTED and max(others) <= HANDFUL
-    return DEFLECTED.measured("; ".join(parts), holds)
+    return "; ".join(parts), holds
 
 
-def _stretch(small: list[Run], stretched: list[Run]) -> Claim:
-    few, many = [len(run.unreached) for run in small], [len(run.unreached) for run in stretched]
-    always = sorted(set.intersection(*(set(run.unreached) for run in stretched)))
+@claim("thesis 7.3", f"{_SMALL}: in spite of static constraints some actions sometimes fail and sometimes succeed", "qualitative")
+def random(runs: Runs) -> Measured:
+    small, wide = of_each(runs, lambda run: run.uncertain).values()
+    text = f"{estimate(small, 0)} actions (stretched lattice {estimate(wide, 0)}) fail in 10 to 90 % of their tries"
+    return text, interval(small)[0] >= 1.0
+
+
+@claim("thesis 7.3, fig. 7.9", f"{_WIDE}: many more states are never reached", "far too many to discuss")
+def stretched(runs: Runs) -> Measured:
+    few, many = of_each(runs, lambda run: len(run.unreached)).values()
+    always = sorted(set.intersection(*(set(run.unreached) for run in runs["stretched"])))
     text = f"{estimate(many, 0)} states, on the other lattice {estimate(few, 0)}; in every run {' '.join(map(str, always))}"
-    return STRETCH.measured(text, interval(many)[0] > 2.0 * interval(few)[1])
+    return text, interval(many)[0] > 2.0 * interval(few)[1]
 
 
-def _self_contacts(small: list[Run], stretched: list[Run]) -> list[Claim]:
-    shares = {name: [float(run.touched.mean()) for run in runs] for name, runs in (("20-80 %", small), ("stretched", stretched))}
-    text = ", ".join(f"{name}: {estimate([100.0 * share for share in group], 1)} % of the actions" for name, group in shares.items())
-    few, many = interval(shares["20-80 %"]), interval(shares["stretched"])
-    reached = [float(run.succeeded[run.touched].mean()) for run in stretched if run.touched.any()]
-    despite = (
-        f"{estimate([100.0 * share for share in reached], 0)} % of the actions with a contact reach their goal" if reached else "no contact"
-    )
-    return [
-        CONTACTS.measured(text, min(few[0], many[0]) > MANY_CONTACTS),
-        MORE.measured(text, many[0] > 2.0 * few[1]),
-        DESPITE.measured(despite, bool(reached) and interval(reached)[0] > 0.0),
-    ]
+def _contacts(runs: Runs) -> tuple[str, tuple[float, float], tuple[float, float]]:
+    """Return the shares of actions with self-contacts as text, and their intervals [%] on both lattices."""
+    shares = of_each({"20-80 %": runs["small"], "stretched": runs["stretched"]}, lambda run: 100.0 * float(run.touched.mean()))
+    few, many = map(interval, shares.values())
+    return texts(shares, 1, "{}: {} % of the actions"), few, many
+
+
+@claim("thesis 7.3", "arm and body touch each other often on both lattices of 256 states (in more than 1 % of the actions)", "qualitative")
+def contacts(runs: Runs) -> Measured:
+    text, few, many = _contacts(runs)
+    return text, min(few[0], many[0]) > 100.0 * MANY_CONTACTS
+
+
+@claim("thesis 7.3", f"{_WIDE}: arm and body touch each other much more often", "qualitative")
+def more_contacts(runs: Runs) -> Measured:
+    text, few, many = _contacts(runs)
+    return text, many[0] > 2.0 * few[1]
+
+
+@claim("thesis 7.3", f"{_WIDE}: some contacts of arm and body do not change the outcome, and the arm reaches its goal", "qualitative")
+def despite(runs: Runs) -> Measured:
+    reached = [100.0 * float(run.succeeded[run.touched].mean()) for run in runs["stretched"] if run.touched.any()]
+    text = f"{estimate(reached, 0)} % of the actions with a contact reach their goal" if reached else "no contact"
+    return text, bool(reached) and interval(reached)[0] > 0.0
+
+
+CLAIMS = (never, rare, deflected, random, stretched, contacts, more_contacts, despite)
 
 
 SIDE = 16  # states along an edge of the map

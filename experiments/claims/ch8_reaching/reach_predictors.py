@@ -33,7 +33,8 @@ from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_pl
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations
 from experiments.kit.reaching.targets import between, grid, targets_at
 from experiments.kit.reaching.truth import TRIES, Truth, measure, oracle, truth_of
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval, ratio, ratio_interval
+from experiments.kit.rules import decides
+from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio, ratio_interval
 from experiments.kit.sweep import grouped, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue

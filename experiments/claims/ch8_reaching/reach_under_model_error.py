@@ -36,7 +36,8 @@ from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import PART, learned_transitions, reach_agent, space
 from experiments.kit.reaching.planner_peer import ENDS, MEMORIES, Memory, PeerTry, PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import all_hold, decides, estimate, interquartile_mean, interval
+from experiments.kit.rules import all_hold, decides
+from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee.arrays import Array
 from mobee.learning.reaching.tries import Problems

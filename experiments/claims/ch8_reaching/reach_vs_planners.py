@@ -39,7 +39,8 @@ from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, s
 from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained
 from experiments.kit.reaching.planner_peer import PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.statistics import decides, estimate, interquartile_mean, interval
+from experiments.kit.rules import decides
+from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import Gains, Model, MotorParameters, OfflinePlant, World, box, cylinder
 from mobee.arrays import Array

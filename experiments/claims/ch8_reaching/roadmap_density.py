@@ -29,7 +29,8 @@ from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp as example
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.roadmap_task import RIGHT, build
-from experiments.kit.statistics import estimate, interquartile_mean, interval, rises
+from experiments.kit.rules import rises
+from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import MobeeError, Model, Roadmap, World, cylinder
 from mobee.arrays import Array, Ints

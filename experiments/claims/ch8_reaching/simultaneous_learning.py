@@ -32,15 +32,17 @@ from experiments.kit.plots import draw_curve, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.statistics import all_hold, decides, estimate, interval, rises
+from experiments.kit.rules import all_hold, decides, rises
+from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
+from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import TransitionModel
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
-from mobee.reach import TARGET, ReachOutcome, ReachPlant, ReachTarget
+from mobee.reach import TARGET, ReachPlant
 
 CHECKPOINTS = (500, 1000, 1500, 2000, 3000, 3500, 4000)  # actions after which the learners are evaluated
 QUICK = (500, 1000, 2000)
@@ -144,7 +146,7 @@ def _agent(variant: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeMo
     return agent(plant=plant, model=model), model.debiased(), 0
 
 
-class BlamingPlant:
+class BlamingPlant(WrappedPlant[ReachPlant]):
     """A plant that reports false contacts: none ("model"), or the target's wherever a transition does not end in its goal ("target").
 
     Args:
@@ -154,33 +156,14 @@ class BlamingPlant:
     """
 
     def __init__(self, plant: ReachPlant, space: Space, blame: Blame) -> None:
-        self.inner, self.robot, self._space, self._blame = plant, plant.robot, space, blame
-
-    @property
-    def q(self) -> Array:
-        """See Plant."""
-        return self.inner.q
-
-    def measure(self, part: str) -> Array:
-        """See Plant."""
-        return self.inner.measure(part)
+        super().__init__(plant)
+        self._space, self._blame = space, blame
 
     def act(self, part: str, target: Array) -> Outcome:
         """See Plant; with false contacts."""
-        outcome = self.inner.act(part, target)
-        arrived = self._state(outcome.q) == self._state(target)
+        outcome = super().act(part, target)
+        arrived = self._space.state_of(outcome.q) == self._space.state_of(target)
         return replace(outcome, touched=() if self._blame == "model" or arrived else (TARGET,))
-
-    def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
-        self.inner.present(target)
-
-    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant."""
-        return self.inner.reach(part, marker, stay)
-
-    def _state(self, q: Array) -> int:
-        return self._space.state_of(q)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -31,6 +31,8 @@ Edge = tuple[int, int]  # vertices, the smaller first
 class Belief:
     """A planner's model of robot and world; a pose of the arm is sound if it is clear of contacts and cable constraints.
 
+    It is a `mobee.roadmap.ompl.ValidityChecker`.
+
     Args:
         model: the robot in the world, as believed.
         turns: (4,) rad, believed minus measured joint angles.
@@ -40,8 +42,9 @@ class Belief:
     def __init__(self, model: Model, turns: Array, clauses: Sequence[Clause]) -> None:
         self._model, self._turns, self._clauses = model, turns, clauses
         limits = robot().limits[columns()]
-        self.limits: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
+        self.box: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
         """(4, 2) rad between which the joint limits exert no force."""
+        self.low: Array = self.box[:, 0]
         self.span: Array = np.ptp(limits, axis=1)
         """(4,) rad, the joints' ranges."""
         self.checked = 0
@@ -52,7 +55,7 @@ class Belief:
         self.checked += len(q)
         return clear(self._model, q + self._turns, self._clauses if cables else ())
 
-    def is_sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
+    def sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
         """Return whether the straight motion between two poses (4,) rad is sound; its start is not checked."""
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
@@ -103,7 +106,7 @@ class Roadmap:
         """
         near = self.nearest(pose, neighbours)
         for cables in (True, False):  # a pose that violates the cable constraints may still be reached
-            found = [v for v in near if self.belief.is_sound_motion(pose, self.vertices[v], cables)]
+            found = [v for v in near if self.belief.sound_motion(pose, self.vertices[v], cables)]
             if found:
                 return found
         return near
@@ -154,7 +157,7 @@ def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Road
     vertex = {int(state): number for number, state in enumerate(samples)}
     wanted = {edge(vertex[s], vertex[int(g)]) for s in vertex for g in lattice.actions(s) if int(g) in vertex}
     poses = lattice.samples[samples]
-    return Roadmap(poses, [(v, w) for v, w in sorted(wanted) if belief.is_sound_motion(poses[v], poses[w])], belief)
+    return Roadmap(poses, [(v, w) for v, w in sorted(wanted) if belief.sound_motion(poses[v], poses[w])], belief)
 
 
 def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
@@ -167,20 +170,7 @@ def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int
     return found
 
 
-class _Believed:
-    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.ValidityChecker`."""
-
-    def __init__(self, belief: Belief) -> None:
-        self.low, self.span, self.box = belief.limits[:, 0], belief.span, belief.limits
-        self.sound_motion = belief.is_sound_motion
-        self._belief = belief
-
-    def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See ValidityChecker."""
-        return self._belief.sound(q)
-
-
 def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
     """Build a PRM over the arm's four joints by OMPL, in fractions of their ranges; raises OmplMissing."""
-    found = grown("PRM", _Believed(belief), milestones, neighbours, seed, resolution=STEP)
+    found = grown("PRM", belief, milestones, neighbours, seed, resolution=STEP)
     return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from experiments.kit.cells import CellResult
-from experiments.kit.sweep import grouped_by
+from experiments.kit.sweep import runs_by
 from mobee import Lattice
 from mobee.arrays import Array, Ints
 
@@ -100,16 +100,13 @@ Groups = dict[tuple[str, str], list[Explored]]  # values of two settings
 
 def explored(found: Mapping[str, CellResult], space_of: Callable[[str], Lattice], where: str, how: str) -> Groups:
     """Group the runs that recorded transitions as "seen" by two settings, sorted by seed; the setting `where` decides the space."""
-    return {
-        (place, method): [_explored(space_of(place), result) for result in results]
-        for (place, method), results in grouped_by(found, where, how).items()
-    }
 
+    def of(result: CellResult) -> Explored:
+        seen, space = result.values["seen"], space_of(result.cell.settings[where])
+        tries, failures = (counts(space, seen)[exists_in(space)] for counts in (tries_of, failures_of))
+        return Explored(result.cell.seed, tries, failures, visits_of(space, seen), result.values)
 
-def _explored(space: Lattice, result: CellResult) -> Explored:
-    seen, exists = result.values["seen"], exists_in(space)
-    tries, failures = tries_of(space, seen)[exists], failures_of(space, seen)[exists]
-    return Explored(result.cell.seed, tries, failures, visits_of(space, seen), result.values)
+    return runs_by(found, of, where, how)
 
 
 def constraint_actions(runs: Sequence[Explored]) -> NDArray[np.bool_]:
@@ -131,3 +128,10 @@ def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> l
     """
     ratios = [relative_tries(one.tries, constraint_actions([run for run in runs if run is not one])) for one in judged]
     return [ratio for ratio in ratios if np.isfinite(ratio)]
+
+
+def draw_tries(axes: Any, tries: Ints, chosen: NDArray[np.bool_], width: float, label: str) -> None:
+    """Draw the tries (E,) of every state-action as bars, the chosen ones in red and as wide as `width`."""
+    number = np.arange(len(tries))
+    axes.bar(number[~chosen], tries[~chosen], width=1.0, color="0.6", label="others")
+    axes.bar(number[chosen], tries[chosen], width=width, color="C3", label=label)

@@ -8,19 +8,14 @@ random neighbour, half towards actions that need more tries.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from experiments.kit.learning.exploration import begin_nearby
-from mobee import Plant, TransitionModel, run_batch, value_iteration
+from mobee import Plant, TransitionModel, value_iteration
 from mobee.arrays import Array, Ints
-from mobee.errors import InvalidValue
 from mobee.learning.explorers import choose
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
@@ -35,28 +30,12 @@ CERTAIN = 0.9  # probability of the most likely outcome, below which an action i
 class Truth:
     """Measured frequencies of the outcomes of each action; an OutcomeModel.
 
-    `outcomes`, `probabilities`: (S, A, B), probability 0 where there is no action or no try.  `tries`: (S, A).  `settings`: of the space.
+    `outcomes`, `probabilities`: (S, A, B), probability 0 where there is no action or no try.  `tries`: (S, A).
     """
 
     outcomes: Ints
     probabilities: Array
     tries: Ints
-    settings: dict[str, Any]
-
-    def save(self, path: Path) -> None:
-        """Write the frequencies to a .npz file."""
-        np.savez_compressed(
-            path, outcomes=self.outcomes, probabilities=self.probabilities, tries=self.tries, settings=json.dumps(self.settings)
-        )
-
-
-def load_truth(path: Path, space: Space) -> Truth:
-    """Read a file written by `Truth.save`; raises InvalidValue if it belongs to another space."""
-    with np.load(path) as file:
-        truth = Truth(file["outcomes"], file["probabilities"], file["tries"], json.loads(str(file["settings"])))
-    if truth.settings["digest"] != space.settings["digest"]:
-        raise InvalidValue(f"{path} belongs to another space, {truth.settings}: measure the outcomes of this one, {space.settings}.")
-    return truth
 
 
 def truth_of(space: Space, seen: Ints) -> Truth:
@@ -72,26 +51,7 @@ def truth_of(space: Space, seen: Ints) -> Truth:
     tries = counted.sum(axis=1, keepdims=True)
     shape = (states, actions, -1)
     probabilities = counted / np.maximum(tries, 1.0)
-    return Truth(
-        outcomes.reshape(shape), probabilities.reshape(shape), tries.reshape(states, actions).astype(np.intp), dict(space.settings)
-    )
-
-
-def measure_truth(
-    space: Space, plant_of: Callable[[int], Plant], tries: int, seeds: Iterable[int], most: int, processes: int | None = None
-) -> Truth:
-    """Measure the frequencies of outcomes in parallel walks, one for each seed, that try every action `tries` times.
-
-    Args:
-        space: states and actions.
-        plant_of: a function of a module that makes a plant of a seed.
-        tries: number of tries of each action in each walk.
-        seeds: seeds of walks and plants.
-        most: largest number of actions of a walk, for spaces with states that cannot be reached.
-        processes: number of processes; None: one per core.
-    """
-    seen = run_batch(partial(walk, space, plant_of, tries, most), seeds, processes)
-    return truth_of(space, np.concatenate(seen))
+    return Truth(outcomes.reshape(shape), probabilities.reshape(shape), tries.reshape(states, actions).astype(np.intp))
 
 
 def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, seed: int) -> Ints:

@@ -21,6 +21,7 @@ from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_s
 from experiments.kit.learning.arm import robot as published_robot
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.reaching.belief import PeerBelief
+from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -159,7 +160,7 @@ class Errors:
     shift: Array
 
 
-class JudgedPlant:
+class JudgedPlant(WrappedPlant[OfflinePlant]):
     """An offline plant with wrong encoders and eyes: control uses them, but the result of a reach is measured in the true poses.
 
     Args:
@@ -169,9 +170,9 @@ class JudgedPlant:
     """
 
     def __init__(self, plant: OfflinePlant, errors: Errors | None = None, unseen: Collection[str] = ()) -> None:
-        self.inner, self.robot, self.model = plant, plant.robot, plant.model
-        n = len(plant.robot.motors)
-        self.errors = Errors(np.zeros(n), np.zeros(3)) if errors is None else errors
+        super().__init__(plant)
+        self.model = plant.model
+        self.errors = Errors(np.zeros(len(plant.robot.motors)), np.zeros(3)) if errors is None else errors
         self._unseen = frozenset(unseen)
         self._target: ReachTarget | None = None
 
@@ -186,18 +187,9 @@ class JudgedPlant:
         errors = {"turns": self.errors.turns.tolist(), "shift": self.errors.shift.tolist()}
         return self.inner.settings | {"errors": errors, "unseen": sorted(self._unseen)}
 
-    @property
-    def q(self) -> Array:
-        """See Plant."""
-        return self.inner.q
-
-    def measure(self, part: str) -> Array:
-        """See Plant."""
-        return self.inner.measure(part)
-
     def act(self, part: str, target: Array) -> Outcome:
         """See Plant."""
-        return self._reported(self.inner.act(part, target))
+        return self._reported(super().act(part, target))
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
         """Act, while the target exerts no force on the marker's hand, as in a reach: the planner plans around it."""
@@ -206,11 +198,11 @@ class JudgedPlant:
     def present(self, target: ReachTarget | None) -> None:
         """See ReachPlant; the target is at its seen position."""
         self._target = target
-        self.inner.present(target)
+        super().present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """See ReachPlant; the outcome has the true position of the marker and the true remaining error."""
-        found = self.inner.reach(part, marker, stay)
+        found = super().reach(part, marker, stay)
         where = self.marker_at(marker, part, found.q)
         return replace(
             found, marker=where, missing=self._true.missing(where), touched=self._seen(found.touched), after=self._reported(found.after)

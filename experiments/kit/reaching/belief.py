@@ -7,8 +7,9 @@ one nearest pose.  OMPL's RRT-Connect (Kuffner and LaValle 2000), and shortcuts 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,20 +221,14 @@ def _error(belief: PeerBelief, whole: Array, place: Array, within: float) -> tup
 SHORTCUTS = 60  # attempts
 
 
-class _Believed:
-    """Checks poses for OMPL by a belief, within the limits that exert no force; see `mobee.roadmap.ompl.ValidityChecker`."""
+class _Careful(NamedTuple):
+    """A belief with a degree of care, as a `mobee.roadmap.ompl.ValidityChecker`."""
 
-    def __init__(self, belief: PeerBelief, care: Care) -> None:
-        self.low, self.span, self.box = belief.range[:, 0], belief.span, belief.limits
-        self._belief, self._care = belief, care
-
-    def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See ValidityChecker."""
-        return self._belief.sound(q, self._care)
-
-    def sound_motion(self, start: Array, end: Array) -> bool:
-        """See ValidityChecker."""
-        return self._belief.sound_motion(start, end, self._care)
+    low: Array
+    span: Array
+    box: Array
+    sound: Callable[[Array], NDArray[np.bool_]]
+    sound_motion: Callable[[Array, Array], bool]
 
 
 def rrt_connect(
@@ -243,7 +238,9 @@ def rrt_connect(
 
     "Sound" is defined by `PeerBelief`.  Raises OmplMissing.
     """
-    return connected(_Believed(belief, care), start, ends, seed, extensions)
+    sound, sound_motion = partial(belief.sound, care=care), partial(belief.sound_motion, care=care)
+    checker = _Careful(belief.range[:, 0], belief.span, belief.limits, sound, sound_motion)
+    return connected(checker, start, ends, seed, extensions)
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:

@@ -9,10 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from experiments.kit.rules import all_hold, better, decides, ratio_within, rises, row, stands_above, stands_below, texts, within
 from experiments.kit.statistics import (
-    all_hold,
-    better,
-    decides,
     estimate,
     gini,
     interquartile_mean,
@@ -23,7 +21,6 @@ from experiments.kit.statistics import (
     ratio_estimate,
     ratio_interval,
     relative_spread,
-    rises,
 )
 from mobee.errors import InvalidValue
 
@@ -139,8 +136,8 @@ def test_a_ratio_is_told_with_its_interval():
 def test_the_intervals_decide_whether_one_is_better():
     many = {"a": np.arange(1.0, 11.0), "b": np.arange(1.0, 11.0) + 0.1, "c": np.arange(10.0) - 20.0}
     text, found = better(many, "a", ("b", "c"))
-    assert found == [None, True] and "P 1.00" in text
-    assert better(many, "c", ("a",), worse=True)[1] == [True]
+    assert found is None and "P 1.00" in text
+    assert better(many, "c", ("a",), worse=True)[1] is True and better(many, "a", ("c",))[1] is True
 
 
 @pytest.mark.parametrize(("given", "wanted"), [((True, True), True), ((True, None), None), ((None, False), False)])
@@ -151,3 +148,16 @@ def test_all_hold_if_none_is_open_or_fails(given, wanted):
 @pytest.mark.parametrize(("change", "expected"), [(0.5, True), (-0.5, False), (0.0, None)])
 def test_a_change_rises_where_its_interval_is_above_zero(change, expected):
     assert rises(change + np.array([-0.1, 0.1, -0.08, 0.09, 0.0, 0.01])) is expected
+
+
+def test_a_group_stands_out_where_its_interval_is_apart_from_all_others():
+    groups = {"low": [1.0, 1.1, 1.2], "middle": [2.0, 2.1, 2.2], "high": [3.0, 3.1, 3.2]}
+    assert stands_above(groups, "high") and not stands_above(groups, "middle") and not stands_above(groups, "high", least=4.0)
+    assert stands_below(groups, "low") and not stands_below(groups, "middle")
+
+
+def test_rules_tell_the_estimate_and_judge_its_interval():
+    assert within([0.5, 0.5], least=0.4, text="share {}") == ("share 0.50 [0.50, 0.50]", True)
+    assert ratio_within([2.0, 2.0], [4.0, 4.0], most=0.4) == ("0.50 [0.50, 0.50]", False)
+    assert texts({"least_tried": [1.0, 1.0], 0.5: [2.0]}, 1) == "least tried 1.0 [1.0, 1.0], 0.5 2.0 [2.0, 2.0]"
+    assert row(["a", "bbb"], {"letters": len}) == {"seeds": 2, "letters": 2.0}

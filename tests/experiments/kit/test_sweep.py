@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from experiments.kit.cells import Cell, load_cells
-from experiments.kit.sweep import CellsFailed, Condition, Sweep, TimeLeft, grouped, grouped_by, run_cells
+from experiments.kit.sweep import CellsFailed, Condition, Sweep, TimeLeft, grouped, grouped_by, run_cells, runs_by
 from mobee.errors import InvalidValue
 from mobee.roadmap.ompl import OmplMissing
 from tests.experiments.finished_cells import finished
@@ -52,9 +52,9 @@ def test_cells_are_grouped_by_one_setting_or_by_several_in_the_order_of_their_se
     cells = [Cell(f"{a}-{b}-s{seed}", seed, {"a": a, "b": b}) for a in (1, 2) for b in (3, 4) for seed in (10, 9)]
     found = finished(lambda cell: {"seed": cell.seed}, cells)
     assert grouped(found, "a", (2, 1, 0))[2] == [{"seed": 9}, {"seed": 9}, {"seed": 10}, {"seed": 10}]
-    assert {key: [one.cell.seed for one in mine] for key, mine in grouped_by(found, "a", "b").items()} == {
-        (a, b): [9, 10] for a in (1, 2) for b in (3, 4)
-    }
+    everything = {(a, b): [9, 10] for a in (1, 2) for b in (3, 4)}
+    assert runs_by(found, lambda result: result.cell.seed, "a", "b") == everything
+    assert grouped_by(found, "a", "b") == {key: [{"seed": seed} for seed in seeds] for key, seeds in everything.items()}
 
 
 def test_a_missing_package_is_named_before_anything_is_begun(tmp_path):

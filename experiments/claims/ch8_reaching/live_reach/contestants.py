@@ -34,6 +34,7 @@ from experiments.kit.live.launch import append_done, read_job
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.learning import Course
 from experiments.kit.reaching.planner_peer import PlannerPeer
+from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import ActionInterrupted, Model, load_robot
 from mobee.arrays import Array
 from mobee.learning.reaching.reach_agent import ReachAgent
@@ -174,43 +175,35 @@ def at_once(hand: Hand, problem: Problem) -> Ended:
     return Ended([hand.end], 1, missing, first=hand.first)
 
 
-class PeerPlant:
+class PeerPlant(WrappedPlant[Hand]):
     """The live arm as a plant of the planner peer; the target exerts no force during motions, because the planner avoids it."""
 
     def __init__(self, hand: Hand, tick: float) -> None:
         """`tick`: s."""
-        self.robot, self.ends = hand.robot, list[int]()
+        super().__init__(hand)
+        self.ends = list[int]()
         """Ticks at which the peer had finished."""
-        self._hand, self._model, self._dt = hand, Model(hand.robot), tick
+        self._model, self._dt = Model(hand.robot), tick
         self._target: ReachTarget | None = None
 
     @property
     def time(self) -> float:
         """Robot time, s."""
-        return self._hand.tick * self._dt
-
-    @property
-    def q(self) -> Array:
-        """See Plant."""
-        return self._hand.q
-
-    def measure(self, part: str) -> Array:
-        """See Plant."""
-        return self._hand.measure(part)
+        return self.inner.tick * self._dt
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
         """See JudgedPlant."""
-        self._hand.present(None)
-        return self._hand.act(part, target)
+        self.inner.present(None)
+        return self.act(part, target)
 
     def present(self, target: ReachTarget | None) -> None:
         """See ReachPlant."""
         self._target = target
-        self._hand.present(target)
+        super().present(target)
 
     def missing(self, marker: str) -> float:
         """Return the present distance of the marker from the target by the encoders, m."""
-        self.ends.append(self._hand.tick)
+        self.ends.append(self.inner.tick)
         whole = self.robot.home.copy()
         whole[self.robot.part(PART).slice] = self.measure(PART)
         target = self._target

@@ -6,14 +6,14 @@ import numpy as np
 from experiments.claims.ch7_learning.constraint_discovery import (
     DISCOUNTS,
     ENTERING,
-    FAIL,
     FAILING,
     INITIAL,
-    NUMBERS,
-    PEAKS,
-    SOONER,
-    STOCHASTIC,
+    fail,
     findings,
+    numbers,
+    peaks,
+    sooner,
+    stochastic,
 )
 from experiments.kit.learning.arm import arm_space
 from tests.experiments.finished_cells import Cell, finished
@@ -44,7 +44,7 @@ def every_setting(work):
 def test_tries_and_failures_decide_the_claims():
     results = findings(every_setting(lambda cell: explored(40 if cell.settings["initial"] == "60-40" else 0)))
     verdicts = {claim["text"]: claim["verdict"] for claim in results["claims"]}
-    expected = {NUMBERS["50-50"]: "confirmed", SOONER: "refuted", FAIL: "confirmed", PEAKS: "confirmed", STOCHASTIC: "refuted"}
+    expected = {numbers[0]: "confirmed", sooner: "refuted", fail: "confirmed", peaks: "confirmed", stochastic: "refuted"}
     assert {claim: verdicts[claim.text] for claim in expected} == expected  # 3024 actions, and 60-40 needs more
 
 

@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch7_learning.exploration_coverage import (
-    AGGRESSIVE,
-    BEST,
-    DEPLETES,
-    FLOOR,
-    NOVEL,
-    RATIO,
-    _row,
+    CLAIMS,
+    aggressive,
+    best,
+    depletes,
     first_repeat,
-    measured,
+    half,
+    near_floor,
+    novel,
+    row,
     shortest_walk,
     states_seen,
     trial,
 )
+from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import HYPERCUBE, RANK3, RANK4, arm_space
 from mobee.errors import InvalidValue
 
@@ -45,8 +46,8 @@ def published(curious: int, least: int):
     }
 
 
-def verdicts(claims) -> dict[str, str]:
-    return {claim.text: claim.verdict for claim in claims}
+def verdicts(runs) -> dict[str, str]:
+    return {claim["text"]: claim["verdict"] for claim in judged(CLAIMS, runs)}
 
 
 def test_the_first_repeat_and_the_states_seen_follow_from_the_new_actions_and_states():
@@ -56,8 +57,8 @@ def test_the_first_repeat_and_the_states_seen_follow_from_the_new_actions_and_st
 
 def test_runs_in_which_not_every_action_was_tried_are_counted():
     one = values(99.0)
-    row = _row([one, one | {"transitions": 5000, "state_actions": 51}])
-    assert row["unfinished"] == 1 and row["high"] == 5000
+    found = row([one, one | {"transitions": 5000, "state_actions": 51}])
+    assert found["unfinished"] == 1 and found["high"] == 5000
 
 
 @pytest.mark.parametrize(
@@ -65,22 +66,22 @@ def test_runs_in_which_not_every_action_was_tried_are_counted():
     [(1590, {"constrained": "confirmed", "free": "confirmed"}), (3000, {"constrained": "refuted", "free": "refuted"})],
 )
 def test_the_ratio_and_the_shortest_walk_decide(curious, expected):
-    found = verdicts(measured(published(curious, 3200)))
-    assert {world: found[claim.text] for world, claim in RATIO.items()} == expected
-    assert {world: found[claim.text] for world, claim in FLOOR.items()} == expected
+    found = verdicts(published(curious, 3200))
+    assert {world: found[claim.text] for world, claim in half.items()} == expected
+    assert {world: found[claim.text] for world, claim in near_floor.items()} == expected
 
 
 def test_runs_as_published_confirm_the_claims_about_new_actions_and_refute_that_about_new_states():
-    found = verdicts(measured(published(1590, 3200)))
-    assert [found[claim.text] for claim in (BEST, NOVEL, AGGRESSIVE)] == ["confirmed", "confirmed", "refuted"]
+    found = verdicts(published(1590, 3200))
+    assert [found[claim.text] for claim in (best, novel, aggressive)] == ["confirmed", "confirmed", "refuted"]
 
 
 def test_the_depleting_explorer_is_judged_only_with_runs_in_both_worlds():
     runs = published(1590, 3200)
     runs |= {(world, name): runs[world, "curious"] for world in ("constrained", "free") for name in ("depleting", "nearest_untried")}
-    assert verdicts(measured(runs))[DEPLETES.text] == "confirmed"
+    assert verdicts(runs)[depletes.text] == "confirmed"
     del runs["free", "nearest_untried"]
-    assert verdicts(measured(runs))[DEPLETES.text] == "open"
+    assert verdicts(runs)[depletes.text] == "open"
 
 
 def searched_walk(goals: np.ndarray) -> int:

@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.claims.ch7_learning.exploration_uniformity import EXPLORERS, measured
+from experiments.claims.ch7_learning.exploration_uniformity import CLAIMS, EXPLORERS
+from experiments.kit.experiment import judged
 from experiments.kit.learning.outcomes import Explored
 
 UNIFORM, UNEQUAL = np.array([10, 11, 10, 11, 10, 20]), np.array([1, 30, 2, 40, 3, 2])
@@ -20,7 +21,7 @@ def runs(is_uniform, fails=True):
 def verdicts(fails=True):
     nearest = {("nearest", explorer): runs(explorer == "curious", fails) for explorer in EXPLORERS}
     equidistant = {("equidistant", explorer): runs(explorer != "random", fails) for explorer in EXPLORERS}
-    return [claim.verdict for claim in measured(nearest | equidistant)]
+    return [claim["verdict"] for claim in judged(CLAIMS, nearest | equidistant)]
 
 
 def test_uniform_tries_with_spikes_where_actions_fail_confirm_the_claims():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.claims.ch7_learning.mdp_planner import ENTERS, ROADMAPS, fates, measured, runs_of, tables
+from experiments.claims.ch7_learning.mdp_planner import CLAIMS, ENTERS, ROADMAPS, fates, runs_of, tables
 from experiments.claims.ch7_learning.planned_queries import (
     DOWN,
     PERIOD,
@@ -22,6 +22,7 @@ from experiments.claims.ch7_learning.planned_queries import (
     touched_states,
 )
 from experiments.kit.cells import Cell, load_cells, write_cell
+from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
 from mobee import TransitionModel
 
@@ -64,11 +65,11 @@ def done(tmp_path):
 
 
 def test_the_claims_follow_from_the_numbers(done):
-    fig7, enters, inoperable, predictable, avoids = measured(runs_of(done))
-    assert [claim.verdict for claim in (fig7, enters, inoperable)] == ["confirmed", "confirmed", "refuted"]
-    assert [claim.verdict for claim in (predictable, avoids)] == ["confirmed", "confirmed"]
-    assert "0.50" in inoperable.ours and "0.95" in inoperable.ours
-    assert "0.80" in enters.ours and "1000 transitions later" in enters.ours
+    fig7, enters, inoperable, predictable, avoids = judged(CLAIMS, runs_of(done))
+    assert [claim["verdict"] for claim in (fig7, enters, inoperable)] == ["confirmed", "confirmed", "refuted"]
+    assert [claim["verdict"] for claim in (predictable, avoids)] == ["confirmed", "confirmed"]
+    assert "0.50" in inoperable["ours"] and "0.95" in inoperable["ours"]
+    assert "0.80" in enters["ours"] and "1000 transitions later" in enters["ours"]
 
 
 def test_there_is_a_row_for_each_planner_and_world_and_each_time(done):

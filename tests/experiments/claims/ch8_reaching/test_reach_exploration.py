@@ -6,23 +6,26 @@ import pytest
 
 from experiments.claims.ch8_reaching import reach_exploration
 from experiments.claims.ch8_reaching.reach_exploration import (
-    AGREE,
-    BETTER,
-    DECREASES,
-    FALLS,
-    FEW,
-    NEGATIVE,
-    SAME_STATES,
-    SPEED,
-    STEADY,
-    TIME,
-    TIME_GREEDY,
-    WEAK_EARLY,
-    measured,
+    CHECKPOINTS,
+    CLAIMS,
+    JUDGED,
+    Runs,
+    agree,
+    best,
+    decreases,
+    falls,
+    few,
+    negative,
     plot,
+    same_states,
+    speed,
+    steady,
+    time,
+    time_greedy,
     trial,
+    weak_early,
 )
-from experiments.claims.ch8_reaching.reach_runs import CHECKPOINTS, Runs
+from experiments.kit.experiment import judged
 from experiments.kit.reaching import arm
 from tests.experiments.finished_cells import Cell, finished
 
@@ -59,29 +62,29 @@ def runs(**changes):
 
 
 def verdicts(found) -> dict[str, str]:
-    return {claim.text: claim.verdict for claim in measured(found)}
+    return {claim["text"]: claim["verdict"] for claim in judged(CLAIMS, found)}
 
 
-BETTER_LATE = (BETTER[800], BETTER[1600], BETTER[6400])
+BETTER_LATE = tuple(best[JUDGED.index(tries)] for tries in (800, 1600, 6400))
 
 
 def test_the_published_findings_confirm_the_claims():
     found = verdicts(runs())
-    for claim in (*BETTER_LATE, WEAK_EARLY, STEADY, FALLS, DECREASES, AGREE, FEW, NEGATIVE, TIME, TIME_GREEDY, SPEED):
+    for claim in (*BETTER_LATE, weak_early, steady, falls, decreases, agree, few, negative, time, time_greedy, speed):
         assert found[claim.text] == "confirmed", claim.text
 
 
 def test_a_better_greedy_agent_refutes_them():
     broad = ((4.8, 5.0, 5.2, 6.4, 7.9, 7.9, 7.0), 20, 100, 22.6)
     found = verdicts(runs(intrinsic=broad, greedy=((6.0, 6.5, 7.0, 8.0, 9.0, 9.0, 9.5), 1, 900, 60.0)))
-    for claim in (*BETTER_LATE, AGREE, FEW, NEGATIVE, TIME_GREEDY):
+    for claim in (*BETTER_LATE, agree, few, negative, time_greedy):
         assert found[claim.text] == "refuted", claim.text
 
 
 def test_equal_agents_refute_that_one_is_better_and_leave_changes_open():
     same = ((5.0,) * 7, 3, 100, 20.0)
     found = verdicts(runs(intrinsic=same, greedy=same, random=same))
-    assert [found[claim.text] for claim in (BETTER[1600], FALLS, TIME)] == ["refuted", "open", "refuted"]
+    assert [found[claim.text] for claim in (best[1], falls, time)] == ["refuted", "open", "refuted"]
 
 
 @pytest.mark.parametrize(
@@ -91,7 +94,7 @@ def test_the_two_states_must_be_those_of_the_thesis(first, second, verdict):
     made = runs()
     for one in made["intrinsic"].values:
         one["states_grid"][-1] = np.where(one["states_grid"][-1] == 0, first, second)
-    assert verdicts(made)[SAME_STATES.text] == verdict
+    assert verdicts(made)[same_states.text] == verdict
 
 
 def test_the_agreement_of_runs_is_the_overlap_of_their_choices():

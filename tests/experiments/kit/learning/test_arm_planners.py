@@ -16,7 +16,7 @@ ELSEWHERE = np.array([0.0, 0.2, 0.0, 0.0])
 class Free:
     span = np.ones(4)
 
-    def is_sound_motion(self, start, end, cables=True):
+    def sound_motion(self, start, end, cables=True):
         return bool(np.linalg.norm(end - start) < 0.5)
 
 

@@ -16,7 +16,7 @@ class Plane:
 
     span = np.ones(4)
 
-    def is_sound_motion(self, start, end, cables=True):
+    def sound_motion(self, start, end, cables=True):
         return (start[0] - 0.5) * (end[0] - 0.5) > 0.0
 
 
@@ -71,8 +71,8 @@ def test_a_vertex_is_joined_by_sound_motions_only_and_by_all_if_there_are_none(s
 class Held(Plane):
     """As the plane, but all of it is too near to the cables."""
 
-    def is_sound_motion(self, start, end, cables=True):
-        return not cables and super().is_sound_motion(start, end)
+    def sound_motion(self, start, end, cables=True):
+        return not cables and super().sound_motion(start, end)
 
 
 def test_a_pose_held_by_the_cables_is_joined_where_nothing_touches():
@@ -90,4 +90,4 @@ def test_a_roadmap_follows_from_its_seed_and_holds_only_sound_poses_and_motions(
     assert belief.sound(first.vertices).all()
     for vertex in range(5):
         for other_vertex in first._costs[vertex]:
-            assert belief.is_sound_motion(first.vertices[vertex], first.vertices[other_vertex])
+            assert belief.sound_motion(first.vertices[vertex], first.vertices[other_vertex])

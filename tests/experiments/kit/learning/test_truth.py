@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.kit.learning.truth import Truth, l1, load_truth, measure_truth, model_error, most_likely, sampling_error, truth_of, walk
-from mobee.errors import InvalidValue
+from experiments.kit.learning.truth import Truth, l1, model_error, most_likely, sampling_error, truth_of, walk
 from mobee.learning.tabular import TabularPlant, half_space
-from tests.mobee.learning.toys import arm, torso
+from tests.mobee.learning.toys import arm
 
 SPACE = arm(neighbours="equidistant")
 
@@ -41,23 +40,13 @@ def test_the_truth_is_the_frequencies_of_what_was_seen():
 
 
 def test_walks_of_several_seeds_find_the_table_that_the_plant_draws_from():
-    truth = measure_truth(SPACE, plant_of, tries=25, seeds=[1, 2], most=40_000, processes=1)
+    truth = truth_of(SPACE, np.concatenate([walk(SPACE, plant_of, tries=25, most=40_000, seed=seed) for seed in (1, 2)]))
     error = l1(truth, plant_of(0))
     assert truth.tries[SPACE.goals >= 0].min() >= 50
     stochastic = plant_of(0).probabilities.max(axis=-1) < 1
     stochastic &= SPACE.goals >= 0
     assert (error[(SPACE.goals >= 0) & ~stochastic] == 0).all()
     assert error[stochastic].mean() < 0.3  # about 9 outcomes and 60 tries each
-
-
-def test_it_comes_back_from_its_file_and_is_refused_for_another_space(tmp_path):
-    truth = truth_of(SPACE, np.array([[0, 0, 1], [0, 0, 40]]))
-    truth.save(tmp_path / "truth.npz")
-    again = load_truth(tmp_path / "truth.npz", SPACE)
-    assert np.array_equal(again.outcomes, truth.outcomes) and np.array_equal(again.probabilities, truth.probabilities)
-    assert np.array_equal(again.tries, truth.tries) and again.settings == truth.settings
-    with pytest.raises(InvalidValue, match="another space"):
-        load_truth(tmp_path / "truth.npz", torso())
 
 
 @dataclass

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of results and rules of claims, for runs from which numbers are computed and compared between groups.
+
+A group is the runs of one setting.  A verdict is True, False, or None where the numbers leave the claim open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from experiments.kit.experiment import Measured
+from experiments.kit.statistics import (
+    estimate,
+    improvement_interval,
+    interquartile_mean,
+    interval,
+    mean_over,
+    probability_of_improvement,
+    ratio_estimate,
+    ratio_interval,
+)
+from mobee.arrays import Array
+
+Key = TypeVar("Key")
+Run = TypeVar("Run")
+ABOUT_EQUAL = (0.9, 1.1)
+
+
+def row(runs: Sequence[Run], columns: Mapping[str, Callable[[Run], float]]) -> dict[str, Any]:
+    """Return a row of results: the number of runs, and the interquartile mean of each column's number, computed for each run."""
+    return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in columns.items()}
+
+
+def of_each(groups: Mapping[Key, Iterable[Run]], number: Callable[[Run], float]) -> dict[Key, list[float]]:
+    """Return a number of every run, by group."""
+    return {key: [number(run) for run in runs] for key, runs in groups.items()}
+
+
+def texts(values: Mapping[Any, ArrayLike], digits: int = 2, form: str = "{} {}") -> str:
+    """Return the estimate of each group as text; `form`: of its key and the estimate."""
+    return ", ".join(form.format(str(key).replace("_", " "), estimate(group, digits)) for key, group in values.items())
+
+
+def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
+    """Return True for an interval (low, high) within the bounds, False for one outside, None for one that contains a bound."""
+    low, high = span
+    if low >= least and high <= most:
+        return True
+    return False if high < least or low > most else None
+
+
+def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
+    """Combine verdicts: False if one is False, else None if one is open, else True."""
+    given = list(verdicts)
+    return False if False in given else None if None in given else True
+
+
+def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Measured:
+    """Judge whether the mean of the runs lies within bounds, by its interval; `text`: holds the estimate."""
+    return text.format(estimate(values, digits)), decides(interval(values), least, most)
+
+
+def ratio_within(
+    above: ArrayLike, below: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}"
+) -> Measured:
+    """Judge whether the ratio of two groups of runs lies within bounds, by its interval; `text`: holds the estimate."""
+    return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
+
+
+def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool:
+    """Return whether the interval of one group lies above those of all others, and above `least`."""
+    return interval(values[name])[0] > max([least, *(interval(group)[1] for key, group in values.items() if key != name)])
+
+
+def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool:
+    """Return whether the interval of one group lies below those of all others."""
+    return interval(values[name])[1] < min(interval(group)[0] for key, group in values.items() if key != name)
+
+
+def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Measured:
+    """Judge whether the runs of one group are above those of every rival (or, with `worse`, below them).
+
+    They are above a rival if the interval of the probability of improvement lies above one half.  They are not if it lies below, or if the
+    interval of the ratio lies within a tenth of 1.
+    """
+    parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
+    for rival in rivals:
+        first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
+        chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
+        parts.append(f"{rival} {estimate(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
+        verdicts.append(True if low > 0.5 else False if high < 0.5 or _about_equal(first, second) else None)
+    return ", ".join(parts), all_hold(verdicts)
+
+
+def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
+    """Return whether the interval of the ratio lies within a tenth of 1; False if a value is not above 0."""
+    if min(np.min(first), np.min(second)) <= 0.0:
+        return False
+    return decides(ratio_interval(first, second), *ABOUT_EQUAL) is True
+
+
+def rises(change: ArrayLike) -> bool | None:
+    """Return whether the change of the runs is above 0; None if its interval contains 0."""
+    low, high = interval(change)
+    return True if low > 0.0 else False if high < 0.0 else None
+
+
+def changes(before: Array, after: Array) -> str:
+    """Return the means before and after and the mean change of a run as text."""
+    return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"
