@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import mobee
-from mobee import Geometry, Model, Robot, World
+from mobee import Geometry, Model, Robot, World, costs
 from mobee.arrays import Array
 from mobee.rendering.sheet import View
 from mobee.roadmap.building.settings import MAX_TURN
@@ -72,6 +72,24 @@ class Example:
     margin: float = 0.0
 
 
+def one_hand(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
+    """Return an example in which torso and right arm move, the left arm is bent aside, and the law lets the robot rest in every pose.
+
+    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields.
+    """
+    return _example(model, title, figure, terms, task, spacing, {"motors": ONE_HAND, "start": left_aside(model.robot)} | more)
+
+
+def both_hands(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
+    """Return an example in which torso and both arms move; see `one_hand`."""
+    return _example(model, title, figure, terms, task, spacing, {"motors": BOTH_HANDS, "markers": (LEFT, RIGHT)} | more)
+
+
+def _example(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, more: Mapping[str, Any]) -> Example:
+    every = (*terms, costs.collision(), costs.home())
+    return Example(title=title, figure=figure, model=model, costs=every, task=task, spacing=spacing, **({"margin": MARGIN} | more))
+
+
 def build(
     example: Example,
     method: Method,
@@ -82,6 +100,7 @@ def build(
     longest: float | None = MAX_TURN,
 ) -> Roadmap:
     """Build the roadmap of an example."""
+    settings = mobee.RoadmapSettings(method, neighbours, longest, example.margin)
     return mobee.build_roadmap(
         example.model,
         costs=list(example.costs),
@@ -90,7 +109,7 @@ def build(
         start=example.start,
         motors=list(example.motors),
         seed=seed,
-        settings=mobee.RoadmapSettings(method, neighbours, longest, example.margin),
+        settings=settings,
         file=file,
         progress=progress,
     )

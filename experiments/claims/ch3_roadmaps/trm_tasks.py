@@ -14,7 +14,6 @@ from experiments.kit.roadmap_task import (
     FINGERS,
     FORWARD,
     LEFT,
-    MARGIN,
     NECK,
     ONE_HAND,
     RIGHT,
@@ -26,15 +25,25 @@ from experiments.kit.roadmap_task import (
     Example,
     alone,
     at_table,
+    both_hands,
     carry,
     elbows_out,
     grasping,
     left_aside,
+    one_hand,
 )
 from mobee import Geometry, Model, costs, tasks
+from mobee.rendering.sheet import View
 from mobee.roadmap.ik.terms import Term
 
 PREGRASP_SPACING = 0.008  # m
+FIVE_DEGREES = float(np.deg2rad(5.0))  # rad
+OVER_TABLE = [(-0.20, 0.24), (-0.44, 0.14), (-0.36, 0.30), (-0.18, 0.34)]  # m, x and y
+Via = list[tuple[float, ...]]
+
+
+def _degrees(*angles: float) -> Via:
+    return [(float(np.deg2rad(angle)),) for angle in angles]
 
 
 def held(width: float) -> tuple[Term, Term]:
@@ -56,24 +65,10 @@ def both_held() -> Example:
     width = 0.20  # m, from palm to palm
     model = at_table()
     between_palms(model, mobee.box(0.12, 0.16, width - 0.05), width)
-    return Example(
-        title="both hands held",
-        figure="3.1, left",
-        model=model,
-        costs=(
-            *held(width),
-            costs.orientation(RIGHT, TO_THE_LEFT),
-            costs.plane(RIGHT, TO_THE_RIGHT, 0.5 * width),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.place(RIGHT, "xz", [(-0.48, -0.14), (-0.02, 0.34)]),
-        spacing=0.02,
-        motors=BOTH_HANDS,
-        markers=(LEFT, RIGHT),
-        margin=MARGIN,
-        via=[(-0.24, 0.04), (-0.40, 0.04), (-0.30, 0.24), (-0.24, 0.26)],
-    )
+    terms = [*held(width), costs.orientation(RIGHT, TO_THE_LEFT), costs.plane(RIGHT, TO_THE_RIGHT, 0.5 * width)]
+    task = tasks.place(RIGHT, "xz", [(-0.48, -0.14), (-0.02, 0.34)])
+    via = [(-0.24, 0.04), (-0.40, 0.04), (-0.30, 0.24), (-0.24, 0.26)]
+    return both_hands(model, "both hands held", "3.1, left", terms, task, 0.02, via=via)
 
 
 def elbow_down() -> Example:
@@ -82,55 +77,24 @@ def elbow_down() -> Example:
     The elbow is never higher than 10 cm below the shoulder; the task space is the place of the hand.
     """
     highest = 0.05  # m, of the elbow
-    model = at_table()
-    return Example(
-        title="elbow down",
-        figure="3.1, right",
-        model=model,
-        costs=(costs.at_most("right_elbow", UP, highest), costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.06, 0.38)]),
-        spacing=0.04,
-        motors=ONE_HAND,
-        start=left_aside(model.robot),
-        margin=MARGIN,
-        via=[(-0.26, 0.20, 0.0), (-0.40, 0.06, 0.02), (-0.26, 0.06, 0.22), (-0.22, 0.30, 0.14)],
-    )
+    task = tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.06, 0.38)])
+    via = [(-0.26, 0.20, 0.0), (-0.40, 0.06, 0.02), (-0.26, 0.06, 0.22), (-0.22, 0.30, 0.14)]
+    return one_hand(at_table(), "elbow down", "3.1, right", [costs.at_most("right_elbow", UP, highest)], task, 0.04, via=via)
 
 
 def palm_side() -> Example:
     """The right hand moves over the table, its palm to the side (thesis fig. 3.2, left): left and right, forward and back."""
-    height = 0.0  # m, 10 cm above the table
-    model = at_table()
-    return Example(
-        title="palm to the side",
-        figure="3.2, left",
-        model=model,
-        costs=(costs.orientation(RIGHT, TO_THE_LEFT), costs.plane(RIGHT, UP, height), costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xy", [(-0.56, -0.10), (-0.30, 0.46)]),
-        spacing=0.02,
-        motors=ONE_HAND,
-        start=left_aside(model.robot),
-        margin=MARGIN,
-        via=[(-0.20, 0.20), (-0.44, 0.16), (-0.36, -0.08), (-0.26, 0.14)],
-    )
+    terms = [costs.orientation(RIGHT, TO_THE_LEFT), costs.plane(RIGHT, UP, 0.0)]  # 10 cm above the table
+    task = tasks.place(RIGHT, "xy", [(-0.56, -0.10), (-0.30, 0.46)])
+    via = [(-0.20, 0.20), (-0.44, 0.16), (-0.36, -0.08), (-0.26, 0.14)]
+    return one_hand(at_table(), "palm to the side", "3.2, left", terms, task, 0.02, via=via)
 
 
 def palm_down() -> Example:
     """The right hand moves over the table, its palm down (thesis fig. 3.2, right): left and right, forward and back."""
-    height = 0.0  # m, 10 cm above the table
-    model = at_table()
-    return Example(
-        title="palm down",
-        figure="3.2, right",
-        model=model,
-        costs=(costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, height), costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xy", [(-0.56, -0.06), (-0.30, 0.50)]),
-        spacing=0.02,
-        motors=ONE_HAND,
-        start=left_aside(model.robot),
-        margin=MARGIN,
-        via=[(-0.20, 0.24), (-0.44, 0.14), (-0.36, 0.30), (-0.18, 0.34)],
-    )
+    terms = [costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, 0.0)]  # 10 cm above the table
+    task = tasks.place(RIGHT, "xy", [(-0.56, -0.06), (-0.30, 0.50)])
+    return one_hand(at_table(), "palm down", "3.2, right", terms, task, 0.02, via=OVER_TABLE)
 
 
 def raise_glass() -> Example:
@@ -141,18 +105,11 @@ def raise_glass() -> Example:
     """
     model = at_table()
     carry(model, "glass", mobee.cylinder(0.03, 0.12), RIGHT, 0.045, THUMB)
-    return Example(
-        title="raise a glass",
-        figure="3.3",
-        model=model,
-        costs=(costs.orientation(RIGHT, UP, direction=THUMB), costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.02, 0.38)]),
-        spacing=0.04,
-        motors=ONE_HAND,
-        start=grasping(left_aside(model.robot), model.robot, "r"),
-        margin=MARGIN,
-        via=[(-0.40, 0.20, 0.02), (-0.36, 0.10, 0.10), (-0.28, 0.08, 0.22)],
-    )
+    terms = [costs.orientation(RIGHT, UP, direction=THUMB)]
+    task = tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.02, 0.38)])
+    start = grasping(left_aside(model.robot), model.robot, "r")
+    via = [(-0.40, 0.20, 0.02), (-0.36, 0.10, 0.10), (-0.28, 0.08, 0.22)]
+    return one_hand(model, "raise a glass", "3.3", terms, task, 0.04, start=start, via=via)
 
 
 def bimanual_inspect() -> Example:
@@ -166,25 +123,12 @@ def bimanual_inspect() -> Example:
     model = at_table()
     between_palms(model, mobee.box(0.10, 0.12, width - 0.05), width)
     across = np.multiply(0.5 * width, TO_THE_LEFT)
-    return Example(
-        title="bimanual inspect",
-        figure="3.1, 3.4",
-        model=model,
-        costs=(
-            costs.position(LEFT, middle + across),
-            costs.position(RIGHT, middle - across),
-            costs.orientation(LEFT, THUMBS_UP),
-            costs.orientation(RIGHT, THUMBS_UP),
-            costs.gaze(middle, tolerance=np.deg2rad(10.0)),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.place("head", "xy", [(-0.12, 0.06), (-0.13, 0.13)]),
-        spacing=0.01,
-        motors=(*BOTH_HANDS, *NECK),
-        markers=("head",),
-        via=[(0.02, 0.0), (-0.04, 0.06), (-0.06, 0.0), (-0.04, -0.06)],
-    )
+    terms = [costs.position(LEFT, middle + across), costs.position(RIGHT, middle - across)]
+    terms += [costs.orientation(LEFT, THUMBS_UP), costs.orientation(RIGHT, THUMBS_UP), costs.gaze(middle, tolerance=np.deg2rad(10.0))]
+    task = tasks.place("head", "xy", [(-0.12, 0.06), (-0.13, 0.13)])
+    more = {"motors": (*BOTH_HANDS, *NECK), "markers": ("head",), "margin": 0.0}
+    via = [(0.02, 0.0), (-0.04, 0.06), (-0.06, 0.0), (-0.04, -0.06)]
+    return both_hands(model, "bimanual inspect", "3.1, 3.4", terms, task, 0.01, via=via, **more)
 
 
 def inspect_hand() -> Example:
@@ -196,24 +140,11 @@ def inspect_hand() -> Example:
     place = (-0.26, 0.05, 0.28)  # m
     model = alone()
     carry(model, "held", mobee.box(0.05, 0.05, 0.10), RIGHT, 0.04, THUMB)
-    return Example(
-        title="inspect",
-        figure="3.5",
-        model=model,
-        costs=(
-            costs.position(RIGHT, place),
-            costs.across(RIGHT, UP),
-            costs.gaze(RIGHT, tolerance=np.deg2rad(10.0)),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.angle(RIGHT, UP, FORWARD, -np.pi / 2, np.pi),
-        spacing=float(np.deg2rad(5.0)),
-        motors=(*ONE_HAND, *NECK),
-        start=elbows_out(grasping(left_aside(model.robot), model.robot, "r"), model.robot, "r"),
-        markers=(RIGHT, "right_elbow"),  # the hand itself stays
-        via=[(np.deg2rad(170.0),), (np.deg2rad(-60.0),)],
-    )
+    terms = [costs.position(RIGHT, place), costs.across(RIGHT, UP), costs.gaze(RIGHT, tolerance=np.deg2rad(10.0))]
+    task = tasks.angle(RIGHT, UP, FORWARD, -np.pi / 2, np.pi)
+    start = elbows_out(grasping(left_aside(model.robot), model.robot, "r"), model.robot, "r")
+    more = {"motors": (*ONE_HAND, *NECK), "markers": (RIGHT, "right_elbow"), "margin": 0.0}  # the hand itself stays
+    return one_hand(model, "inspect", "3.5", terms, task, FIVE_DEGREES, start=start, via=_degrees(170.0, -60.0), **more)
 
 
 def push_forward() -> Example:
@@ -225,25 +156,10 @@ def push_forward() -> Example:
     width, height = 0.24, 0.0  # m
     model = at_table()
     between_palms(model, mobee.box(0.18, 0.20, width - 0.05), width)
-    return Example(
-        title="push forward",
-        figure="3.6",
-        model=model,
-        costs=(
-            *held(width),
-            costs.orientation(RIGHT, THUMBS_UP),
-            costs.plane(RIGHT, UP, height),
-            costs.plane(RIGHT, TO_THE_RIGHT, 0.5 * width),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.place(RIGHT, "x", [(-0.56, -0.10)]),
-        spacing=0.02,
-        motors=BOTH_HANDS,
-        markers=(LEFT, RIGHT),
-        margin=MARGIN,
-        via=[(-0.26,), (-0.42,)],
-    )
+    terms = [*held(width), costs.orientation(RIGHT, THUMBS_UP)]
+    terms += [costs.plane(RIGHT, UP, height), costs.plane(RIGHT, TO_THE_RIGHT, 0.5 * width)]
+    task = tasks.place(RIGHT, "x", [(-0.56, -0.10)])
+    return both_hands(model, "push forward", "3.6", terms, task, 0.02, via=[(-0.26,), (-0.42,)])
 
 
 def push_over() -> Example:
@@ -255,25 +171,8 @@ def push_over() -> Example:
     width, height, before = 0.20, 0.0, 0.32  # m
     model = at_table()
     between_palms(model, mobee.box(0.18, 0.20, width - 0.05), width)
-    return Example(
-        title="push over",
-        figure="3.7",
-        model=model,
-        costs=(
-            *held(width),
-            costs.orientation(RIGHT, THUMBS_UP),
-            costs.plane(RIGHT, UP, height),
-            costs.plane(RIGHT, (1, 0, 0), -before),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.place(RIGHT, "y", [(-0.30, 0.50)]),
-        spacing=0.02,
-        motors=BOTH_HANDS,
-        markers=(LEFT, RIGHT),
-        margin=MARGIN,
-        via=[(0.22,), (-0.02,)],
-    )
+    terms = [*held(width), costs.orientation(RIGHT, THUMBS_UP), costs.plane(RIGHT, UP, height), costs.plane(RIGHT, (1, 0, 0), -before)]
+    return both_hands(model, "push over", "3.7", terms, tasks.place(RIGHT, "y", [(-0.30, 0.50)]), 0.02, via=[(0.22,), (-0.02,)])
 
 
 def reach_into() -> Example:
@@ -285,18 +184,9 @@ def reach_into() -> Example:
     x, y, floor = -0.27, 0.17, -0.22  # m, of the box
     model = alone()
     _put_box(model, x, y, floor)
-    return Example(
-        title="reach into a box",
-        figure="3.8",
-        model=model,
-        costs=(costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xyz", [(x - 0.16, x + 0.16), (y - 0.16, y + 0.16), (floor, 0.14)]),
-        spacing=0.03,
-        motors=ONE_HAND,
-        start=left_aside(model.robot),
-        margin=MARGIN,
-        via=[(x + 0.06, y, 0.05), (x, y, floor + 0.09), (x - 0.03, y - 0.03, 0.08), (x - 0.10, y - 0.14, 0.06)],
-    )
+    task = tasks.place(RIGHT, "xyz", [(x - 0.16, x + 0.16), (y - 0.16, y + 0.16), (floor, 0.14)])
+    via = [(x + 0.06, y, 0.05), (x, y, floor + 0.09), (x - 0.03, y - 0.03, 0.08), (x - 0.10, y - 0.14, 0.06)]
+    return one_hand(model, "reach into a box", "3.8", [], task, 0.03, via=via)
 
 
 def _put_box(model: Model, x: float, y: float, floor: float) -> None:
@@ -309,64 +199,32 @@ def _put_box(model: Model, x: float, y: float, floor: float) -> None:
         model.world.add(name, mobee.box(side, thick, wall), position=(x, y + sign * half, middle))
 
 
+def _turned(
+    model: Model, title: str, figure: str, width: float, across: tuple[int, int, int], most: float, view: View, via: Via
+) -> Example:
+    """Return an example in which both hands turn an object about a direction: parallel palms, the middle between them stays."""
+    middle = (-0.30, 0.0, 0.20)  # m
+    between_palms(model, mobee.box(0.12, 0.12 if view == "front" else 0.16, width - 0.05), width)
+    terms = [*held(width), costs.position(RIGHT, middle, tolerance=0.01, offset=(0.0, 0.0, 0.5 * width)), costs.across(RIGHT, across)]
+    task = tasks.angle(RIGHT, across, TO_THE_LEFT, -most, most)
+    more = {"start": elbows_out(model.robot.home, model.robot), "views": (view,), "margin": 0.0}
+    return both_hands(model, title, figure, terms, task, FIVE_DEGREES, via=via, **more)
+
+
 def bimanual_rotate() -> Example:
     """Rotate a large object between both hands about the forward direction, as a steering wheel (thesis fig. 3.9).
 
-    Where the hands are to each other is fixed, their palms are parallel and opposite, and the middle between them stays; the task space
-    is the angle of the right palm's normal in the plane of up/down and left/right.
+    The task space is the angle of the right palm's normal in the plane of up/down and left/right.
     """
-    width, middle = 0.20, (-0.30, 0.0, 0.20)  # m
-    model = alone()
-    between_palms(model, mobee.box(0.12, 0.12, width - 0.05), width)
-    return Example(
-        title="bimanual rotate",
-        figure="3.9",
-        model=model,
-        costs=(
-            *held(width),
-            costs.position(RIGHT, middle, tolerance=0.01, offset=(0.0, 0.0, 0.5 * width)),
-            costs.across(RIGHT, FORWARD),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.angle(RIGHT, FORWARD, TO_THE_LEFT, -0.4 * np.pi, 0.4 * np.pi),
-        spacing=float(np.deg2rad(5.0)),
-        motors=BOTH_HANDS,
-        start=elbows_out(model.robot.home, model.robot),
-        markers=(LEFT, RIGHT),
-        views=("front",),
-        via=[(np.deg2rad(-55.0),), (np.deg2rad(55.0),)],
-    )
+    return _turned(alone(), "bimanual rotate", "3.9", 0.20, FORWARD, 0.4 * np.pi, "front", _degrees(-55.0, 55.0))
 
 
 def bimanual_twist() -> Example:
     """Twist a large object between both hands about the vertical (thesis fig. 3.10).
 
-    Where the hands are to each other is fixed, their palms are parallel and opposite, and the middle between them stays; the task space
-    is the angle of the right palm's normal in the plane of the table.
+    The task space is the angle of the right palm's normal in the plane of the table.
     """
-    width, middle = 0.18, (-0.30, 0.0, 0.20)  # m
-    model = at_table()
-    between_palms(model, mobee.box(0.12, 0.16, width - 0.05), width)
-    return Example(
-        title="bimanual twist",
-        figure="3.10",
-        model=model,
-        costs=(
-            *held(width),
-            costs.position(RIGHT, middle, tolerance=0.01, offset=(0.0, 0.0, 0.5 * width)),
-            costs.across(RIGHT, UP),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.angle(RIGHT, UP, TO_THE_LEFT, -np.pi / 2, np.pi / 2),
-        spacing=float(np.deg2rad(5.0)),
-        motors=BOTH_HANDS,
-        start=elbows_out(model.robot.home, model.robot),
-        markers=(LEFT, RIGHT),
-        views=("top",),
-        via=[(np.deg2rad(-40.0),), (np.deg2rad(40.0),)],
-    )
+    return _turned(at_table(), "bimanual twist", "3.10", 0.18, UP, np.pi / 2, "top", _degrees(-40.0, 40.0))
 
 
 def unscrew() -> Example:
@@ -378,24 +236,12 @@ def unscrew() -> Example:
     bottle = np.array([-0.32, 0.02, 0.05])  # m, where the left hand holds it
     model = alone()
     carry(model, "bottle", mobee.cylinder(0.025, 0.20), LEFT, 0.045, THUMB)
-    return Example(
-        title="unscrew",
-        figure="3.11",
-        model=model,
-        costs=(
-            costs.position(LEFT, bottle - (0.0, 0.045, 0.0)),
-            costs.orientation(LEFT, THUMBS_UP),
-            costs.position(RIGHT, bottle + (0.0, 0.0, 0.13)),
-            costs.orientation(RIGHT, DOWN),
-            costs.collision(),
-            costs.home(),
-        ),
-        task=tasks.angle(RIGHT, UP, FORWARD, -np.pi, np.pi, direction=FINGERS),
-        spacing=float(np.deg2rad(5.0)),
-        motors=BOTH_HANDS,
-        start=grasping(model.robot.home, model.robot),
-        markers=(RIGHT, "right_elbow"),  # the hands themselves stay
-        via=[(np.deg2rad(0.0),), (np.deg2rad(75.0),)],
+    terms = [costs.position(LEFT, bottle - (0.0, 0.045, 0.0)), costs.orientation(LEFT, THUMBS_UP)]
+    terms += [costs.position(RIGHT, bottle + (0.0, 0.0, 0.13)), costs.orientation(RIGHT, DOWN)]
+    task = tasks.angle(RIGHT, UP, FORWARD, -np.pi, np.pi, direction=FINGERS)
+    start, markers = grasping(model.robot.home, model.robot), (RIGHT, "right_elbow")  # the hands themselves stay
+    return both_hands(
+        model, "unscrew", "3.11", terms, task, FIVE_DEGREES, start=start, markers=markers, margin=0.0, via=_degrees(0.0, 75.0)
     )
 
 
@@ -405,20 +251,9 @@ def pregrasp() -> Example:
     The thesis counts one for every square centimetre of half a square metre, for which both hands are needed; the right palm reaches
     0.3 m^2.
     """
-    height = -0.04  # m, 6 cm above the table
-    model = at_table()
-    return Example(
-        title="pre-grasp",
-        figure="4.8",
-        model=model,
-        costs=(costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, height), costs.collision(), costs.home()),
-        task=tasks.place(RIGHT, "xy", [(-0.74, -0.14), (-0.75, 0.75)]),
-        spacing=PREGRASP_SPACING,
-        motors=ONE_HAND,
-        start=left_aside(model.robot),
-        margin=MARGIN,
-        via=[(-0.20, 0.24), (-0.44, 0.14), (-0.36, 0.30), (-0.18, 0.34)],
-    )
+    terms = [costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, -0.04)]  # 6 cm above the table
+    task = tasks.place(RIGHT, "xy", [(-0.74, -0.14), (-0.75, 0.75)])
+    return one_hand(at_table(), "pre-grasp", "4.8", terms, task, PREGRASP_SPACING, via=OVER_TABLE)
 
 
 EXAMPLES: dict[str, Callable[[], Example]] = {  # in the order of the thesis

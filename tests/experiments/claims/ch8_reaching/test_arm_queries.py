@@ -64,4 +64,4 @@ def test_a_motion_past_a_ball_is_not_sound_though_its_ends_are():
     ball = Model(load_robot("icub_2014")).evaluate(whole((start + end) / 2)).position("left_palm")
     belief = believed(Scene(ball[None], np.zeros((1, 3)), np.zeros(4), *nowhere), "no cables")
     assert belief.sound(np.array([start, end])).all()
-    assert not belief.is_sound_motion(start, end)
+    assert not belief.sound_motion(start, end)
