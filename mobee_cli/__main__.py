@@ -34,7 +34,7 @@ VERBS = {
     "view": "show a robot file in motion",
 }
 
-EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "icub_models": "sim"}
+EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "mujoco": "sim", "icub_models": "sim"}
 """Packages that some verbs import, and the extra of this project that installs each."""
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: more threads would only wait

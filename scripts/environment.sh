@@ -6,20 +6,22 @@ root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 venv="$root/.venv"
 say() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; }
 
-# Prints the interpreter to use: python3.11 first, because PyBullet has no wheels for later versions.
-find_python() {
-  local candidate
-  for candidate in python3.11 python3 python3.12 python3.13 python3.14; do
-    if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then
+# Prints the interpreter to use: the one that made .venv, else the newest; for the tests python3.11 first, under which all of them run.
+find_python() { # "run" or "dev"
+  local candidate candidates=(python3.14 python3.13 python3.12 python3.11 python3)
+  if [[ "$1" == dev ]]; then candidates=(python3.11 "${candidates[@]}"); fi
+  if [[ "$1" == run && -s "$venv/made-with" ]]; then candidates=("$(cat "$venv/made-with")" "${candidates[@]}"); fi
+  for candidate in "${candidates[@]}"; do
+    if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' >/dev/null 2>&1; then
       command -v "$candidate"
       return
     fi
   done
-  say "needs Python 3.11 or newer, found $(python3 --version 2>/dev/null || echo none): install python3.11 with its venv module."
+  say "needs Python 3.11 to 3.14, found $(python3 --version 2>/dev/null || echo none): install one of them with its venv module."
   return 1
 }
 
-# Prints four words: the Python version, and a hash of the files that decide which packages are installed to run, which to test, and the project.
+# Prints three words, each a hash of the Python version and of the files that decide which packages are installed to run, which to test, and the project.
 fingerprints() {
   "$1" - "$root" <<'PYTHON'
 import hashlib, pathlib, sys
@@ -33,7 +35,7 @@ def digest(*names):
     return hashlib.sha256(f"{version} {root} ".encode() + text).hexdigest()
 
 
-print(version, digest("requirements.lock"), digest("requirements-dev.lock"), digest("requirements.lock", "pyproject.toml"))
+print(digest("requirements.lock"), digest("requirements-dev.lock"), digest("requirements.lock", "pyproject.toml"))
 PYTHON
 }
 
@@ -49,6 +51,7 @@ make_venv() { # interpreter
     say "$1 cannot make a virtual environment: install its venv module (Debian: apt install python3-venv)."
     return 1
   fi
+  echo "$1" >"$venv/made-with"
 }
 
 # No byte code is compiled here: most modules are never imported, and Python compiles the others at their first import.
@@ -136,12 +139,9 @@ install_environment() {
 
 # Makes .venv complete, with the argument "dev" also for ./test; returns non-zero, after one line with the reason, if that fails.
 ensure_environment() {
-  local kind="${1:-run}" python version run dev project packages lock size core=()
-  python="$(find_python)" || return 1
-  read -r version run dev project < <(fingerprints "$python")
-  if [[ "$version" != 3.11 ]]; then
-    say "Python $version: PyBullet has no wheel for it, so the robot runs on its kinematic back-end only; install python3.11 for the physics."
-  fi
+  local kind="${1:-run}" python run dev project packages lock size core=()
+  python="$(find_python "$kind")" || return 1
+  read -r run dev project < <(fingerprints "$python")
   # Sizes are those on Linux with Python 3.11.  Warnings of the compiler are errors for the tests only: a user's compiler may be another.
   if [[ "$kind" == dev ]]; then
     packages="$dev" lock=requirements-dev.lock core=(--strict) size="1 GB to download and 3 GB on disk, one to three minutes"

@@ -18,7 +18,7 @@ from services.common.emergency_stop import StopRecord
 from services.common.worlds import is_path
 from services.launcher.scenario import Scenario
 
-_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco", "icub-models", "rerun-sdk")
+_PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco-core", "icub-models", "rerun-sdk")
 
 
 def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:

@@ -21,7 +21,7 @@ from services.robot_sim.mujoco_spec import add_tree, add_volume, joint_name
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
 NEGLIGIBLE = 1e-6  # kg, of a link without mass in a robot with masses: what carries the link includes its weight
 HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of motors, couplings and stops: as hard as MuJoCo allows
-SOLID = (0.99, 0.99, 0.001, 0.5, 2.0)  # solimp of contacts
+SOLID = (0.1, 0.99, 0.0005, 0.5, 2.0)  # solimp of contacts: harder with the depth, within 0.5 mm, so that a pressing hand comes to rest
 FRICTION = (0.5, 0.5, 0.0, 0.0, 0.0)  # of contacts, as PyBullet's
 ARENA = 64 * 2**20  # bytes; holds some 100 000 contacts, so that none is left out
 
@@ -56,7 +56,6 @@ class MujocoScene:
             geom = add_volume(spec, body, _of_object(name), thing, np.zeros(3))
             geom.quat, geom.contype, geom.conaffinity = (1.0, 0.0, 0.0, 0.0), 0, 0
         self.pairs_watched = self._add_pairs(spec, world)
-        self.notes = self._assumptions()
         joints = [max(motor.joints, key=lambda one: abs(one[1])) for motor in robot.motor_table]
         self.scale, self.offset = np.array([scale for _, scale, _ in joints]), np.array([offset for _, _, offset in joints])
         for motor, (joint, scale, offset) in zip(robot.motor_table, joints, strict=True):
@@ -65,6 +64,7 @@ class MujocoScene:
         self.data: Any = mujoco.MjData(self.model)
         self._number(world, [joint for joint, _, _ in joints])
         self.set_posture(robot.home)
+        self.notes = self._assumptions()
 
     def set_posture(self, q: Array) -> None:
         """Put the joints at q (n,) rad of the motors, at rest."""
@@ -132,9 +132,13 @@ class MujocoScene:
         if not self._robot.bodies:
             notes.append(f"the robot's file has no masses: those of its solids at {WATER_DENSITY:g} kg/m^3 are taken")
         if self.left_out:
-            (first, second), depth = max(self.left_out.items(), key=lambda item: item[1])
+            pair, depth = max(self.left_out.items(), key=lambda item: item[1])
             some = f"{len(self.left_out)} pairs of solids overlap at home and are not tested for contact"
-            notes.append(f"{some}; the deepest is {first} and {second}, by {depth * 1e3:.1f} mm")
+            notes.append(f"{some}; the deepest is {' and '.join(sorted(pair))}, by {depth * 1e3:.1f} mm")
+        load = np.abs(self.data.qfrc_bias[self._all_dofs] @ self._robot.coupling[0])
+        weak = [motor.name for motor, weight in zip(self._robot.motor_table, load.tolist(), strict=True) if weight > motor.max_torque]
+        if weak:
+            notes.append(f"too weak to carry the robot's weight at home, so that they give way: {', '.join(weak)}")
         return tuple(notes)
 
     def _add_pairs(self, spec: Any, world: World) -> int:
@@ -153,7 +157,7 @@ class MujocoScene:
         return len(watched)
 
     def _add_pair(self, spec: Any, geoms: GeomPair, names: GeomPair) -> None:
-        if names not in self.left_out:
+        if frozenset(names) not in self.left_out:
             spec.add_pair(geomname1=geoms[0], geomname2=geoms[1], condim=3, friction=FRICTION, solref=self._soonest, solimp=SOLID)
 
     @property
@@ -204,10 +208,10 @@ def _share(amount: float, motor: Motor, scale: float) -> float:
     return amount / (len(motor.joints) * scale**2)
 
 
-def touching_at_home(robot: Robot, world: World) -> dict[GeomPair, float]:
+def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
     """Return the pairs of solids, by name, that the model finds in contact at home, with the depth in m."""
     contacts = Model(robot, world).evaluate(robot.home).contacts
-    return {(one.first, one.second): one.depth for one in contacts if one.kind == "solid"}
+    return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 
 
 def _options(substep: float) -> Any:
