@@ -147,8 +147,6 @@ def test_an_old_python_is_refused_in_one_line(bare_clone: Path) -> None:
     assert done.stderr.splitlines() == ["launch: needs Python 3.11 to 3.14, found Python 3.9.18: install one of them with its venv module."]
 
 
-
-
 def fake_interpreter(clone: Path, pip: str = "exit 0", core: str = "touch $root/core; exit 0", name: str = "python3.14") -> None:
     """A Python whose venv holds a copy of itself; pip runs the command `pip`, the core is built by `core`, and all is logged."""
     body = f"""

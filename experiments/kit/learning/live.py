@@ -26,6 +26,7 @@ JOINTS = {
 }
 ROBOTS = {  # settings of robot_sim; the identified motor model was fitted to the PyBullet robot
     "pybullet": {"backend": "pybullet", "motors": "published"},
+    "mujoco": {"backend": "mujoco", "motors": "published"},
     "kinematic": {"backend": "kinematic", "motors": "identified"},
 }
 PIECE = 200  # transitions of each part in one launch

@@ -111,7 +111,7 @@ def compared(folder: Path, task: str, least: int) -> Compared:
     return Compared(live, offline, counts)
 
 
-COLORS = {"pybullet": "tab:red", "kinematic": "tab:blue"}
+COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
 
 
 def draw_distances(tasks: Mapping[str, Compared], least: int) -> Any:

@@ -36,7 +36,7 @@ def test_the_launcher_takes_the_scenario_and_its_agents_are_those_of_the_offline
     configs = {part.who: part.config for part in scenario.parts}
     assert scenario.is_locked and ticks > 30 * 4 * RATE
     assert configs["robot_sim"].backend == robot and configs["robot_sim"].rate == RATE
-    assert configs["robot_sim"].motors == ("published" if robot == "pybullet" else "identified")
+    assert configs["robot_sim"].motors == ("identified" if robot == "kinematic" else "published")
     offline = agents(TASKS[task], offline_plant(TASKS[task], 3), 3)
     assert [f"agent_{agent.part}" for agent in offline] == [who for who in configs if who.startswith("agent_")]
     for agent in offline:
