@@ -8,9 +8,9 @@ Published: no number.  Run time: about fifteen minutes on 2 cores for the arms; 
 Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at the same time; with --table also those of
 torso and arms at the table.  Live: all services in lockstep, with PyBullet; beside it MuJoCo and, for control, the motor model alone.
 Offline: the same agents with five other seeds.  Each of them is compared with the other four; this distance is the noise that a perfect
-copy would show too.  So a live robot is also compared with four of them at a time.  It is equal if its distance is below the 95 % prediction bound of one more
-offline seed, or below 0.01.  If that bound is more than 0.02 (the margin of equivalence) above the offline mean, the offline seeds differ
-too much for a verdict, and the claim is open.
+copy would show too.  So a live robot is also compared with four of them at a time.  It is equal if its distance is below the 95 %
+prediction bound of one more offline seed, or below 0.01.  If that bound is more than 0.02 (the margin of equivalence) above the offline
+mean, the offline seeds differ too much for a verdict, and the claim is open.
 Both engines simulate masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
 """
 
