@@ -80,6 +80,16 @@ def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str
     }
 
 
+def engine_ratios(runs: Sequence[Mapping[str, Any]]) -> dict[int, float]:
+    """Return by rate [Hz] how many times as fast as PyBullet MuJoCo was, where both were run."""
+    speeds = {(run["backend"], run["rate"]): run["standard_speed"] for run in runs}
+    return {
+        rate: speed / speeds["pybullet", rate]
+        for (name, rate), speed in speeds.items()
+        if name == "mujoco" and ("pybullet", rate) in speeds
+    }
+
+
 def report(result: dict[str, Any]) -> str:
     """Format the measurements."""
     lines = ["Lockstep of robot_sim, model, controller and three agents, a process each"]
@@ -91,5 +101,8 @@ def report(result: dict[str, Any]) -> str:
             f"{run['backend']:<10}{run['rate']:>4} Hz{run['speed']:>13.1f}{run['ticks_per_second']:>9.0f}"
             f"{run['standard_speed']:>12.1f}{least:>10}{aim:>5}{verdict}"
         )
+    lines += [
+        f"MuJoCo is {ratio:.2f} x as fast as PyBullet at {rate} Hz (calibrated)." for rate, ratio in engine_ratios(result["runs"]).items()
+    ]
     lines.append(f"calibrated: on the standard machine; processes exchange messages {result['speed']:.2f} x as fast.")
     return "\n".join(lines)

@@ -30,7 +30,7 @@ rate = 50
 joints = ["joint_0", "joint_1", "joint_2"]
 neighbours = 6
 """
-TICKS = 1500
+TICKS = 1000
 
 
 def test_a_urdf_learns_with_physics_and_the_same_seed_makes_the_same_run(tmp_path: Path) -> None:
@@ -46,7 +46,7 @@ def test_a_urdf_learns_with_physics_and_the_same_seed_makes_the_same_run(tmp_pat
         assert "the robot's file has no masses" in system.log("robot_sim")
     for summary in summaries:
         assert (summary["lockstep"]["ticks"], summary["lockstep"]["repeatable"]) == (TICKS, True)
-        assert summary["agents"]["all"]["transitions"] >= 3
+        assert summary["agents"]["all"]["transitions"] >= 2
         assert summary["pairs_watched"] > 0
         assert summary["deepest_solid_contact_m"] < 0.002
     assert summaries[0]["lockstep"]["states_sha256"] == summaries[1]["lockstep"]["states_sha256"]

@@ -61,6 +61,13 @@ def test_the_table_of_lockstep_fits_80_columns_and_marks_what_falls_short() -> N
     assert [line.split()[-1] for line in lines[-4:-1]] == [f"{lockstep.CASES[1].aim:g}", "SHORT", "VARIES"]
 
 
+def test_lockstep_compares_the_engines_at_each_rate() -> None:
+    cases = [("pybullet", 50, 8.0), ("mujoco", 50, 12.0), ("mujoco", 100, 6.0)]
+    runs = [lockstep.judged_run(lockstep.Case(name, rate), lockstep_summary(speed), speed=1.0) for name, rate, speed in cases]
+    assert lockstep.engine_ratios(runs) == {50: 1.5}
+    assert "MuJoCo is 1.50 x as fast as PyBullet at 50 Hz" in lockstep.report({"seconds": 20.0, "speed": 1.0, "runs": runs, "passed": True})
+
+
 def live_summary(p99: float) -> dict[str, Any]:
     return {
         "command_age_ticks": {"p50": 1.0, "p99": p99, "max": 12.0},
