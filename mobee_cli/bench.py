@@ -109,6 +109,10 @@ BENCHES = {
         quick="30 mm instead of 8 between poses",
         options={"--seeds": _number("maps of each method, of which the worst counts (default: 1)")},
     ),
+    "gym": Bench(
+        "the Gymnasium environments beside MuJoCo's: steps per second, alone and in a batch",
+        quick="two short rounds",
+    ),
     "edges": Bench(
         "checks of all edges of a map, and of those near a change of the world",
         quick="a map of 500 vertices, one round (default: 5000, 5 rounds)",

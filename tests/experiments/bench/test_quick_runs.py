@@ -10,13 +10,14 @@ from typing import Any
 
 import pytest
 
-from experiments.bench import edges, ik, model, nes, plant, trm, vi
+from experiments.bench import edges, gym, ik, model, nes, plant, trm, vi
 from experiments.claims.ch3_roadmaps import trm as trm_claim
 from mobee.roadmap.building.lattice_builder import Patience
 from mobee_cli.bench import BENCHES
 
 SMALLEST: dict[str, Any] = {
     "edges": edges.Settings(spacing=0.1, rounds=1),
+    "gym": gym.Settings(steps=10, rounds=1),
     "ik": ik.Settings(targets=1, whole=1, rivals=1),
     "model": model.Settings(boxes=(0,), rounds=1, poses=5, other_poses=5, compared_boxes=(0,), compared_poses=2),
     "nes": nes.Settings(dimensions=(4,), runs=1),
@@ -25,6 +26,7 @@ SMALLEST: dict[str, Any] = {
     "vi": vi.Settings(problems=4, rounds=1, observations=2, large=200, large_rounds=1),
 }
 PEERS = {
+    "gym": ("gymnasium", "mujoco", "imageio"),
     "ik": ("cma", "mink", "mujoco"),
     "model": ("mujoco", "pinocchio"),
     "nes": ("cma",),

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Gymnasium environments: steps per second, alone and 64 in a batch, beside MuJoCo environments of Gymnasium in the same rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.bench import verdicts
+from experiments.bench.calibration import Calibration
+from experiments.bench.peers import import_peer
+from experiments.bench.timing import cores_text, one_core, processor_time
+from experiments.bench.verdicts import Requirement
+from experiments.kit.command_line import Progress
+
+BATCH = 64
+REACH, REACH_BATCH, LATTICE, LATTICE_BATCH = "Reach, one", f"Reach, {BATCH} together", "Lattice, one", f"Lattice, {BATCH} together"
+REACHER, HUMANOID = "Reacher-v5 of Gymnasium", "Humanoid-v5 of Gymnasium"
+UNITS = {
+    REACH: "10 ticks",
+    REACH_BATCH: "10 ticks",
+    LATTICE: "an action",
+    LATTICE_BATCH: "an action",
+    REACHER: "2 ticks",
+    HUMANOID: "5 ticks",
+}
+
+REQUIREMENTS = (
+    Requirement("Reach-v0, one, steps/s", ("standard", REACH), at_least=2000.0),
+    Requirement(f"Reach-v0, {BATCH} in a batch, steps/s", ("standard", REACH_BATCH), at_least=14_000.0, aim=20_000.0),
+    Requirement("Lattice-v0, one, whole actions/s", ("standard", LATTICE), at_least=2000.0),
+    Requirement("Reach-v0 in a batch, times Humanoid-v5", ("times_humanoid",), at_least=2.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings: steps of each environment in a round, and rounds."""
+
+    steps: int = 500
+    rounds: int = 7  # the median counts
+
+
+QUICK = Settings(steps=100, rounds=2)
+
+
+class Player:
+    """Random actions in an environment, or in a vector of them, drawn in advance."""
+
+    def __init__(self, env: Any, steps: int) -> None:
+        self._env, self._count = env, getattr(env, "num_envs", 1)
+        env.reset(seed=0)
+        env.action_space.seed(0)
+        self._actions = [env.action_space.sample() for _ in range(max(1, steps // self._count))]
+
+    @property
+    def steps(self) -> int:
+        """Steps of all environments in one `run`."""
+        return len(self._actions) * self._count
+
+    def run(self) -> None:
+        """Do the steps; an episode that ends begins again."""
+        for action in self._actions:
+            _, _, over, cut, _ = self._env.step(action)
+            if self._count == 1 and (over or cut):
+                self._env.reset()
+
+
+def players(steps: int) -> dict[str, Player]:
+    """Return a player for each environment; raises NotInstalled without Gymnasium or its MuJoCo environments."""
+    gymnasium = import_peer("gymnasium", "Gymnasium")
+    for package, name in (("mujoco", "MuJoCo"), ("imageio", "imageio, which Gymnasium's MuJoCo environments import")):
+        import_peer(package, name)
+    import_peer("mobee.gymnasium", "Gymnasium")
+    made = {
+        REACH: gymnasium.make("MoBeE/Reach-v0"),
+        REACH_BATCH: gymnasium.make_vec("MoBeE/Reach-v0", num_envs=BATCH),
+        LATTICE: gymnasium.make("MoBeE/Lattice-v0"),
+        LATTICE_BATCH: gymnasium.make_vec("MoBeE/Lattice-v0", num_envs=BATCH),
+        REACHER: gymnasium.make("Reacher-v5"),
+        HUMANOID: gymnasium.make("Humanoid-v5"),
+    }
+    return {name: Player(env, steps * (4 if name == REACH_BATCH else 1)) for name, env in made.items()}
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """Measure, and return all numbers and the verdict; raises NotInstalled."""
+    playing, speeds = players(settings.steps), Calibration()
+    found: dict[str, list[float]] = {name: [] for name in playing}
+    standard: dict[str, list[float]] = {name: [] for name in playing}
+    with one_core() as core, Progress() as progress:
+        for number in range(settings.rounds):
+            for part, (name, player) in enumerate(playing.items()):
+                progress.show((number + part / len(playing)) / settings.rounds, name)
+                (_, seconds), speed = speeds.around(lambda player=player: processor_time(player.run))
+                found[name].append(player.steps / seconds)
+                standard[name].append(player.steps / seconds / speed)
+    result: dict[str, Any] = {"core": core, "rounds": settings.rounds, "speed": speeds.median}
+    result["steps_per_second"] = {name: float(np.median(rates)) for name, rates in found.items()}
+    result["standard"] = {name: float(np.median(rates)) for name, rates in standard.items()}
+    for key, peer in (("times_humanoid", HUMANOID), ("times_reacher", REACHER)):
+        result[key] = float(np.median(np.array(found[REACH_BATCH]) / found[peer]))
+    return result | verdict(result)
+
+
+def verdict(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return whether the environments are as fast as required."""
+    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
+
+
+def report(result: dict[str, Any]) -> str:
+    """Format the measurements."""
+    lines = [
+        f"Random actions; processor time {cores_text(result['core'])},",
+        f"rounds: {result['rounds']} (the median counts).",
+        f"{'':<28}{'a step':>10}{'steps/s':>10}{'in standard time':>18}",
+    ]
+    for name, rate in result["steps_per_second"].items():
+        lines.append(f"{name:<28}{UNITS[name]:>10}{rate:>10.0f}{result['standard'][name]:>18.0f}")
+    lines.append(f"A batch of Reach-v0 beside Reacher-v5, two motors without contacts: {result['times_reacher']:.2f}")
+    return verdicts.report_text(lines, result)
