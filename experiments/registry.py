@@ -49,6 +49,7 @@ EXPERIMENTS = {
     "simultaneous-learning": "experiments.claims.ch8_reaching.simultaneous_learning",
     "step-response": "experiments.claims.ch5_control.step_response",
     "table-discovery": "experiments.claims.ch7_learning.table_discovery",
+    "tabular-exploration": "experiments.claims.ch7_learning.tabular_exploration",
     "trm": "experiments.claims.ch3_roadmaps.trm",
     "unreachable-states": "experiments.claims.ch7_learning.unreachable_states",
     "urdf-files": "experiments.claims.robot_files.urdf_files",

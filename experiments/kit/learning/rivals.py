@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Explorers of the literature on the agent of this library, and worlds of tables with rewards that are not known in advance.
+
+Each explorer plans with the agent's counts alone: of an action that was never tried it knows nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mobee import value_iteration
+from mobee.arrays import Array, Ints
+from mobee.learning.discrete import DiscreteSpace
+from mobee.learning.explorers import Explorable, SampledBeliefs
+from mobee.learning.tabular import TabularPlant, TabularWorld
+from mobee.plant import Outcome
+
+PRIOR = 1e-6  # count of "the state stays", believed of an action that was never tried, and nearly nothing after a try
+PLAN_TOLERANCE = 1e-3  # of plans in sampled models
+
+
+class RewardedPlant(TabularPlant):
+    """A world of tables whose rewards the agent finds out: each depends on state and action."""
+
+    def __init__(self, world: TabularWorld, seed: int) -> None:
+        states, actions = world.outcomes.shape[:2]
+        super().__init__(DiscreteSpace(states, actions), world.outcomes, world.probabilities, seed)
+        self.truth: Array = world.mean_reward
+        self.known: Array = np.zeros((states, actions))
+        """The reward of each state and action that was tried, 0 of the others, shape (S, A)."""
+        self.earned: list[float] = []
+        """The reward of each action so far."""
+        self.largest = float(self.truth.max())
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """Do an action, and note its reward."""
+        at = self.state, int(target[1])
+        outcome = super().act(part, target)
+        self.known[at] = self.truth[at]
+        self.earned.append(float(self.truth[at]))
+        return outcome
+
+
+def learned(agent: Explorable) -> Any:
+    """Return beliefs from the counts alone: an action that was never tried stays where it is."""
+    return agent.model.debiased(goal=PRIOR, stay=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Curious:
+    """The published curiosity with an external reward: the information gain plus `weight` times the rewards that were found."""
+
+    plant: RewardedPlant
+    weight: float
+
+    def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
+        """Score the actions of a state."""
+        return agent.plan(agent.model.reward + self.weight * self.plant.known)[1][state]
+
+
+@dataclass(frozen=True, eq=False)
+class CountBonus:
+    """MBIE-EB (Strehl and Littman 2008): rewards plus `bonus` / sqrt(tries); untried actions have the largest value that there is."""
+
+    plant: RewardedPlant
+    bonus: float
+
+    def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
+        """Score the actions of a state."""
+        tries = agent.model.tries
+        bonus = self.bonus / np.sqrt(np.maximum(tries, 1))
+        reward = np.where(tries > 0, self.plant.known + bonus, self.plant.largest + self.bonus)
+        return agent.plan(reward, learned(agent), key="count bonus")[1][state]
+
+
+@dataclass(frozen=True, eq=False)
+class RMax:
+    """R-MAX (Brafman and Tennenholtz 2002): an action tried less than `known` times is believed to have the largest value that there is."""
+
+    plant: RewardedPlant
+    known: int
+
+    def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
+        """Score the actions of a state."""
+        known = agent.model.tries >= self.known
+        beliefs = learned(agent)
+        probabilities = np.where(known[..., None], beliefs.probabilities, 0.0)
+        probabilities[..., 0] += ~known  # the first bin: the state stays
+        reward = np.where(known, self.plant.known, self.plant.largest)
+        return agent.plan(reward, SampledBeliefs(beliefs.outcomes, probabilities), key="rmax")[1][state]
+
+
+class PosteriorSampling:
+    """PSRL (Osband, Russo and Van Roy 2013): plans with a world drawn from the posterior, a new one after every `episode` steps.
+
+    Outcomes: Dirichlet with the count 1 / S of every state.  Rewards: normal with variance 1, known after the first try.
+    """
+
+    def __init__(self, plant: RewardedPlant, episode: int) -> None:
+        self.plant, self.episode = plant, episode
+        self._values = np.zeros(0)
+
+    def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
+        """Score the actions of a state."""
+        if agent.transitions % self.episode == 0:
+            tries, counts = agent.model.tries, all_counts(agent)
+            drawn = rng.standard_gamma(counts + 1.0 / counts.shape[2])
+            drawn /= drawn.sum(axis=2, keepdims=True)
+            reward = np.where(tries > 0, self.plant.known, rng.standard_normal(tries.shape))
+            outcomes: Ints = np.broadcast_to(np.arange(counts.shape[2]), counts.shape).copy()
+            world = SampledBeliefs(outcomes, drawn)
+            self._values = value_iteration(world, reward, agent.discount, PLAN_TOLERANCE, relative=True, method="modified")[1]
+        return self._values[state]
+
+
+@dataclass(frozen=True, eq=False)
+class EpsilonGreedy:
+    """Takes the action that is best by what was found so far, and a random one with probability `share`."""
+
+    plant: RewardedPlant
+    share: float
+
+    def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
+        """Score the actions of a state."""
+        if rng.random() < self.share:
+            return np.zeros(self.plant.known.shape[1])
+        return agent.plan(self.plant.known, learned(agent), key="greedy")[1][state]
+
+
+def all_counts(agent: Explorable) -> Array:
+    """Return how often each action led to each state, shape (S, A, S)."""
+    model = agent.model
+    real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
+    states, actions, _ = real.shape
+    counts = np.zeros((states, actions, states))
+    s, a, _ = np.indices(real.shape)
+    np.add.at(counts, (s, a, model.outcomes), real)
+    return counts
+
+
+def rooms(width: int = 11, slip: float = 0.1) -> TabularWorld:
+    """Return four rooms with a door in each wall, and four directions; a step slips to either side with the probability `slip` each.
+
+    The reward 1 is in the corner opposite to the start, from where every action leads to the start.
+    """
+    middle, doors = width // 2, (width // 4, width - 1 - width // 4)
+    wall = np.zeros((width, width), dtype=bool)
+    wall[middle], wall[:, middle] = True, True
+    wall[middle, list(doors)] = wall[list(doors), middle] = False
+    cells = np.argwhere(~wall)
+    number = np.full((width, width), -1)
+    number[~wall] = np.arange(len(cells))
+    step = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+    there = np.clip(cells[:, None] + step, 0, width - 1)
+    reached = number[there[..., 0], there[..., 1]]
+    reached = np.where(reached < 0, np.arange(len(cells))[:, None], reached)
+    outcomes = np.stack([reached, np.roll(reached, -1, axis=1), np.roll(reached, 1, axis=1)], axis=-1)
+    probabilities = np.broadcast_to([1.0 - 2.0 * slip, slip, slip], outcomes.shape).copy()
+    outcomes[-1], rewards = 0, np.zeros(outcomes.shape)
+    rewards[-1] = 1.0
+    return TabularWorld(outcomes, probabilities, rewards)
+
+
+def random_world(seed: int, states: int = 50, actions: int = 4, branches: int = 5) -> TabularWorld:
+    """Return a world in which each action leads to `branches` random states with random probabilities (Archibald et al. 1995).
+
+    One state in ten has rewards, uniform in 0 to 1.
+    """
+    rng = np.random.default_rng(seed)
+    outcomes = np.array([[rng.choice(states, branches, replace=False) for _ in range(actions)] for _ in range(states)])
+    probabilities = rng.dirichlet(np.ones(branches), size=(states, actions))
+    rewards = np.where(rng.random(states) < 0.1, rng.random(states), 0.0)
+    rewards[0], rewards[-1] = 0.0, 1.0
+    return TabularWorld(outcomes, probabilities, np.broadcast_to(rewards[:, None, None], outcomes.shape).copy())
