@@ -16,7 +16,7 @@ from bus_schema.rpc import CALLS, Reply, Request
 from bus_schema.stream import DELIVERIES
 
 PAGE = Path(__file__).parents[1] / "docs" / "bus.md"
-_BASES: tuple[type[Struct], ...] = (Message, Request, Reply)
+BASES: tuple[type[Struct], ...] = (Message, Request, Reply)
 _MARKED = re.compile(r"(<!-- begin (\w+)[^\n]*-->\n).*?(<!-- end \2 -->)", re.DOTALL)
 _FIELD = re.compile(r"    (\w+): (.+?)(?: = (.+?))?(?:  # (.*))?$")
 _BOUNDED = re.compile(r"Annotated\[(.+), Meta\((.+)\)\]$")
@@ -36,7 +36,7 @@ def with_tables(page: str) -> str:
 
 def structs(module: object) -> list[type[Struct]]:
     """Return the messages, or requests and replies, of a module, and the structs inside them, in the order of the source."""
-    found = [cls for _, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Struct) and cls not in _BASES]
+    found = [cls for _, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Struct) and cls not in BASES]
     own = [cls for cls in found if inspect.getmodule(cls) is module]
     return sorted(own, key=lambda cls: inspect.getsourcelines(cls)[1])
 

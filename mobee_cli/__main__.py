@@ -20,7 +20,7 @@ VERBS = {
     "status": "print the state of the running system",
     "stop": "end the running system",
     "estop": "stop the robot at once; --reset releases it",
-    "topic": "show what is published on the bus: list, echo, hz",
+    "topic": "show what is published on the bus: list, echo, hz, schema",
     "router": "run only the router, for services that are started one by one",
     "robots": "list the robots and worlds that come with mobee",
     "convert": "convert a robot from zero-position XML to URDF, or back",

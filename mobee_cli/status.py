@@ -52,7 +52,7 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
     """Return the state of every service that is present or that the launcher supervises."""
     launcher = answers.get("launcher")
     restarts = {
-        name.removeprefix(_RESTARTS): int(count)
+        name.removeprefix(_RESTARTS): int(count or 0)
         for name, count in (launcher.numbers if launcher else {}).items()
         if name.startswith(_RESTARTS)
     }

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee topic`: shows the messages on the bus: list, echo, hz."""
+"""`mobee topic`: shows the messages on the bus (list, echo, hz) and their types (schema)."""
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
 import statistics
 import sys
@@ -26,12 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(_ACTIONS))
     for name, (text, add, _) in _ACTIONS.items():
         action = actions.add_parser(name, description=text, help=text)
-        add_endpoint(action)
+        if name != "schema":  # of the contract, which is the same with and without a running system
+            add_endpoint(action)
         add(action)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Connect and run the action."""
+    """Run the action, connected to the running system if it needs one."""
+    if arguments.action == "schema":
+        return _schema(None, arguments)
     with connected(arguments.endpoint) as session:
         try:
             return _ACTIONS[arguments.action][2](session, arguments)
@@ -158,9 +162,32 @@ def _as_text(figures: dict[str, float | int | None]) -> str:
     return f"{rate:8.1f} Hz   period {mean * 1e3:8.2f} ms   jitter {jitter * 1e3:6.2f}   {low * 1e3:.2f} .. {high * 1e3:.2f} ms"
 
 
+def _add_schema(parser: argparse.ArgumentParser) -> None:
+    text = "key, for example left_arm/state or model/rpc/world/add, or the name of a type (default: list all keys)"
+    parser.add_argument("key", nargs="?", help=text)
+    parser.add_argument("--json", action="store_true", help="changes nothing for a key: schemas are JSON; without a key, print a list")
+
+
+def _schema(session: None, arguments: argparse.Namespace) -> int:
+    """Print the JSON schemas of a key, or all keys."""
+    from bus_schema.schemas import keys, schemas_of
+
+    if arguments.key is None:
+        print(json.dumps(keys(), indent=2) if arguments.json else "\n".join(keys()))
+        return OK
+    found = schemas_of(arguments.key)
+    if not found:
+        near = difflib.get_close_matches(arguments.key, keys(), n=1, cutoff=0.5)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        raise UserError(f"no message of the bus has the key {arguments.key!r}.{hint} `mobee topic schema` lists all keys", BAD_INPUT)
+    print(json.dumps(found, indent=2))
+    return OK
+
+
 _Run = Callable[[Any, argparse.Namespace], int]
 _ACTIONS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None], _Run]] = {
     "list": ("list all keys with type, rate and size", _add_list, _list),
     "echo": ("print every message on a key, one line of JSON each", _add_echo, _echo),
     "hz": ("measure rate, period and jitter of the messages on a key", _add_hz, _hz),
+    "schema": ("print the JSON schemas of the messages on a key", _add_schema, _schema),
 }

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import signal
 import subprocess
 import sys
@@ -28,7 +29,7 @@ def test_an_unknown_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -
 
 
 ACTIONS = {
-    "topic": ("list", "echo", "hz"),
+    "topic": ("list", "echo", "hz", "schema"),
     "roadmap": tuple(roadmap.ACTIONS),
     "experiment": ("list", "run", "figure", "claims"),
     "bench": tuple(bench.BENCHES),
@@ -129,3 +130,12 @@ def test_robots_lists_what_is_shipped() -> None:
     assert done.returncode == 0
     assert "icub         41 motors: torso 3, head 6, left_arm 16, right_arm 16" in done.stdout
     assert "table" in done.stdout
+
+
+def test_the_schema_of_a_key_needs_no_running_system(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topic", "schema", "left_arm/state"]) == 0
+    assert json.loads(capsys.readouterr().out)["message"]["$ref"] == "#/$defs/State"
+    assert main(["topic", "schema"]) == 0
+    assert "{part}/rpc/drive/take" in capsys.readouterr().out.splitlines()
+    assert main(["topic", "schema", "{part}/stat"]) == 2
+    assert "no message of the bus has the key '{part}/stat'. Did you mean '{part}/state'?" in capsys.readouterr().err
