@@ -32,6 +32,7 @@ VERBS = {
     "bench": "measure the speed of mobee on this machine, beside other programs",
     "check": "report what is wrong with a robot or world file",
     "view": "show a robot file in motion",
+    "conform": "test a robot_sim of your own against the contract of the bus",
 }
 
 EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "mujoco": "sim", "icub_models": "sim"}

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rules that every robot_sim must keep, each as a check (docs/hardware.md). A check raises Broken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from bus_schema import keys
+from bus_schema.messages import EStop, Mode, State
+from bus_schema.rpc import Config, Done, Empty, PartMeta, Pulse
+from mobee.arrays import Array
+from mobee_cli.conform.player import ANSWER, TTL, Broken, Player
+from services.common.rpc import CallFailed
+from services.common.worlds import robot_hash
+
+OBSERVED = 1.5  # s for which the streams are recorded
+MISSING = 0.1  # share of the ticks that may not arrive
+SLOWEST, FASTEST = 0.5, 1.1  # of the rate that dt claims: a busy machine is slow, nothing is fast
+OUTSIDE = math.radians(5.0)  # rad beyond its limits at which a position cannot be right
+SPEED = 0.1  # rad/s, at which a motor is moved
+MOTION = 0.4  # s for which it is moved
+LEAST = 0.25  # share of the commanded motion that must be seen: servos lag
+STILL = math.radians(1.0)  # rad by which a part that must not move may seem to, by noise
+JUMP = 0.1  # rad, of a position command that must be refused
+ATTEMPTS = 5  # to bring a valid command into force
+NONE = -1  # cmd_seq without a command in force
+STOP_TIME = 0.5  # s within which a stop is obeyed
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A rule: its name, what it requires, and the function that tests it on a part."""
+
+    name: str
+    rule: str
+    test: Callable[[Player, str], None]
+    moves: bool = False  # whether it arms the part
+
+
+def service(player: Player, part: str) -> None:
+    """Test the calls that every service answers."""
+    if not player.service.alive.get("robot_sim"):
+        raise Broken("there is no liveliness token alive/robot_sim/INSTANCE: declare it after all subscriptions and calls")
+    if len(player.service.alive["robot_sim"]) > 1:
+        raise Broken(f"{len(player.service.alive['robot_sim'])} processes have the token of robot_sim: end all but one")
+    stat = player.stat()
+    if stat.who != "robot_sim" or not stat.ready:
+        raise Broken(f"stat says who {stat.who!r}, ready {stat.ready}: expected 'robot_sim', True")
+    player.call(keys.service_rpc("robot_sim", "config"), Empty, Config)
+    player.call(keys.service_rpc("robot_sim", "pulse"), Empty, Pulse)
+
+
+def parts(player: Player, part: str) -> None:
+    """Compare parts, motors and limits with the robot file."""
+    robot = player.robot
+    if set(player.tick.parts) != set(robot.parts):
+        raise Broken(f"a tick has the parts {', '.join(player.tick.parts)}; the robot file has {', '.join(robot.parts)}")
+    for name, own in robot.parts.items():
+        meta = player.call(keys.meta(name), Empty, PartMeta)
+        if tuple(meta.motors) != own.motors:
+            raise Broken(f"{name}/meta has the motors {', '.join(meta.motors)}; in the robot file their order is {', '.join(own.motors)}")
+        if meta.robot_hash != robot_hash(robot):
+            raise Broken(f"{name}/meta has robot_hash {meta.robot_hash}, the robot file {robot_hash(robot)}: give both the same --robot")
+
+
+def streams(player: Player, part: str) -> None:
+    """Test that all streams arrive and are valid."""
+    player.until(lambda: bool(player.ticks and player.clocks and all(player.states.values())), ANSWER)
+    if player.refused:
+        raise Broken(f"{len(player.refused)} messages are not valid, such as {player.refused[-1]}")
+    silent = [State.stream.key(name) for name, states in player.states.items() if not states]
+    silent += [] if player.clocks else ["clock"]
+    if not player.tick or silent:
+        raise Broken(f"nothing arrives on {', '.join(silent)}")
+
+
+def ticks(player: Player, part: str) -> None:
+    """Test numbers, times and rate of the ticks."""
+    first = len(player.ticks)
+    player.wait(OBSERVED)
+    seen = player.ticks[first:]
+    if len(seen) < 2:
+        raise Broken(f"{len(seen)} ticks in {OBSERVED:g} s")
+    for (_, before), (_, after) in zip(seen, seen[1:], strict=False):
+        if after.run != before.run:
+            raise Broken(f"the run changes from {before.run} to {after.run} without a reset")
+        if after.k <= before.k or after.seq <= before.seq:
+            raise Broken(f"tick {after.k} (seq {after.seq}) comes after tick {before.k} (seq {before.seq}): both must increase")
+        if after.t - before.t != (after.k - before.k) * after.dt:
+            raise Broken(f"t advances by {after.t - before.t} ns in {after.k - before.k} ticks of dt = {after.dt} ns")
+    (begin, old), (end, new) = seen[0], seen[-1]
+    missing = new.k - old.k + 1 - len(seen)
+    if missing > MISSING * len(seen):
+        raise Broken(f"{missing} of {new.k - old.k + 1} ticks are not published: publish every one")
+    actual, claimed = (new.k - old.k) / (end - begin), new.rate * 1e9 / new.dt
+    if not SLOWEST * claimed < actual < FASTEST * claimed:
+        raise Broken(f"{actual:.1f} ticks come a second, and dt and rate say {claimed:.1f}")
+
+
+def positions(player: Player, part: str) -> None:
+    """Test that all positions are within the limits of the robot file."""
+    low, high = player.robot.limits.T
+    q = np.array(player.tick.q)
+    beyond = np.maximum(q - high, low - q)
+    worst = int(beyond.argmax())
+    if beyond[worst] > OUTSIDE:
+        unit = " Are they degrees? The bus has rad." if abs(q[worst]) > math.pi else ""
+        raise Broken(f"{player.robot.motors[worst]} is at {q[worst]:.3f}, its limits are {low[worst]:.3f} to {high[worst]:.3f} rad.{unit}")
+
+
+def ownership(player: Player, part: str) -> None:
+    """Test take, arm and release, and who may call them."""
+    first = player.take(part)
+    if player.take(part) <= first:
+        raise Broken(f"take returns epoch {player.epochs[part]} after {first}: each epoch must be larger than all before")
+    if _accepted(lambda: player.drive(part, "arm", first)):
+        raise Broken(f"arm with the epoch {first} is accepted, although {player.epochs[part]} is in force")
+    if _accepted(lambda: player.take(part, instance="i0_another")):
+        raise Broken("another process can take a part whose owner's token exists: refuse it with the code 'owned'")
+    with player.armed(part):
+        if not player.until(lambda: player.status(part).gate == "armed", ANSWER):
+            raise Broken(f"after arm the ticks have gate {player.status(part).gate!r}, expected 'armed'")
+    if not player.until(lambda: player.status(part).gate == "idle", ANSWER):
+        raise Broken(f"after release the ticks have gate {player.status(part).gate!r}, expected 'idle'")
+
+
+def hold(player: Player, part: str) -> None:
+    """Test that a part that is not armed ignores commands."""
+    player.take(part)
+    start = player.q(part)
+    player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
+    _require_still(player, part, start, "a part in hold moves on command: obey in state 'armed' only")
+    if player.status(part).gate == "armed":
+        raise Broken("take arms the part: it must be in 'hold' until arm is called")
+    player.drive(part, "release")
+
+
+def obeys(player: Player, part: str) -> None:
+    """Test that an armed part follows commands of velocity and of position."""
+    with player.armed(part):
+        start, speed = player.q(part), _speed(player, part)
+        player.keep(part, "velocity", lambda: speed, MOTION)
+        _require_moved(player.q(part) - start, speed * MOTION, "velocity")
+        status = player.status(part)
+        if status.cmd_seq < 0 or status.mode != "velocity" or not 0 < status.cmd_age < 1e3:
+            raise Broken(
+                f"the ticks have mode {status.mode!r}, cmd_seq {status.cmd_seq}, cmd_age {status.cmd_age} of the command in force: "
+                "expected 'velocity', its seq, and the ticks since its re_k"
+            )
+        player.drive(part, "hold")
+        player.wait(MOTION)
+        player.drive(part, "arm")
+        start, done = player.q(part), player.tick
+        player.keep(part, "position", lambda: start - speed * (player.tick.t - done.t) * 1e-9, MOTION)
+        _require_moved(player.q(part) - start, -speed * MOTION, "position")
+
+
+def refuses(player: Player, part: str) -> None:
+    """Test that invalid and stale commands change nothing."""
+    n = len(player.robot.part(part))
+    still, nan = np.zeros(n), np.full(n, math.nan)
+    limits = player.robot.limits[player.robot.part(part).slice]
+    fast = np.array([player.robot.motor_table[k].max_velocity for k in range(*player.robot.part(part).slice.indices(10**6))])
+    with player.armed(part):
+        bad: dict[str, tuple[Mode, Callable[[], Array], dict[str, Callable[[], object]]]] = {
+            "of an older epoch": ("velocity", lambda: still, {"epoch": lambda: player.epochs[part] - 1}),
+            "of another run": ("velocity", lambda: still, {"run": lambda: "run_of_yesterday"}),
+            "that answers a tick half a second ago": ("velocity", lambda: still, {"re_k": lambda: _ticks_ago(player, 0.5)}),
+            "that answers a tick of the future": ("velocity", lambda: still, {"re_k": lambda: player.tick.k + 1000}),
+            "without an end (ttl 0)": ("velocity", lambda: still, {"ttl": lambda: 0}),
+            "of NaN": ("velocity", lambda: nan, {}),
+            "of 1.2 times the highest velocity": ("velocity", lambda: 1.2 * fast * (np.arange(n) == 0), {}),
+            "that jumps by 0.1 rad": ("position", lambda: player.q(part) + JUMP * _toward_middle(player, part), {}),
+            "beyond a limit": ("position", lambda: np.where(np.arange(n) == 0, limits[:, 1] + JUMP, player.q(part)), {}),
+        }
+        for what, (mode, ref, changed) in bad.items():
+            fields = {name: value() for name, value in changed.items()}
+            _require_ignored(player, part, what, partial(_send, player, part, mode, ref, fields))
+        older = player.send(part, "velocity", still)
+        player.send(part, "velocity", still)
+        _require_ignored(player, part, "with a seq that was used before", lambda: player.send(part, "velocity", still, seq=older))
+
+
+def watchdog(player: Player, part: str) -> None:
+    """Test that a part holds when its commands stop, and must be armed again."""
+    with player.armed(part):
+        player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
+        if not player.until(lambda: player.status(part).gate == "hold", 1e-3 * TTL + STOP_TIME):
+            gate = player.status(part).gate
+            raise Broken(f"{STOP_TIME:g} s after the ttl ({TTL} ms) of the last command the gate is {gate!r}, not 'hold'")
+        player.wait(STOP_TIME)
+        start = player.q(part)
+        player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
+        _require_still(player, part, start, "after the watchdog's hold the part moves without having been armed again")
+
+
+def owner_gone(player: Player, part: str) -> None:
+    """Test that a part holds when the liveliness token of its owner disappears."""
+    _hold_without(player, part, "controller", owner=True)
+
+
+def model_gone(player: Player, part: str) -> None:
+    """Test that all parts hold when the model disappears."""
+    _hold_without(player, part, "model", owner=False)
+
+
+def emergency_stop(player: Player, part: str) -> None:
+    """Test that an emergency stop stops all parts, stays, and is reset by a call only."""
+    with player.armed(part):
+        player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
+        player.service.bus.publisher(EStop).put(set=True, source="conform", reason="test of the emergency stop")
+        try:
+            if not player.until(lambda: all(status.gate == "estop" for status in player.tick.parts.values()), STOP_TIME):
+                moving = [name for name, status in player.tick.parts.items() if status.gate != "estop"]
+                raise Broken(f"{STOP_TIME:g} s after an emergency stop {', '.join(moving)} are not in gate 'estop'")
+            if not player.until(lambda: any(stop.src == "robot_sim" and stop.set for stop in player.stops), ANSWER):
+                raise Broken("robot_sim does not repeat the stop on 'estop' while it is latched, for services that join late")
+            player.take(part)
+            if _accepted(lambda: player.drive(part, "arm")):
+                raise Broken("a part can be armed during an emergency stop")
+        finally:
+            player.call(keys.ESTOP_RESET, Empty, Done)
+        if not player.until(lambda: player.status(part).gate in ("hold", "idle"), ANSWER):
+            raise Broken(f"after {keys.ESTOP_RESET} the gate is {player.status(part).gate!r}, expected 'hold'")
+
+
+CHECKS = (
+    Check("service", "robot_sim is alive and answers stat, config and pulse", service),
+    Check("streams", "tick, clock and the state of each part are valid messages", streams),
+    Check("ticks", "ticks are numbered, dated and published at their rate", ticks),
+    Check("parts", "parts, motors and limits are those of the robot file", parts),
+    Check("positions", "positions are within the limits, in rad", positions),
+    Check("ownership", "a part is taken, armed and released by its owner alone", ownership, moves=True),
+    Check("hold", "a part that is not armed ignores commands", hold, moves=True),
+    Check("obeys", "an armed part follows velocities and positions", obeys, moves=True),
+    Check("refuses", "stale and invalid commands change nothing", refuses, moves=True),
+    Check("watchdog", "without commands a part holds, and must be armed again", watchdog, moves=True),
+    Check("owner-gone", "a part holds when its owner's token disappears", owner_gone, moves=True),
+    Check("model-gone", "all parts hold when the model's token disappears", model_gone, moves=True),
+    Check("emergency-stop", "an emergency stop stops all parts until its reset", emergency_stop, moves=True),
+)
+
+
+def _accepted(call: Callable[[], object]) -> bool:
+    """Return whether a call that must be refused is answered; raises CallFailed if nobody answers."""
+    try:
+        call()
+    except CallFailed as failed:
+        if failed.code in ("no_answer", "bad_answer"):
+            raise
+        return False
+    return True
+
+
+def _toward_middle(player: Player, part: str) -> Array:
+    """Return the first motor's direction to the middle of its range, and 0 for the others, (n,)."""
+    middle = player.robot.limits[player.robot.part(part).slice].mean(axis=1)
+    direction: Array = np.where(np.arange(len(middle)) == 0, np.where(player.q(part) < middle, 1.0, -1.0), 0.0)
+    return direction
+
+
+def _speed(player: Player, part: str) -> Array:
+    return SPEED * _toward_middle(player, part)
+
+
+def _ticks_ago(player: Player, seconds: float) -> int:
+    return max(player.tick.k - math.ceil(seconds * 1e9 / player.tick.dt), 0)
+
+
+def _require_still(player: Player, part: str, start: Array, what: str) -> None:
+    moved = float(np.abs(player.q(part) - start).max())
+    if moved > STILL:
+        raise Broken(f"{what} (it moved by {math.degrees(moved):.1f} deg)")
+
+
+def _require_moved(moved: Array, wanted: Array, mode: str) -> None:
+    if moved[0] * np.sign(wanted[0]) < LEAST * abs(wanted[0]):
+        raise Broken(
+            f"by {mode} commands the first motor was to move by {math.degrees(wanted[0]):.2f} deg, and it moved by "
+            f"{math.degrees(moved[0]):.2f} deg"
+        )
+
+
+def _send(player: Player, part: str, mode: Mode, ref: Callable[[], Array], fields: dict[str, object]) -> int:
+    return player.send(part, mode, ref(), **fields)
+
+
+def _in_force(player: Player, part: str) -> int:
+    """Bring a valid command into force, and return its seq; on a busy machine some come too late."""
+    for _ in range(ATTEMPTS):
+        valid = player.send(part, "velocity", np.zeros(len(player.robot.part(part))))
+        if player.until(lambda sent=valid: player.status(part).cmd_seq == sent, 1e-3 * TTL):
+            return valid
+    raise Broken(f"no valid command comes into force: the ticks have gate {player.status(part).gate!r}, and never its cmd_seq")
+
+
+def _require_ignored(player: Player, part: str, what: str, send: Callable[[], int]) -> None:
+    """Send an invalid command while a valid one is in force; raises Broken if it comes into force."""
+    valid = _in_force(player, part)
+    first = len(player.ticks)
+    send()
+    player.until(lambda: len(player.ticks) >= first + 5, 0.5e-3 * TTL)
+    if any(tick.parts[part].cmd_seq not in (valid, NONE) for _, tick in player.ticks[first:]):
+        raise Broken(f"a command {what} is obeyed")
+
+
+def _hold_without(player: Player, part: str, who: str, owner: bool) -> None:
+    """Require that an armed part holds when the token of a service disappears; the other commands go on."""
+    session, instance = player.service.bus.session, f"i0_conform_{who}"
+    token = session.liveliness().declare_token(keys.alive(who, instance))
+    try:
+        player.wait(0.1)
+        player.drive(part, "release", player.take(part))
+        player.take(part, instance=instance if owner else "")
+        player.drive(part, "arm")
+        player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
+        gate = player.status(part).gate
+    finally:
+        token.undeclare()
+    if gate != "armed":
+        raise Broken(f"under valid commands the gate is {gate!r}, expected 'armed'")
+    player.keep(part, "velocity", lambda: _speed(player, part), STOP_TIME)
+    gate = player.status(part).gate
+    player.take(part)
+    player.drive(part, "release")
+    if gate == "armed":
+        raise Broken(f"{STOP_TIME:g} s after the token alive/{who}/... is gone the part is still armed")

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plays the controller for a robot_sim under test: records what it streams, and sends commands, also ones that it must refuse."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numpy as np
+
+from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
+from bus_schema.messages import Clock, Commands, EStop, Message, Mode, Order, PartStatus, State, Tick
+from bus_schema.rpc import Driven, Reply, Request, Stat, Take, Taken, WithEpoch
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from services.common.observe import Heard, listen
+from services.common.service import Service
+
+ANSWER = 1.0  # s within which a call is answered and a stop is obeyed
+TTL = 200  # ms, of a command
+
+_M = TypeVar("_M", bound=Message)
+_R = TypeVar("_R", bound=Reply)
+
+
+class Broken(Exception):
+    """A rule of the contract that the robot does not keep; the message says what was seen, and what is expected."""
+
+
+class Player:
+    """The session, what was heard, and the drive epochs that are held."""
+
+    def __init__(self, service: Service, robot: Robot) -> None:
+        self.service, self.robot = service, robot
+        self.ticks: list[tuple[float, Tick]] = []  # with the monotonic time of arrival, s
+        self.clocks: list[Clock] = []
+        self.states: dict[str, list[State]] = {part: [] for part in robot.parts}
+        self.stops: list[EStop] = []
+        self.refused: list[str] = []  # streams that the contract does not allow
+        self.epochs = dict.fromkeys(robot.parts, 0)
+        self._seq = 0
+        self._hear(Tick, lambda heard, tick: self.ticks.append((heard.at, tick)))
+        self._hear(Clock, lambda heard, clock: self.clocks.append(clock))
+        self._hear(EStop, lambda heard, stop: self.stops.append(stop))
+        for part in robot.parts:
+            self._hear(State, lambda heard, state, part=part: self.states[part].append(state), part)
+
+    def _hear(self, cls: type[_M], note: Callable[[Heard, _M], object], part: str = "") -> None:
+        size = len(self.robot.part(part)) if part else None
+
+        def read(heard: Heard) -> None:
+            try:
+                message = decode(cls, heard.payload, heard.encoding, part=size, robot=len(self.robot.motors))
+            except Refused as refused:
+                self.refused.append(f"{heard.key}: {refused}")
+            else:
+                note(heard, message)
+
+        listen(self.service.bus.session, cls.stream.keys(part) if part else cls.stream.key(), read)
+
+    # Time
+
+    def wait(self, seconds: float) -> None:
+        """Let the time pass."""
+        self.service.spin(time.monotonic() + seconds)
+
+    def until(self, condition: Callable[[], bool], seconds: float) -> bool:
+        """Wait until the condition is true; returns False if it is not within that time."""
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                return False
+            self.wait(0.005)
+        return True
+
+    @property
+    def tick(self) -> Tick:
+        """The newest tick."""
+        if not self.ticks:
+            raise Broken(f"nothing valid arrives on {Tick.stream.key()!r}{self._why()}")
+        return self.ticks[-1][1]
+
+    def _why(self) -> str:
+        return f": {self.refused[-1]}" if self.refused else ": publish a Tick in every tick"
+
+    def status(self, part: str) -> PartStatus:
+        """The status of a part in the newest tick."""
+        return self.tick.parts[part]
+
+    def q(self, part: str) -> Array:
+        """The positions of a part in the newest tick, rad."""
+        return np.array(self.tick.q)[self.robot.part(part).slice]
+
+    # Calls
+
+    def call(self, key: str, request: type[Request], reply: type[_R], **fields: object) -> _R:
+        """Call the robot; raises rpc.CallFailed."""
+        return self.service.call(key, request, reply, timeout=ANSWER, **fields)
+
+    def stat(self) -> Stat:
+        """The status of robot_sim."""
+        from bus_schema.rpc import Empty
+
+        return self.call(keys.service_rpc("robot_sim", "stat"), Empty, Stat)
+
+    def take(self, part: str, who: str = "controller", instance: str = "") -> int:
+        """Take a part's drive; returns the epoch."""
+        taken = self.call(keys.drive(part, "take"), Take, Taken, instance=instance or self.service.instance)
+        self.epochs[part] = taken.epoch
+        return taken.epoch
+
+    def drive(self, part: str, verb: str, epoch: int | None = None) -> str:
+        """Arm, release or hold a part, with its epoch or another; returns the state of the gate."""
+        epoch = self.epochs[part] if epoch is None else epoch
+        return self.call(keys.drive(part, verb), WithEpoch, Driven, epoch=epoch).gate
+
+    @contextmanager
+    def armed(self, part: str) -> Iterator[None]:
+        """Take and arm a part; release it at the end, in whatever state it is."""
+        self.take(part)
+        gate = self.drive(part, "arm")
+        if gate != "armed":
+            raise Broken(f"arm of {part} answers gate {gate!r}, expected 'armed'")
+        try:
+            yield
+        finally:
+            self.take(part)
+            self.drive(part, "release")
+
+    # Commands
+
+    def send(self, part: str, mode: Mode, ref: Array, **changed: Any) -> int:
+        """Send one command to a part on `commands`; `changed`: fields that differ from those of a valid one; returns its seq."""
+        whole = np.zeros(len(self.robot.motors))
+        whole[self.robot.part(part).slice] = ref
+        self._seq += 1
+        epoch = changed.pop("epoch", self.epochs[part])
+        fields: dict[str, Any] = {
+            "v": VERSION,
+            "run": self.tick.run,
+            "src": "controller",
+            "seq": self._seq,
+            "k": self.tick.k,
+            "t": self.tick.t,
+            "tw": time.monotonic_ns(),
+            "re_k": self.tick.k,
+            "parts": {part: Order(epoch, mode)},
+            "ref": whole.tolist(),
+            "ttl": TTL,
+            "answer": None,
+        }
+        message = Commands(**{**fields, **changed})
+        self.service.bus.session.put(Commands.stream.key(), encode(message), encoding=encoding_of(Commands))
+        return message.seq
+
+    def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float) -> None:
+        """Answer every tick with a valid command for some time."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            seen = self.tick.k
+            self.send(part, mode, ref())
+            self.until(lambda seen=seen: self.tick.k > seen, ANSWER)
