@@ -28,7 +28,7 @@ class UnknownName(MobeeError, KeyError):
 
     def __init__(self, kind: str, given: object, valid: Iterable[object]) -> None:
         names = sorted(map(str, valid))
-        near = difflib.get_close_matches(str(given), names, n=1)
+        near = difflib.get_close_matches(str(given), names, n=1) or [name for name in names if str(given) and str(given) in name]
         hint = f" Did you mean {near[0]!r}?" if near else ""
         super().__init__(f"unknown {kind} {given!r}.{hint} Valid: {', '.join(names) or 'none'}.")
 

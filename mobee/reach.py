@@ -103,5 +103,6 @@ def _triple(value: ArrayLike, what: str) -> Array:
     except InvalidValue:
         found = np.empty(0)
     if found.shape != (3,) or not np.isfinite(found).all():
-        raise InvalidValue(f"{what} {value!r} of the target: must be three finite numbers, in m in the root frame")
+        shown = f"({', '.join(f'{x:g}' for x in found)})" if found.shape == (3,) else repr(value)
+        raise InvalidValue(f"{what} {shown} of the target: must be three finite numbers, in m in the root frame")
     return found

@@ -17,7 +17,16 @@ _PATIENCE = 0.3  # s: a system that runs answers at once
 
 def add_endpoint(parser: argparse.ArgumentParser) -> None:
     """Add the option for the address of the router."""
-    parser.add_argument("--endpoint", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="address of the router (default: %(default)s)")
+    text = "address of the router (default: %(default)s)"
+    parser.add_argument("--endpoint", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ADDRESS", help=text)
+
+
+def endpoint(text: str) -> str:
+    """Return an address of a router; raises ArgumentTypeError for one that Zenoh could not use."""
+    protocol, _, place = text.partition("/")
+    if not place or (protocol == "tcp" and not place.rpartition(":")[2].isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no address of a router: write tcp/HOST:PORT, such as {DEFAULT_ENDPOINT}")
+    return text
 
 
 @contextmanager

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)
     if not target.resolve().parent.is_dir():
-        raise UserError(f"{target}: there is no folder {target.resolve().parent}: create it", FAILED)
+        raise UserError(f"{target}: there is no folder {target.resolve().parent}: create it", BAD_INPUT)
     taken = [path for path in _written(target) if path.exists()]
     if taken and not arguments.force:
         raise UserError(f"{taken[0]} exists already. Choose another name, or overwrite it with --force", BAD_INPUT)

@@ -47,7 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "Run an experiment; `mobee experiment run NAME --help` explains its options."
     running = actions.add_parser("run", help="run an experiment", description=text)
     running.add_argument("name", metavar="NAME", help=", ".join(EXPERIMENTS))
-    running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="options of the experiment")
+    options = running.add_argument("options", nargs=argparse.REMAINDER, metavar="options", help="options of the experiment")
+    options.required = False  # argparse would name them as missing beside NAME
     drawing = actions.add_parser("figure", help="draw the figure of a run", description="Draw the figure of a run.")
     drawing.add_argument("name", metavar="NAME|RUN", help="folder of a run, or the name of an experiment, for its newest run")
     drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run, after the name of an experiment")

@@ -12,10 +12,11 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.learning.recorded_transitions import Record, records
+from experiments.kit.learning.recorded_transitions import Record, records, stores_of
 from mobee.errors import MobeeError
 from mobee.learning.reaching.store import COLUMNS as STEP_COLUMNS
 from mobee.learning.reaching.store import ReachStore, reaching_parts
+from mobee.store import STORE
 from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 
@@ -33,7 +34,9 @@ _IN_THE_RUN = Path()
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the run and the file."""
     parser.epilog = _NOTES
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run of `mobee launch` or `mobee experiment`")
+    parser.add_argument(
+        "run", type=Path, metavar="RUN", help=f"folder of a run of `mobee launch` or `mobee experiment`, or a file such as {STORE}"
+    )
     kinds = parser.add_mutually_exclusive_group()
     text = "{} (default FILE: transitions.{} in the run's folder)"
     kinds.add_argument("--csv", nargs="?", type=Path, const=_IN_THE_RUN, metavar="FILE", help=text.format("write CSV, the default", "csv"))
@@ -51,13 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the table."""
-    if not arguments.run.is_dir():
+    if not arguments.run.exists():
         raise UserError(f"{arguments.run}: there is no such folder; give the folder of a run, one of those in runs/", BAD_INPUT)
     file: Path = arguments.parquet or arguments.csv or arguments.reaches or _IN_THE_RUN
     kind = "parquet" if arguments.parquet is not None else "csv"
     what = "transitions" if arguments.reaches is None else "reaches"
     if file == _IN_THE_RUN:
-        file = arguments.run / f"{what}.{kind}"
+        file = (arguments.run if arguments.run.is_dir() else arguments.run.parent) / f"{what}.{kind}"
     try:
         if arguments.reaches is not None:
             rows = write_reaches(file, arguments.run)
@@ -133,13 +136,13 @@ def write_reaches(file: Path, folder: Path) -> int:
     with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
         lines = csv.writer(sink)
         lines.writerow(REACH_COLUMNS)
-        for source in sorted(folder.rglob("*.sqlite")):
+        for source, name in stores_of(folder):
             for part in reaching_parts(source):
                 with ReachStore(source, part, read_only=True) as store:
                     targets = [target.position.tolist() for target in store.problems()]
                     for step, time in zip(store.load(), store.times(), strict=True):
                         values = (json.dumps(value) if isinstance(value, bool | tuple) else value for value in astuple(step))
-                        lines.writerow((source.relative_to(folder), part, *targets[step.problem], *values, time))
+                        lines.writerow((name, part, *targets[step.problem], *values, time))
                         rows += 1
         if not rows:
             raise MobeeError(f"{folder}: no agent has learned to reach in this run.")

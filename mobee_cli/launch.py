@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from experiments.kit.command_line import positive_number, positive_whole
+from mobee_cli.connect import endpoint
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ticks", type=positive_whole, metavar="N", help="lockstep only (shared.mode=lock): end after N ticks")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     text = "address of the router (default: the scenario's, or tcp/127.0.0.1:7447)"
-    parser.add_argument("--endpoint", metavar="ADDRESS", help=text)
+    parser.add_argument("--endpoint", type=endpoint, metavar="ADDRESS", help=text)
     parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="parent of the run's folder (default: runs)")
 
 

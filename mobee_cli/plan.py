@@ -25,6 +25,9 @@ that the agent moves, or of all motors of its part. A pose stands for its state.
 Plans use the observed outcomes, and a weak prior belief that actions which were
 never tried succeed (docs/learning.md)."""
 
+UNLIKELY = 0.5  # probability below which a plan is expected to fail
+BETTER = 3  # number of goals that are named instead
+
 _NAME_IT = " The run does not record the file of its robot: name it with --robot FILE."
 
 
@@ -53,8 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
     except MobeeError as error:
         unknown = isinstance(error, UnknownName) and str(error).startswith("unknown robot") and arguments.robot is None
         raise UserError(f"{error}{_NAME_IT if unknown else ''}", BAD_INPUT) from None
+    better = _better(learned, start, plan, arguments.discount)
     read = [f"{pose} rad is in state {state}." for pose, state in poses.items()]
-    print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join([*read, *_lines(learned, plan)]))
+    print(json.dumps(_as_json(learned, plan), indent=2) if arguments.json else "\n".join([*read, *_lines(learned, plan), *better]))
     return 0
 
 
@@ -109,6 +113,24 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
         avoided = ", ".join(f"{state} ({chance:.2f})" for state, chance in plan.avoided.items())
         lines.append(f"Avoided states (probability of passing): {avoided}.")
     return lines
+
+
+def _better(learned: Learned, start: int, plan: Plan, discount: float) -> list[str]:
+    """Explain a plan that is expected to fail: what was never tried, and the goals that are reached most reliably from the start."""
+    if plan.success >= UNLIKELY:
+        return []
+    pairs = zip(plan.path, plan.actions, strict=False)
+    never = sum(learned.model.tries[state, action] == 0 for state, action in pairs)
+    beliefs = learned.model.debiased()
+    chances = {
+        goal: Planner(learned.space, beliefs, target_states(learned.space, goal), discount).plan(start).success
+        for goal in range(len(learned.space.samples))
+        if goal not in (start, plan.path[-1])
+    }
+    best = sorted(chances, key=lambda goal: -chances[goal])[:BETTER]
+    tried = f"{never} of its {len(plan.actions)} actions were never tried, so more transitions may find a better one. " if never else ""
+    goals = ", ".join(f"{goal} ({chances[goal]:.2f})" for goal in best)
+    return [f"This plan will probably fail: {tried}From here the most reliable goals are {goals}."]
 
 
 def _times(count: int) -> str:

@@ -7,6 +7,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from mobee_cli.connect import endpoint
 from mobee_cli.errors import UserError
 from services.common.config import ServiceConfig
 from services.common.emergency_stop import StopRecord
@@ -17,7 +18,8 @@ from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_route
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the address."""
-    parser.add_argument("--listen", default=DEFAULT_ENDPOINT, metavar="ADDRESS", help="address to listen at (default: %(default)s)")
+    text = "address to listen at (default: %(default)s)"
+    parser.add_argument("--listen", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ADDRESS", help=text)
     parser.add_argument(
         "--stop-record", type=Path, metavar="FILE", help="record of emergency stops that robot_sim reads: created if absent"
     )

@@ -10,6 +10,7 @@ from typing import Any
 
 from mobee.errors import MobeeError
 from mobee.model.world import World
+from mobee.model.world_file import shipped_worlds
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.errors import UserError
@@ -40,7 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
         robot = load_robot(arguments.file, **urdf_options(arguments))
         world = world_around(arguments.world, arguments.file) if arguments.world else None
     except MobeeError as error:
-        raise UserError(str(error), BAD_INPUT) from None
+        world = f" It is a world: `mobee view icub --world {arguments.file}`." if arguments.file in shipped_worlds() else ""
+        raise UserError(f"{error}{world}", BAD_INPUT) from None
     return show(robot, world, save)
 
 

@@ -4,9 +4,9 @@
 `Servos` is the hardware; its servos are simulated here. To drive real ones, change `exchange` and `stop`. The safety gate, the ownership
 of parts and the emergency stop are those of the shipped robot_sim, and must stay between the bus and the motors.
 
-    mobee router &
-    python examples/bus/own_robot.py --robot my_arm.xml &
-    mobee conform --robot my_arm.xml          # plays the controller, and prints what breaks the contract
+    mobee router                                             # each in a terminal of its own
+    python examples/bus/own_robot.py --robot my_arm.xml
+    mobee conform --robot my_arm.xml                         # plays the controller, and prints what breaks the contract
 
 In a scenario it takes the place of the shipped one: `[services.robot_sim]` with `module = "my_package"`, a package that has this file as
 `__main__.py`, and its `Config` in `config.py`. docs/hardware.md explains the contract.

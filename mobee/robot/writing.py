@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of the writers of robot files: the motor of each joint, and numbers as text without loss of precision."""
+"""Functions of the writers of robot files: the motor of each joint, numbers as text without loss of precision, and whole files."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -35,6 +37,17 @@ def drives_of(robot: Robot) -> tuple[Drive, ...]:
         if index not in drives:
             raise InvalidValue(f"joint {idle.name!r} is driven by no motor. Give it one, or make it part of the link that carries it.")
     return tuple(drives[index] for index in range(len(robot.joints)))
+
+
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write a file completely or not at all, and return its path: a temporary file beside it takes its place.  Raises OSError."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_bytes(content)
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
 
 
 def number(value: float) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from mobee.errors import MobeeError
 from mobee_cli.conform.checks import CHECKS, Check
 from mobee_cli.conform.player import Broken, Player
-from mobee_cli.connect import connected
+from mobee_cli.connect import connected, endpoint
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, robot_given
 from services.common.config import ServiceConfig, nearest
@@ -24,11 +24,9 @@ from services.common.service import Service
 from services.common.session import DEFAULT_ENDPOINT
 
 _JOIN = 2.0  # s until tokens and streams arrive
-_NOTES = """Run a router and robot_sim without a controller:
-  mobee router & python examples/bus/own_robot.py & mobee conform
-It moves the first motor of a part by about 5 degrees towards the middle of its
-range, again and again: be ready to switch a real robot off. The contract is in
-docs/hardware.md.
+_NOTES = """Run `mobee router` and your robot_sim, without a controller. The verb moves the
+first motor of a part by about 5 degrees towards the middle of its range, again
+and again: be ready to switch a real robot off. The contract: docs/hardware.md.
 Exit code: 0 all rules are kept, 1 a rule is broken, 2 bad input, 3 no robot."""
 
 
@@ -36,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add endpoint, robot and choice of checks."""
     parser.epilog = _NOTES
     text = "address of the router (default: %(default)s)"
-    parser.add_argument("endpoint", nargs="?", default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help=text)
+    parser.add_argument("endpoint", nargs="?", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help=text)
     add_robot(parser, "default: icub")
     parser.add_argument("--part", help="part that is moved (default: the first)")
     parser.add_argument("--only", action="append", metavar="CHECK", help=f"run this check only: {', '.join(one.name for one in CHECKS)}")

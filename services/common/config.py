@@ -23,6 +23,16 @@ from services.common.worlds import world_around
 
 _C = TypeVar("_C", bound=Struct)
 _KEY = re.compile("[a-z0-9_]+")
+_TYPE = re.compile("`(\\w+)`")
+_WORDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": 'a text in "quotes"',
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+}
+"""What msgspec's names of types are called in a settings file."""
 
 
 class ConfigError(Exception):
@@ -125,6 +135,7 @@ def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], pr
         return msgspec.convert(data, cls)
     except msgspec.ValidationError as error:
         text, _, place = str(error).partition(" - at `$.")
+        text = _TYPE.sub(lambda match: _WORDS.get(match[1], match[0]), text)
         field = prefix + place.rstrip("`")
         raise ConfigError(f"{where(field)}: {field}: {text}.{_nearest_choice(data, cls, place.rstrip('`'))}") from None
 

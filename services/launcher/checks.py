@@ -20,6 +20,7 @@ from services.common import rpc
 from services.common.config import ConfigError, nearest
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 from services.common.worlds import NO_WORLD
+from services.launcher.catalogue import AGENT
 from services.launcher.scenario import Part, Scenario
 
 _CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at once
@@ -177,7 +178,10 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
         name = getattr(part.config, "part", None)
         if name is not None and name not in robot.parts:
             place = scenario.where(f"services.{part.who}")
-            raise ConfigError(f"{place}: {part.who}: the robot has no part {name!r}.{nearest(name, robot.parts)}")
+            raise ConfigError(
+                f"{place}: {part.who}: the robot has no part {name!r}.{nearest(name, robot.parts)} An agent is named after its part, as "
+                f"[services.{AGENT}{next(iter(robot.parts))}]: write a scenario for this robot (docs/robots.md)."
+            )
         for joint in getattr(part.config, "joints", ()):
             if joint not in robot.part(name).motors:
                 place = scenario.where(f"services.{part.who}.joints")
@@ -194,7 +198,14 @@ def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
         try:
             part.config.check_robot(robots[part.config.robot])
         except MobeeError as error:
-            raise ConfigError(f"{scenario.where(f'services.{part.who}')}: {part.who}: {error}") from None
+            raise ConfigError(f"{scenario.where(_setting_in(part, str(error)))}: {part.who}: {error}") from None
+
+
+def _setting_in(part: Part, text: str) -> str:
+    """Return the setting of a service whose value an error quotes, with its tables; the service's table if there is none."""
+    values = ((name, getattr(part.config, name)) for name in part.config.__struct_fields__)
+    named = next((f".{name}" for name, value in values if isinstance(value, str) and value and repr(value) in text), "")
+    return f"services.{part.who}{named}"
 
 
 def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]) -> Any:

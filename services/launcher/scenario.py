@@ -76,6 +76,8 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
     try:
         text = path.read_text()
         data = tomllib.loads(text)
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file. Give a scenario file, or a shipped scenario: {', '.join(shipped())}.") from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -105,6 +107,11 @@ def _find(name_or_path: str) -> Path:
         return names[name_or_path]
     if name_or_path.endswith(".toml") or "/" in name_or_path:
         return Path(name_or_path)
+    if name_or_path.endswith((".xml", ".urdf")):
+        raise ConfigError(
+            f"{name_or_path} is the file of a robot or a world, not a scenario: name it in a scenario, as in "
+            f"`mobee launch kinematic --set shared.robot={name_or_path}`"
+        )
     raise ConfigError(f"unknown scenario {name_or_path!r}.{nearest(name_or_path, names)} Or give the path of a .toml file.")
 
 

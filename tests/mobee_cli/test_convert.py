@@ -10,7 +10,7 @@ from mobee.errors import OlderVersion
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee_cli.__main__ import main
-from services.common.exit_codes import BAD_INPUT, FAILED
+from services.common.exit_codes import BAD_INPUT
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
@@ -73,7 +73,7 @@ def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsy
     [
         (["icbu", "x.urdf"], BAD_INPUT, "Did you mean 'icub'?"),
         (["icub", "x.sdf"], BAD_INPUT, "x.sdf: OUT must end in .xml or .urdf"),
-        (["icub", "nowhere/x.urdf"], FAILED, "there is no folder"),
+        (["icub", "nowhere/x.urdf"], BAD_INPUT, "there is no folder"),
         (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for .urdf files"),
         (["mine.urdf", "x.xml"], BAD_INPUT, "mine.urdf: no such file"),
     ],

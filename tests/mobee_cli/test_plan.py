@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,14 @@ def test_the_path_goes_round_what_never_worked_and_says_so(run: Path, capsys: py
     assert shortest.startswith("If every action succeeded, 2 would be enough. Expected to fail")
     assert failing.split()[:3] == ["0", "->", "1"] and float(failing.split()[3]) < 0.1
     assert avoided.startswith("Avoided states (probability of passing): 1 (0.0")
+
+
+def test_a_plan_that_will_fail_says_so_and_names_better_goals(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "--run", str(run), "--from", "0", "--to", "1"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("This plan will probably fail: ")
+    goals = {int(goal): float(chance) for goal, chance in re.findall(r"(\d+) \((0\.\d+|1\.00)\)", last)}
+    assert len(goals) == 3 and 1 not in goals and min(goals.values()) > 0.9
 
 
 def test_as_json_with_poses(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -32,7 +32,7 @@ class Record:
 
 
 def records(folder: Path) -> Iterator[Record]:
-    """Yield the transitions of every agent in a run's folder.
+    """Yield the transitions of every agent in a run's folder, or in one database.
 
     Raises InvalidValue if there are none or an array has the wrong shape, MobeeError for a damaged file.
     """
@@ -44,14 +44,21 @@ def records(folder: Path) -> Iterator[Record]:
         raise InvalidValue(f"{folder}: no transitions are kept there, neither in a file *.sqlite nor in the cells of a sweep.")
 
 
+def stores_of(run: Path) -> list[tuple[Path, str]]:
+    """Return the databases in a run's folder, or the one that is given itself, each with its name in the folder."""
+    if run.is_file():
+        return [(run, run.name)]
+    return [(file, str(file.relative_to(run))) for file in sorted(run.rglob("*.sqlite"))]
+
+
 def _of_stores(folder: Path) -> Iterator[Record]:
-    for file in sorted(folder.rglob("*.sqlite")):
+    for file, name in stores_of(folder):
         with TransitionStore(file, "", read_only=True) as store:
             for agent in store.agents():
                 made = store.load(agent)
                 names = ("n", "s", "a", "s_next", "reward", "settled", "duration", "q", "touched")
                 columns: dict[str, list[Any]] = {name: [getattr(one, name) for one in made] for name in names}
-                yield Record(str(file.relative_to(folder)), agent, store.settings(agent), columns | {"time": store.times(agent)})
+                yield Record(name, agent, store.settings(agent), columns | {"time": store.times(agent)})
 
 
 def _of_cells(folder: Path) -> Iterator[Record]:

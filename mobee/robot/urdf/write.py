@@ -18,7 +18,7 @@ from mobee.robot.urdf.frames import rpy_of
 from mobee.robot.urdf.hull import facets
 from mobee.robot.urdf.layout import SIX
 from mobee.robot.urdf.write_srdf import write_srdf
-from mobee.robot.writing import drives_of, number, numbers
+from mobee.robot.writing import drives_of, number, numbers, write_whole
 from mobee.robot.xml.pairs import role_elements
 
 
@@ -120,7 +120,7 @@ def write_urdf(robot: Robot, path: str | Path) -> Path:
     _write_markers(robot, root, points)
     _write_pairs(robot, root)
     ET.indent(root, " ")
-    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    write_whole(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
     write_srdf(robot, masters, path.with_suffix(".srdf"))
     return path
 

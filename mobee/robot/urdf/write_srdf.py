@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.pairs import adjacent_links
-from mobee.robot.writing import number
+from mobee.robot.writing import number, write_whole
 from mobee.robot.xml.node import Node, read_xml
 
 
@@ -38,7 +38,7 @@ def write_srdf(robot: Robot, masters: Sequence[tuple[int, float, float]], path: 
             first, second = (robot.links[index] for index in sorted(pair))
             ET.SubElement(root, "enable_collisions", link1=first, link2=second)
     ET.indent(root, " ")
-    path.write_bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    write_whole(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
 
 
 NamePair = frozenset[str]

@@ -29,6 +29,7 @@ REMEDIES = {
 }
 
 
+BOM_AND_BLANKS = b"\xef\xbb\xbf \t\r\n"
 CONFLICT = (b"<<<<<<<", b"=======", b">>>>>>>")
 
 
@@ -91,6 +92,11 @@ def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
             f"{path}:{handler.line}: entities and external references are refused ({type(error).__name__}). Write their text out."
         ) from error
     except xml.sax.SAXParseException as error:
+        text = content.lstrip(BOM_AND_BLANKS)
+        if text and not text.startswith(b"<"):
+            raise RobotFileError(
+                f"{path}:1: no XML file: it does not begin with '<'. Give a robot or world file (.xml or .urdf)."
+            ) from error
         line, column, problem = error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1, error.getMessage()
         remedy = next((REMEDIES[key] for key in REMEDIES if key in problem), "Close every tag and quote every value")
         if content.splitlines()[line - 1 : line] and content.splitlines()[line - 1].startswith(CONFLICT):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import os
 import warnings
 import xml.sax.xmlreader
 from collections.abc import Collection, Iterator
@@ -19,6 +18,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import RobotFileError
+from mobee.robot.writing import write_whole
 from mobee.robot.xml.file import LARGEST, MOST_REPAIRS, LineHandler, Repair, mend, parse_content, read_content
 
 DEEPEST = 2000  # elements inside each other: 500 joints, each in a motor and a link
@@ -245,7 +245,7 @@ def write_tree(root: ET.Element, path: Path, heading: str = "") -> Path:
     """Write elements with their attributes, one per line, and return the path; `heading` becomes a comment above the root.
 
     The standard library's writer is recursive and fails beyond some hundred levels; a chain of 500 joints nests deeper.
-    The file is complete or unchanged: a temporary file beside it replaces it at the end. Raises OSError.
+    The file is complete or unchanged. Raises OSError.
     """
     lines = ['<?xml version="1.0" encoding="utf-8"?>'] + ([f"<!--\n{heading.strip().replace('--', '- -')}\n-->"] if heading else [])
     waiting: list[tuple[ET.Element | str, int]] = [(root, 0)]
@@ -262,10 +262,4 @@ def write_tree(root: ET.Element, path: Path, heading: str = "") -> Path:
         lines.append(f"{indent}<{element.tag}{attributes}>")
         waiting.append((element.tag, depth))
         waiting += [(child, depth + 1) for child in reversed(element)]
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
-    return path
+    return write_whole(path, ("\n".join(lines) + "\n").encode())
