@@ -32,10 +32,21 @@ VERBS = {
     "bench": "measure the speed of mobee on this machine, beside other programs",
     "check": "report what is wrong with a robot or world file",
     "view": "show a robot file in motion",
+    "doctor": "check this machine and installation, and name what mends them",
+    "completion": "print the script with which a shell completes this command",
     "conform": "test a robot_sim of your own against the contract of the bus",
 }
 
-EXTRAS = {"zenoh": "live", "msgspec": "live", "tyro": "live", "rerun": "viz", "pybullet": "sim", "mujoco": "sim", "icub_models": "sim"}
+EXTRAS = {
+    "zenoh": "live",
+    "msgspec": "live",
+    "tyro": "live",
+    "shtab": "live",
+    "rerun": "viz",
+    "pybullet": "sim",
+    "mujoco": "sim",
+    "icub_models": "sim",
+}
 """Packages that some verbs import, and the extra of this project that installs each."""
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: more threads would only wait

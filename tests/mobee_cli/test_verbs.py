@@ -32,6 +32,12 @@ def test_status_shows_every_service(running: Launched) -> None:
     assert max(map(len, done.stdout.splitlines())) <= 80
 
 
+def test_doctor_describes_the_running_system(running: Launched) -> None:
+    found = {one["subject"]: one for one in json.loads(mobee("doctor", "--json", "--endpoint", running.endpoint).stdout)}
+    assert f"one runs at {running.endpoint} since 0 min (launcher {running.process.pid}): toys: 2 of 2 ready" in found["systems"]["found"]
+    assert found["systems"]["remedy"] == f"`mobee stop --endpoint {running.endpoint}` ends it"
+
+
 def test_status_as_json(running: Launched) -> None:
     status = json.loads(mobee("status", "--json", "--endpoint", running.endpoint).stdout)
     assert status["services"]["two"]["state"] == "ready"
