@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans from any state to targets with a learned model, compared with shortest paths over intended outcomes."""
+"""Plans from any state to targets with a learned model; compares them with the shortest paths if every action reached its goal."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""While a part reaches, its link does not feel the targets, and the controller is told where they are."""
+"""While a part reaches, its link has no contacts with the targets, and the controller gets their positions."""
 
 from __future__ import annotations
 
