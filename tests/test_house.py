@@ -275,7 +275,7 @@ RETIRED = (
     r"goes without saying|\bovertures?\b|\blimps?\b|\bdawdl|\bfor ever\b|\boutset\b|told_world|world_told|told_terms"
     r"|still_nears|ToldContacts|way_to_reach|state_of_part|edges_told|made_alike|\bdear to\b|\bdearer\b"
     r"|go on with --resume|take another seed|goaldesk|worlddesk|drivedesk"
-    r"|\bways?[ _]out\b|_way_out|\bfeels?\b|\bmakes for\b|the lack of|\bsways?\b|\beas(e|es|ed)\b|\bgoes without\b|as it were\b"
+    r"|\bways?[ _]out\b|_way_out|\bfeels?\b|\bmakes for\b|the lack of|\bsways?\b|\beas(?:e|es|ed)\b|\bgoes without\b|as it were\b"
 )
 """Words that stood for: is redundant, start-up status, is degraded, inject a delay, indefinitely, search schedule, world from JSON,
 published terms, is approaching, published contacts, plan a reach, state of a part's pose, expensive, continue the run, use another
