@@ -54,7 +54,7 @@ def test_there_is_always_a_finite_smallest_separation(first, second, data):
     assert np.isfinite(found.depth) and np.isfinite(apart) and apart >= 0.0
     axes = np.concatenate([a.rotation.T, b.rotation.T, -a.rotation.T, -b.rotation.T])  # sampling does not meet them exactly
     bound = min(sampled_depth(a, b, np.random.default_rng(0)), overlap_along(a, b, axes).min())
-    # Around a cylinder's axis nearly all directions may separate by an equally short motion; the engine then stops this close to the shortest.
+    # Around a cylinder's axis nearly all directions may separate equally fast; the engine then stops this close to the shortest motion.
     exact = 1e-6 if "cylinder" in (first, second) else 1e-8
     assert found.depth <= max(bound, 0.0) + exact * size
     if apart > 1e-9 * size:
