@@ -26,7 +26,7 @@ LEAST_MEMORY, LEAST_DISK = 1.0, 0.5  # GB that a system with a page and the reco
 LEAST_CORES = 2
 EXTRAS = {
     "live": {"zenoh": "eclipse-zenoh", "msgspec": "msgspec", "tyro": "tyro"},
-    "sim": {"pybullet": "pybullet", "icub_models": "icub-models"},
+    "sim": {"mujoco": "mujoco-core", "pybullet": "pybullet", "icub_models": "icub-models"},
     "viz": {"rerun": "rerun-sdk"},
     "figures": {"matplotlib": "matplotlib"},
     "parquet": {"pyarrow": "pyarrow"},
@@ -144,8 +144,8 @@ def _extra(extra: str) -> Finding:
     if not missing:
         return Finding(f"extra {extra}", "ok", found)
     text = f"{', '.join(missing)} not installed" + (f"; {found}" if found else "")
-    if missing == ["pybullet"] and sys.version_info >= (3, 12):
-        return Finding(f"extra {extra}", "note", text, "it has no wheel for this Python: use Python 3.11, or mobee launch kinematic")
+    if missing == ["pybullet"]:
+        return Finding(f"extra {extra}", "note", text, "not needed: MuJoCo moves the iCub too; PyBullet lacks wheels for some machines")
     return Finding(f"extra {extra}", "wrong" if extra in WANTED else "note", text, f'pip install "mobee[{extra}]"')
 
 

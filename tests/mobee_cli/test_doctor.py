@@ -35,9 +35,10 @@ def test_a_missing_package_is_wrong_if_launch_needs_it(
     free_port: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in ("rerun", "ompl") else find(name))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in ("rerun", "ompl", "pybullet") else find(name))
     code, found = examined(capsys, free_port)
     assert code == 3
+    assert found["extra sim"]["verdict"] == "note" and "MuJoCo moves the iCub too" in found["extra sim"]["remedy"]
     assert (found["extra viz"]["verdict"], found["extra viz"]["remedy"]) == ("wrong", 'pip install "mobee[viz]"')
     assert (found["extra planning"]["verdict"], found["extra planning"]["found"]) == ("note", "ompl not installed")
 
