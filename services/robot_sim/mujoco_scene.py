@@ -217,6 +217,7 @@ def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
 def _options(substep: float) -> Any:
     spec = mujoco.MjSpec()
     spec.memory, spec.compiler.degree = ARENA, False
+    spec.compiler.boundmass, spec.compiler.boundinertia = NEGLIGIBLE, ball_of_water(NEGLIGIBLE)[0, 0]  # of a link with tiny solids
     option, flag = spec.option, mujoco.mjtDisableBit
     option.timestep, option.gravity = substep, GRAVITY
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

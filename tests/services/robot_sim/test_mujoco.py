@@ -132,6 +132,14 @@ def test_pairs_that_overlap_at_home_are_not_tested_and_reported(tmp_path: Path) 
     assert backend.contact().depth == 0.0
 
 
+def test_a_link_whose_solid_is_tiny_has_a_mass(tmp_path: Path) -> None:
+    text = chain(2).replace("radius='0.02' length='0.1'", "radius='1e-6' length='1e-6'")
+    backend = body(written(tmp_path, text))
+    for _ in range(50):
+        backend.step(DT)
+    assert np.isfinite(backend.motors.q).all()
+
+
 def test_a_ghost_is_passed_through_and_a_ball_is_not(tmp_path: Path) -> None:
     robot = written(tmp_path, GRIPPER)
     ends = []
