@@ -82,16 +82,21 @@ class _Reaching:
 
     def draw_goal(self, rng: np.random.Generator, plant: OfflinePlant) -> Array:
         """Return the marker's place (3,) m in a random posture in which no force acts on the joints: the arm can rest there."""
-        q = self.model.robot.home.copy()
+        q, no_contact = self.model.robot.home.copy(), np.zeros(len(self.model.robot.motors))
         for _ in range(GOAL_DRAWS):
             q[self.joints] = rng.uniform(self.low, self.high)
+            if self._pushed(plant.controller.law.forces(q, no_contact, None)):  # limits and constraints: sooner computed than contacts
+                continue
             pose = self.model.evaluate(q)
-            if not plant.controller.forces(pose).total[self.joints].any():
+            if not pose.projection[self.joints].any():
                 return pose.position(self.marker)
         raise MobeeError(
             f"no goal found: in {GOAL_DRAWS} random postures of {self.part} some force of contacts, limits or constraints acts on "
             "its joints. Take other joints, or a world with more room."
         )
+
+    def _pushed(self, forces: Sequence[Array]) -> bool:
+        return any(force[self.joints].any() for force in forces)
 
     def aim(self, plants: Sequence[OfflinePlant], actions: Array) -> None:
         """Move the attractors of several robots by actions (k, d), within the joints' limits."""

@@ -34,7 +34,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 
 def test_each_example_has_its_own_number_and_fits_a_hundred_lines() -> None:
-    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 12)]
+    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 15)]
     assert {path.name: len(path.read_text().splitlines()) for path in EXAMPLES.values() if len(path.read_text().splitlines()) > 100} == {}
 
 
@@ -143,3 +143,24 @@ def test_11_reaches_a_place_never_tried_before(tmp_path: Path) -> None:
     assert len(scores) == 3 and all(3.0 < score < 8.0 for score in scores)
     missing, reward = numbers(r"state \d+: (\S+) mm remain, reward (\S+)", text)
     assert missing < 20.0 and reward == pytest.approx(1 / (1 + missing / 10), abs=0.01)
+
+
+def test_12_explores_a_cliff_and_plans_along_it(tmp_path: Path) -> None:
+    text = printed("12", tmp_path)
+    assert len(re.findall(r"^state +\d+ after [1-9]\S* s, touching .*: gained 0\.\d+ nats$", text, re.MULTILINE)) == 5
+    random, curious = (int(tried) for tried in re.findall(r"tried (\d+) of 152", text))
+    assert random < curious == 152
+    path = [int(state) for state in text.rpartition("cliff: ")[2].split(" -> ")]
+    assert path == [36, *range(24, 36), 47]  # the shortest one
+
+
+def test_13_learns_where_stable_baselines_is_installed(tmp_path: Path) -> None:
+    compile(EXAMPLES["13"].read_text(), "13", "exec")
+    pytest.importorskip("stable_baselines3")
+    assert "0 steps: success" in printed("13", tmp_path, "0")
+
+
+def test_14_learns_to_bring_the_hand_to_a_state(tmp_path: Path) -> None:
+    text = printed("14", tmp_path)
+    shares = [float(share) for share in re.findall(r"steps: (\S+) of the last 40 episodes", text)]
+    assert shares[0] < 0.7 and min(shares[-2:]) > 0.9

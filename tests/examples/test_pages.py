@@ -31,6 +31,7 @@ model = mobee.Model(robot, mobee.load_world("table"))
 
 GIVEN = {
     "docs/control.md": "",
+    "docs/gymnasium.md": "",
     "docs/installation.md": "",
     "docs/law.md": TABLE + "q = goal = robot.home\nf, wrench = np.zeros(41), np.zeros(6)\n",
     "docs/model.md": "",
