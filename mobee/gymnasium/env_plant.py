@@ -63,7 +63,7 @@ class EnvPlant:
     def settings(self) -> dict[str, Any]:
         """The id and arguments of the environment, as far as they are known, as plain JSON values."""
         spec = self.env.spec
-        return {"env": None if spec is None else spec.to_json()}
+        return {} if spec is None else {"env": spec.id, "arguments": {name: repr(value) for name, value in spec.kwargs.items()}}
 
     @property
     def q(self) -> Array:
