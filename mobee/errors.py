@@ -19,6 +19,10 @@ class OlderVersion(UserWarning):
     """Warns that an element of a file was read by the rules of an older version of the format."""
 
 
+class Simplified(UserWarning):
+    """A warning that a robot file has what this library has no counterpart for; the message says how it is read."""
+
+
 class InvalidValue(MobeeError, ValueError):
     """An argument with the wrong shape, unit or range."""
 

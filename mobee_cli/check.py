@@ -7,6 +7,7 @@ import argparse
 import json
 import shutil
 import textwrap
+import warnings
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +20,7 @@ from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.robot.load import ROBOTS, find_file, load_robot
+from mobee.robot.mjcf.compiled import is_mjcf
 from mobee.robot.robot import Robot
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_urdf_options, urdf_options
@@ -32,7 +34,7 @@ FEW = 0.5  # of the random poses: a pair that touches in fewer may be a true col
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the file and the options."""
     parser.epilog = _NOTES
-    parser.add_argument("file", help="shipped robot or world, or path of a .xml or .urdf file")
+    parser.add_argument("file", help="shipped robot or world, or path of a .xml, .urdf or MJCF file")
     parser.add_argument("--world", metavar="FILE", help="also check what the robot touches at home in this world")
     add_urdf_options(parser)
     parser.add_argument(
@@ -144,8 +146,10 @@ def _write_srdf(arguments: argparse.Namespace) -> tuple[list[str], dict[str, Any
     """Write the pairs that touch; return the report as lines and for JSON, and the SRDF to read the robot with."""
     path = find_file(arguments.file, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":
-        pairs = touching_pairs(load_robot(path))
-        return _ignores(pairs), {"pairs": [asdict(pair) for pair in pairs]}, None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the findings repeat what the reader says
+            pairs = touching_pairs(load_robot(path))
+        return _ignores(pairs, is_mjcf(path)), {"pairs": [asdict(pair) for pair in pairs]}, None
     out = Path(arguments.write_srdf) if arguments.write_srdf else None
     done = leave_out_touching(path, out, **urdf_options(arguments))
     result = asdict(done) | {"path": str(done.path)}
@@ -174,10 +178,13 @@ def _title(done: LeftOut) -> str:
     return f"{done.path}: wrote {count(done.pairs, 'pair')} of links that touch at home or in all of {POSES} random poses{kept}."
 
 
-def _ignores(pairs: tuple[TouchingPair, ...]) -> list[str]:
-    """Return the lines to add to a zero-position file."""
+def _ignores(pairs: tuple[TouchingPair, ...], mjcf: bool) -> list[str]:
+    """Return the lines to add to a zero-position file, or to an MJCF."""
     if not pairs:
         return [f"No links touch at home or in all of {POSES} random poses.", ""]
+    if mjcf:
+        lines = [f' <exclude body1="{pair.first}" body2="{pair.second}"/>' for pair in pairs]
+        return ["An MJCF has no SRDF. To exclude these pairs, add these lines to its <contact>:", *lines, "", *_table(pairs), ""]
     lines = [f' <ignore first="{pair.first}" second="{pair.second}"/>' for pair in pairs]
     return ["A zero-position file has no SRDF. To exclude these pairs, add these lines below its root:", *lines, "", *_table(pairs), ""]
 

@@ -12,6 +12,7 @@ from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.robot.load import ROBOTS, find_file, load_robot
+from mobee.robot.mjcf.compiled import is_mjcf
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.write import write_urdf
 from mobee.robot.xml.node import Remark
@@ -25,7 +26,7 @@ WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the input file, the output file and the options for URDF files."""
-    parser.add_argument("source", metavar="IN", help="shipped robot, or a .xml or .urdf file, or a world in .xml")
+    parser.add_argument("source", metavar="IN", help="shipped robot, or a .xml, .urdf or MJCF file, or a world in .xml")
     parser.add_argument("target", metavar="OUT", type=Path, help=".xml or .urdf file to write")
     add_urdf_options(parser)
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
@@ -62,7 +63,7 @@ def _convert(arguments: argparse.Namespace, target: Path) -> list[str]:
             raise UserError(f"{target}: a world can only be written as .xml: a URDF holds robots only", BAD_INPUT)
         return [f"{target}: {len(content.objects)} objects", *_understood(write_upgraded(world, target) or [])]
     source = find_file(arguments.source, ROBOTS, "robot")
-    if source.suffix.lower() == target.suffix.lower() == ".xml":
+    if source.suffix.lower() == target.suffix.lower() == ".xml" and not is_mjcf(source):
         remarks = write_upgraded(source, target)
         if remarks is not None:
             return [_summary(content, target), *_understood(remarks)]

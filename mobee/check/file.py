@@ -10,14 +10,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mobee.check.finding import SEVERITIES, Finding
+from mobee.check.finding import SEVERITIES, Finding, Severity
 from mobee.check.robot import check_robot
 from mobee.check.shapes import hulls
 from mobee.check.world import check_world
-from mobee.errors import InvalidValue, RobotFileError, UnknownName
+from mobee.errors import InvalidValue, RobotFileError, Simplified, UnknownName
 from mobee.model.world import World
 from mobee.model.world_file import WORLDS, load_world, shipped_worlds
 from mobee.robot.load import ROBOTS, find_file, load_robot, shipped_robots
+from mobee.robot.mjcf.compiled import is_mjcf
+from mobee.robot.mjcf.menagerie import menagerie_file
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import Corners
 from mobee.robot.urdf.shapes import Meshes
@@ -97,7 +99,7 @@ def check_file(
             content = load_robot(name_or_path, field=field, meshes=meshes, corners=corners, srdf=srdf, home=home)
         found = check_robot(content, world)
         file = find_file(name_or_path, ROBOTS, "robot")
-        if file.suffix.lower() != ".urdf":
+        if file.suffix.lower() != ".urdf" and not is_mjcf(file):
             found += source(read_xml(file, repair=True))
         elif corners != "all" and any(shape.vertices is not None for shape in content.shapes):
             with _collected_warnings([]):
@@ -123,7 +125,7 @@ def _require_known(name_or_path: str | Path) -> None:
         return
     if is_folder(path):
         raise RobotFileError(f"{path}: is a folder. Give the path of a .xml or .urdf file in it.")
-    if not path.suffix and path.name == given:
+    if not path.suffix and path.name == given and menagerie_file(given) is None:
         raise UnknownName("robot or world", given, known)
 
 
@@ -146,4 +148,5 @@ def _collected_warnings(warned: list[Finding]) -> Iterator[None]:
     for warning in caught:
         found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
         where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
-        warned.append(Finding("warning", "reader", where, what, "the robot differs from what the file says", remedy))
+        severity: Severity = "note" if issubclass(warning.category, Simplified) else "warning"
+        warned.append(Finding(severity, "reader", where, what, "the robot differs from what the file says", remedy))

@@ -135,9 +135,9 @@ def idle_parts(subject: Subject) -> Iterator[Finding]:
 
 
 def unreachable_markers(subject: Subject) -> Iterator[Finding]:
-    """Find markers that no motor moves; in a URDF, where every link is a marker, one note for all."""
+    """Find markers that no motor moves; in a URDF or MJCF, where every link is a marker, one note for all."""
     unmoved = [marker for marker in subject.robot.markers.values() if marker.link not in subject.moved]
-    if subject.is_urdf and unmoved:
+    if (subject.is_urdf or subject.is_mjcf) and unmoved:
         yield Finding(
             "note",
             "marker",
@@ -209,6 +209,8 @@ def _finding(subject: Subject, motors: Sequence[Motor], better: dict[str, float]
 def _change(subject: Subject, motor: Motor, home: float) -> str:
     """Return the text to write, and its line, in the format of the file."""
     line = _line(subject, motor).rpartition(":")[2]
+    if subject.is_mjcf:
+        return f"{motor.name} {home:.6g} in the qpos of a keyframe home"
     if not subject.is_urdf:
         return f'{motor.name} home="{np.rad2deg(home):.6g}" (line {line})'
     index, scale, offset = motor.joints[0]

@@ -15,6 +15,7 @@ from mobee.arrays import Array
 from mobee.model.contact import Contact
 from mobee.model.model import Model
 from mobee.model.world import World
+from mobee.robot.mjcf.compiled import is_mjcf
 from mobee.robot.robot import Robot, Shape
 from mobee.robot.xml.node import read_xml
 
@@ -39,6 +40,11 @@ class Subject:
     def is_urdf(self) -> bool:
         """Whether the robot was read from a URDF, for which some remedies differ."""
         return any(".urdf:" in line for line in self.robot.where.values())
+
+    @cached_property
+    def is_mjcf(self) -> bool:
+        """Whether the robot was read from an MJCF file."""
+        return is_mjcf(Path(self.where("robot", self.robot.name).rpartition(":")[0]))
 
     def urdf_link(self, shape: str) -> str | None:
         """Return the URDF link of a shape; a fixed joint may join it to the robot's link.

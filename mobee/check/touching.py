@@ -180,6 +180,8 @@ def _ignoring(subject: Subject, first: str, second: str) -> str:
     if link1 and link2:
         return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
     links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
+    if subject.is_mjcf:
+        return f'<exclude body1="{links[first]}" body2="{links[second]}"/> in <contact>'
     return f'<ignore first="{links[first]}" second="{links[second]}"/>'
 
 
@@ -231,6 +233,10 @@ def world_contacts(subject: Subject) -> Iterator[Finding]:
 
 def _parting(subject: Subject, contact: Contact) -> str:
     """Return the remedy for two solids that collide at home."""
+    if subject.is_mjcf:
+        remedy = 'write a <key name="home" qpos="..."/> without contact, or correct a shape'
+        apart = "" if contact.second_link < 0 else f"; where only hulls overlap: {_ignoring(subject, contact.first, contact.second)}"
+        return remedy + apart
     if not subject.is_urdf:
         return "move the home, make a shape smaller, or correct where one is placed"
     remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'

@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
+from mobee.robot.mjcf.compiled import is_mjcf
+from mobee.robot.mjcf.menagerie import menagerie_file, menagerie_names
+from mobee.robot.mjcf.read import read_mjcf
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import CORNERS, Corners
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
@@ -25,28 +29,32 @@ def load_robot(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Robot:
-    """Load a shipped robot by name (see `shipped_robots`), or the robot of a zero-position .xml or a .urdf file.
+    """Load a shipped robot by name (see `shipped_robots`), or the robot of a zero-position .xml, a .urdf or an MJCF file.
 
     Args:
-        name_or_path: a shipped name, or the path of a file.
-        field: URDF only: distance [m] by which fields extend beyond the solids, one field for every solid; None: no fields.
-        meshes: URDF only: "hull" (the default) or "bounding", see `UrdfOptions`.
-        corners: URDF only: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
+        name_or_path: a shipped name, the path of a file, or with the package mujoco-menagerie a name of MuJoCo Menagerie.
+        field: URDF and MJCF: distance [m] by which fields extend beyond the solids, one field for every solid; None: no fields.
+        meshes: URDF and MJCF: "hull" (the default) or "bounding", see `UrdfOptions`.
+        corners: URDF and MJCF: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
         srdf: URDF only: the SRDF file; None: one beside the URDF or in ../srdf, if there is any, see docs/robots.md.
-        home: URDF only: the name of a <group_state> of the SRDF, or "zero"; None: see docs/robots.md.
+        home: the name of a <group_state> of the SRDF or of a keyframe of the MJCF, or "zero"; None: see docs/robots.md.
 
     Raises:
         UnknownName: with the nearest shipped name.
         InvalidValue: for an option that is not valid for the file.
         RobotFileError: with file, line, field and remedy.
+        NotInstalled: an MJCF file without the package mujoco.
     """
     path = find_file(name_or_path, ROBOTS, "robot")
-    if path.suffix.lower() == ".urdf":
-        return read_urdf(path, UrdfOptions(field, meshes or "hull", CORNERS if corners is None else corners, srdf, home))
+    reader = read_urdf if path.suffix.lower() == ".urdf" else read_mjcf if is_mjcf(path) else None
+    if reader is not None:
+        return reader(path, UrdfOptions(field, meshes or "hull", CORNERS if corners is None else corners, srdf, home))
     options = {"field": field, "meshes": meshes, "corners": corners, "srdf": srdf, "home": home}
     given = [name for name, value in options.items() if value is not None]
     if given:
-        raise InvalidValue(f"{given[0]}= is for .urdf files only, and {path} is none: zero-position XML has tags for it. Leave it out.")
+        raise InvalidValue(
+            f"{given[0]}= is for URDF and MJCF files only, and {path} is none: zero-position XML has tags for it. Leave it out."
+        )
     return read_robot(path)
 
 
@@ -60,7 +68,7 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
     if not isinstance(name_or_path, str | Path):
         raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")
     path, given = Path(name_or_path), str(name_or_path)
-    suffixes = ".xml or .urdf" if kind == "robot" else ".xml"
+    suffixes = ".xml, .mjcf or .urdf" if kind == "robot" else ".xml"
     if path.suffix.lower() == ".xacro":
         urdf = f"{path.stem.removesuffix('.urdf')}.urdf"
         raise RobotFileError(f"{path}: a xacro file must be converted to URDF first. Run: xacro {path.name} > {urdf}")
@@ -69,7 +77,11 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
             raise RobotFileError(f"{path}: no such file. Give a path to a file ({suffixes}), or a name: {', '.join(shipped(folder))}.")
         return path
     if given not in shipped(folder):
-        raise UnknownName(kind, given, shipped(folder))
+        found = menagerie_file(given) if kind == "robot" else None
+        if found is None:
+            near = difflib.get_close_matches(given, menagerie_names(), n=3) if kind == "robot" else ()
+            raise UnknownName(kind, given, (*shipped(folder), *near))
+        return found
     return folder / f"{given}.xml"
 
 

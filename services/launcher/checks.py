@@ -14,7 +14,7 @@ from typing import Any
 
 from bus_schema import keys
 from bus_schema.rpc import Empty, Stat
-from mobee.errors import MobeeError, OlderVersion, UnknownName
+from mobee.errors import MobeeError, OlderVersion, Simplified, UnknownName
 from mobee.robot.robot import Robot
 from services.common import rpc
 from services.common.config import ConfigError, nearest

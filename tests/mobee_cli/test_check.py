@@ -90,7 +90,7 @@ def test_a_urdf_is_checked_with_fields_and_an_srdf_of_its_own(tmp_path: Path, ca
     assert main(["check", str(arm), "--field", "0.03", "--meshes", "bounding", "--srdf", str(groups)]) == 0
     assert capsys.readouterr().out.endswith("toy: 2 parts, 2 motors, 2 joints, 2 shapes: nothing is wrong\n")
     assert main(["check", "katana", "--field", "0.03"]) == 2
-    assert "field= is for .urdf files" in capsys.readouterr().err
+    assert "field= is for URDF and MJCF files" in capsys.readouterr().err
 
 
 def test_the_srdf_that_was_found_and_the_home_in_it_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,7 +74,7 @@ def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsy
         (["icbu", "x.urdf"], BAD_INPUT, "Did you mean 'icub'?"),
         (["icub", "x.sdf"], BAD_INPUT, "x.sdf: OUT must end in .xml or .urdf"),
         (["icub", "nowhere/x.urdf"], BAD_INPUT, "there is no folder"),
-        (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for .urdf files"),
+        (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for URDF and MJCF files"),
         (["mine.urdf", "x.xml"], BAD_INPUT, "mine.urdf: no such file"),
     ],
 )

@@ -174,7 +174,7 @@ def test_a_robot_of_ones_own_reaches_with_its_end_and_without_a_table(arm: Path,
         (["--robot", "ikub"], "Did you mean 'icub'?"),
         (["--robot", "no.urdf"], "no.urdf: no such file"),
         (["--world", "tabel"], "Did you mean 'table'?"),
-        (["--field", "0.03"], "field= is for .urdf files"),
+        (["--field", "0.03"], "field= is for URDF and MJCF files"),
     ],
 )
 def test_a_robot_or_world_that_cannot_be_used_is_refused_in_one_line(

@@ -47,7 +47,7 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
     file, line, field and remedy, InvalidValue for options out of range; warns of elements that it ignores.
     """
     options = options or UrdfOptions()
-    _check(options)
+    check_options(options)
     root = read_xml(path)
     if root.tag != "robot":
         root.fail("root element", "this is not a URDF file", "Its root is <robot name=...>; run xacro first if it is made by it")
@@ -59,7 +59,8 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
     return _finish(root, name, tree, skeleton, _read_srdf(path, name, options, tree), options)
 
 
-def _check(options: UrdfOptions) -> None:
+def check_options(options: UrdfOptions) -> None:
+    """Raise InvalidValue for options out of range."""
     if options.field is not None and not 0 < options.field <= 1:
         raise InvalidValue(f"field={options.field!r} is no distance for a field. Give metres, such as field=0.03.")
     if options.meshes not in ("hull", "bounding"):
@@ -172,10 +173,10 @@ def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], option
     for link in sorted(skeleton.index, key=skeleton.index.__getitem__):
         index = skeleton.index[link]
         for found in reader.read(tree.links[link], index, skeleton.frames[link], part_of[index]):
-            shape = replace(found.shape, name=_free(found.shape.name, taken))
+            shape = replace(found.shape, name=free_name(found.shape.name, taken))
             both = [shape]
             if options.field is not None and shape.role == "solid":
-                both.append(grown(shape, options.field, _free(f"{shape.name}_field", taken)))
+                both.append(grown(shape, options.field, free_name(f"{shape.name}_field", taken)))
             for one in both:
                 where["shape", one.name] = _place(found.node)
                 if found.base:
@@ -185,11 +186,11 @@ def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], option
     return body
 
 
-def _free(name: str, taken: dict[str, int]) -> str:
+def free_name(name: str, taken: dict[str, int]) -> str:
     """Return the name, with a number appended if it is taken."""
     if name not in taken:
         taken[name] = 0
         return name
     while f"{name}_{taken[name]}" in taken:
         taken[name] += 1
-    return _free(f"{name}_{taken[name]}", taken)
+    return free_name(f"{name}_{taken[name]}", taken)

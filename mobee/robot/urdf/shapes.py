@@ -107,15 +107,19 @@ class ShapeReader:
                 self.known[key] = convex_hull(points, self.corners)
             except InvalidValue as error:
                 form.fail("filename", str(error), "Export the mesh again, or draw a box or cylinder instead")
-        vertices = self.known[key]
-        frame = Frame(shape.position, shape.rotation)
-        if self.meshes == "bounding":
-            fit = smallest(vertices)
-            place = frame @ Frame(fit.centre, fit.rotation)
-            return replace(shape, kind=fit.kind, size=fit.size, position=place.position, rotation=place.rotation)
-        centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
-        place = frame @ Frame(centre, np.eye(3))
-        return replace(shape, kind="convex", position=place.position, vertices=vertices - centre)
+        return hulled(shape, self.known[key], self.meshes)
+
+
+def hulled(shape: Shape, vertices: Array, meshes: Meshes) -> Shape:
+    """Return the shape as the convex hull of `vertices` (v, 3) m in its own frame, or as the smallest primitive around them."""
+    frame = Frame(shape.position, shape.rotation)
+    if meshes == "bounding":
+        fit = smallest(vertices)
+        place = frame @ Frame(fit.centre, fit.rotation)
+        return replace(shape, kind=fit.kind, size=fit.size, position=place.position, rotation=place.rotation)
+    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    place = frame @ Frame(centre, np.eye(3))
+    return replace(shape, kind="convex", position=place.position, vertices=vertices - centre)
 
 
 def _points(form: Node, path: Path) -> Array:

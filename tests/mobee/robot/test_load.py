@@ -51,7 +51,9 @@ def test_a_urdf_is_loaded_by_its_path_with_its_options(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("option", [{"field": 0.03}, {"meshes": "hull"}, {"srdf": "x.srdf"}])
 def test_options_of_a_urdf_are_refused_for_other_files(option: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValue, match=f"{next(iter(option))}= is for .urdf files only, and .*katana.xml is none.*Leave it out"):
+    with pytest.raises(
+        InvalidValue, match=f"{next(iter(option))}= is for URDF and MJCF files only, and .*katana.xml is none.*Leave it out"
+    ):
         load_robot("katana", **option)
 
 

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiles an MJCF file through the package mujoco, the only place that imports it, and gives names and kinds as text."""
+
+from __future__ import annotations
+
+import re
+import xml.sax
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import NotInstalled, RobotFileError
+from mobee.robot.urdf.frames import Frame
+from mobee.robot.xml.file import LineHandler, is_file, parse_content, read_content
+
+ROOT = "mujoco"  # the root element of an MJCF file
+
+
+class _RootTag(LineHandler):
+    """Notes the tag of the root element and reads no further."""
+
+    tag = ""
+
+    def startElement(self, name: str, attributes: object) -> None:
+        """Called by sax at the first element."""
+        self.tag = name
+        raise xml.sax.SAXException("enough")
+
+
+def is_mjcf(path: Path) -> bool:
+    """Return whether the root element of a file is <mujoco>; False for a file that is no XML."""
+    if path.suffix.lower() not in (".xml", ".mjcf") or not is_file(path):
+        return False
+    handler = _RootTag()
+    try:
+        parse_content(path, read_content(path), handler)
+    except (RobotFileError, xml.sax.SAXException):
+        pass  # its reader reports what is wrong with the file
+    return handler.tag == ROOT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compiled:
+    """A model as MuJoCo compiles it, with every hinge and slide at zero; lists are in the order of MuJoCo's ids.
+
+    `model`: the MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`: frames in the world's frame. `anchors`, `axes`:
+    (joints, 3) of the joints in the same frame. `names[kind]`: of bodies, joints, geoms, sites, keys and so on; those without a name get
+    one from their kind and number. `lines[kind]`: of the file, 0 where MuJoCo does not record one.
+    """
+
+    path: Path
+    model: Any
+    bodies: tuple[Frame, ...]
+    inertial: tuple[Frame, ...]
+    geoms: tuple[Frame, ...]
+    sites: tuple[Frame, ...]
+    anchors: Array
+    axes: Array
+    names: dict[str, tuple[str, ...]]
+    lines: dict[str, tuple[int, ...]]
+    joint_kinds: tuple[str, ...]  # free, ball, slide, hinge
+    geom_kinds: tuple[str, ...]  # plane, hfield, sphere, capsule, ellipsoid, cylinder, box, mesh, sdf
+    equality_kinds: tuple[str, ...]  # connect, weld, joint, tendon, ...
+    transmissions: tuple[str, ...]  # of actuators: joint, jointinparent, tendon, site, ...
+    wraps: tuple[str, ...]  # elements of tendons: joint, site, sphere, ...
+
+    def where(self, kind: str, index: int) -> str:
+        """Return file and line of an element."""
+        return f"{self.path}:{max(self.lines[kind][index], 1)}"
+
+
+KINDS = ("body", "joint", "geom", "site", "key", "equality", "actuator", "tendon")
+
+
+def compile_mjcf(path: Path) -> Compiled:
+    """Compile an MJCF file with its includes, defaults and meshes.
+
+    Raises RobotFileError with MuJoCo's message if MuJoCo refuses the file, NotInstalled without the package mujoco.
+    """
+    try:
+        import mujoco
+    except ModuleNotFoundError as error:
+        raise NotInstalled(f'{path} is an MJCF file, which is read through the package mujoco: pip install "mobee[mjcf]"') from error
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)  # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        model = spec.compile()
+    except ValueError as error:
+        problem = " ".join(str(error).split()).rstrip(".")
+        line = re.search(r"line (\d+)", problem)
+        place = f"{path}:{line.group(1)}" if line else f"{path}"
+        raise RobotFileError(f"{place}: MuJoCo refuses this file: {problem}. {_remedy(problem)}.") from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+    data = mujoco.MjData(model)
+    kinds = _kinds(mujoco.mjtJoint, "mjJNT_", model.jnt_type)
+    moving = [kind in ("hinge", "slide") for kind in kinds]
+    data.qpos[model.jnt_qposadr[moving]] = 0.0
+    mujoco.mj_kinematics(model, data)
+    names, lines = _named(model, mujoco), _lines(spec)
+    return Compiled(
+        path=path,
+        model=model,
+        bodies=_frames(data.xpos, data.xmat),
+        inertial=_frames(data.xipos, data.ximat),
+        geoms=_frames(data.geom_xpos, data.geom_xmat),
+        sites=_frames(data.site_xpos, data.site_xmat),
+        anchors=data.xanchor.copy(),
+        axes=data.xaxis.copy(),
+        names=names,
+        lines={kind: lines.get(kind, ()) if len(lines.get(kind, ())) == len(own) else (0,) * len(own) for kind, own in names.items()},
+        joint_kinds=kinds,
+        geom_kinds=_kinds(mujoco.mjtGeom, "mjGEOM_", model.geom_type),
+        equality_kinds=_kinds(mujoco.mjtEq, "mjEQ_", model.eq_type),
+        transmissions=_kinds(mujoco.mjtTrn, "mjTRN_", model.actuator_trntype),
+        wraps=_kinds(mujoco.mjtWrap, "mjWRAP_", model.wrap_type),
+    )
+
+
+def _remedy(problem: str) -> str:
+    if "opening file" in problem or "file not found" in problem.lower():
+        return "Put the file where the MJCF names it, relative to the MJCF's folder and its meshdir"
+    if "nknown file extension" in problem or "decoder" in problem:
+        return "Convert the mesh to .stl or .obj"
+    return "Correct it there; `python -m mujoco.viewer --mjcf FILE` shows a file that MuJoCo accepts"
+
+
+def _kinds(enumeration: Any, prefix: str, values: Sequence[int]) -> tuple[str, ...]:
+    return tuple(enumeration(int(value)).name.removeprefix(prefix).lower() for value in values)
+
+
+def _frames(positions: Array, rotations: Array) -> tuple[Frame, ...]:
+    return tuple(Frame(p.copy(), r.reshape(3, 3).copy()) for p, r in zip(positions, rotations, strict=True))
+
+
+def _named(model: Any, mujoco: Any) -> dict[str, tuple[str, ...]]:
+    """Return the names of all elements of each kind, each once."""
+    counts = (model.nbody, model.njnt, model.ngeom, model.nsite, model.nkey, model.neq, model.nu, model.ntendon)
+    found = {}
+    for kind, count in zip(KINDS, counts, strict=True):
+        code = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        given = [mujoco.mj_id2name(model, code, index) for index in range(count)]
+        taken = set(filter(None, given))
+        found[kind] = tuple(name or _unused(f"{kind}_{index}", taken) for index, name in enumerate(given))
+    return found
+
+
+def _unused(name: str, taken: set[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _lines(spec: Any) -> dict[str, tuple[int, ...]]:
+    """Return the line of each element that the specification records, as its text "line 12" gives it."""
+    tables = {"body": spec.bodies, "joint": spec.joints, "geom": spec.geoms, "site": spec.sites, "key": spec.keys}
+    found = {}
+    for kind, elements in tables.items():
+        numbers = np.zeros(len(elements), dtype=int)
+        for element in elements:
+            word = element.info.rpartition("line ")[2].split()
+            if word and word[0].isdecimal() and 0 <= element.id < len(numbers):
+                numbers[element.id] = int(word[0])
+        found[kind] = tuple(numbers.tolist())
+    return found

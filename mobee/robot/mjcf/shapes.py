@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Solids of an MJCF model from the geoms that can collide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue, RobotFileError
+from mobee.robot.mjcf.compiled import Compiled
+from mobee.robot.robot import Shape
+from mobee.robot.urdf.hull import Corners, convex_hull
+from mobee.robot.urdf.shapes import Meshes, hulled
+from mobee.robot.xml.body import MOST_SHAPES
+
+WITHOUT_BODY = ("plane", "hfield")  # ground, which belongs into a world
+
+
+def read_solids(compiled: Compiled, link_of: list[int], meshes: Meshes, corners: Corners) -> Iterator[tuple[Shape, int]]:
+    """Yield the solid of each geom that can collide, and its number; the ground is left out.
+
+    `link_of`: the robot's link of each body. Geoms that are drawn only (contype and conaffinity 0, in no contact pair) are left out, unless
+    there are no others.
+    """
+    known: dict[int, Array] = {}
+    chosen = colliding(compiled)
+    if len(chosen) > MOST_SHAPES:
+        raise RobotFileError(f"{compiled.path}: more than {MOST_SHAPES} geoms collide. Join small geoms, or set their contype to 0.")
+    for geom in chosen:
+        frame, size = compiled.geoms[geom], compiled.model.geom_size[geom]
+        link = link_of[int(compiled.model.geom_bodyid[geom])]
+        shape = Shape(compiled.names["geom"][geom], link, "sphere", (), frame.position, frame.rotation, "solid", "all")
+        yield _shaped(compiled, geom, shape, size, known, meshes, corners), geom
+
+
+def colliding(compiled: Compiled) -> list[int]:
+    """Return the geoms that can collide, without ground."""
+    model = compiled.model
+    solid = [geom for geom, kind in enumerate(compiled.geom_kinds) if kind not in WITHOUT_BODY]
+    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
+    found = [geom for geom in solid if model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired]
+    return found or solid
+
+
+def _shaped(compiled: Compiled, geom: int, shape: Shape, size: Array, known: dict[int, Array], meshes: Meshes, corners: Corners) -> Shape:
+    x, y, z = map(float, size)
+    match compiled.geom_kinds[geom]:
+        case "sphere":
+            return replace(shape, size=(x,))
+        case "capsule":
+            return replace(shape, kind="capsule", size=(x, 2.0 * y))
+        case "cylinder":
+            return replace(shape, kind="cylinder", size=(x, 2.0 * y))
+        case "box":
+            return replace(shape, kind="box", size=(2.0 * x, 2.0 * y, 2.0 * z))
+        case "ellipsoid":
+            return hulled(shape, around_ball() * size, meshes)
+    return hulled(shape, _mesh(compiled, geom, known, corners), meshes)
+
+
+def _mesh(compiled: Compiled, geom: int, known: dict[int, Array], corners: Corners) -> Array:
+    """Return the vertices (v, 3) m of the hull of a geom's mesh, in the geom's frame."""
+    model = compiled.model
+    mesh = int(model.geom_dataid[geom])
+    if mesh < 0:
+        raise RobotFileError(
+            f"{compiled.where('geom', geom)}: a geom of type {compiled.geom_kinds[geom]} has no mesh. Draw a mesh, box or capsule instead."
+        )
+    if mesh not in known:
+        start = int(model.mesh_vertadr[mesh])
+        points = model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])].astype(np.float64)
+        try:
+            known[mesh] = convex_hull(points, corners)
+        except InvalidValue as error:
+            raise RobotFileError(
+                f"{compiled.where('geom', geom)}: {error}. Export the mesh again, or draw a box or capsule instead."
+            ) from None
+    return known[mesh]
+
+
+def around_ball() -> Array:
+    """Return the corners (32, 3) of a polyhedron around the ball of radius 1: a dodecahedron's and an icosahedron's together."""
+    golden = (1.0 + np.sqrt(5.0)) / 2.0
+    twelve = [np.roll((0.0, a, b), k) for a, b in product((-1.0, 1.0), (-golden, golden)) for k in range(3)]
+    twenty = [
+        *product((-1.0, 1.0), repeat=3),
+        *(np.roll((0.0, a, b), k) for a, b in product((-1 / golden, 1 / golden), (-golden, golden)) for k in range(3)),
+    ]
+    corners = np.array([*twelve, *twenty])
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    from scipy.spatial import ConvexHull  # 0.3 s, and only robots with ellipsoids need it
+
+    nearest = float(-ConvexHull(corners).equations[:, 3].max())
+    held: Array = corners / nearest
+    return held
