@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mobee.control import Command, Controller, Forces, Gains, Reacher, ReachPath, Term, constraint_forces, reach_path
+    from mobee.derivation import Derived, derive
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent, run
     from mobee.learning.lattice import Lattice
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "mobee.control": "Command Controller Forces Gains ReachPath Reacher Term constraint_forces reach_path",
+    "mobee.derivation": "Derived derive",
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent run",
     "mobee.learning.lattice": "Lattice",
@@ -89,6 +91,7 @@ __all__ = [
     "Controller",
     "CuriousAgent",
     "CuriousSettings",
+    "Derived",
     "Forces",
     "Gains",
     "Geometry",
@@ -135,6 +138,7 @@ __all__ = [
     "constraint_forces",
     "costs",
     "cylinder",
+    "derive",
     "join_robots",
     "load_roadmap",
     "load_robot",

@@ -33,7 +33,7 @@ class Lattice(Space):
         neighbours: number of nearest samples (in fractions of the range) that each state has actions to, or "equidistant":
             the samples one step away along one joint.  None: 16, or all others if there are fewer.
         tie_seed: seed of the draw among equally near samples at the last rank.
-        rest: fraction of its range at which each other motor of the part stays.
+        rest: fraction of its range at which each other motor of the part stays; or one for each motor of the part.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
@@ -46,7 +46,7 @@ class Lattice(Space):
         levels: Levels = (0.25, 0.5, 0.75),
         neighbours: int | Literal["equidistant"] | None = None,
         tie_seed: int = 0,
-        rest: float = 0.5,
+        rest: float | Sequence[float] = 0.5,
     ) -> None:
         _, indices = checked_joints(robot, joints)
         self.levels = _checked_levels(levels, joints)

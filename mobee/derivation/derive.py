@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Derives from any robot what curious agents need: arms as parts, joints to learn, limits, home, tested pairs and fields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mobee.control.gains import Gains
+from mobee.derivation.chains import Chain, chains
+from mobee.derivation.joints import bounded, joints_to_learn, movements
+from mobee.derivation.names import names_of
+from mobee.derivation.pairs import free_home, often_touching, reach_of, with_fields, without_links
+from mobee.errors import InvalidValue
+from mobee.learning.lattice import Lattice
+from mobee.robot.robot import Clause, Part, Robot
+
+MOST_ARMS = 4  # that learn at once
+LEAST_ARM = 0.25  # of the movement of the best arm's joint: what moves its end less is no arm
+LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A part that learns: `motors` is its chain, `joints` span its states, `movement` is how far its best joint moves its end [m]."""
+
+    part: str
+    motors: tuple[str, ...]
+    joints: tuple[str, ...]
+    movement: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Derived:
+    """A robot that curious agents can use at once, and what was derived.
+
+    `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of
+    contact. `left_out`: pairs of links that are tested no more. `field`: width of the fields that were added [m], 0 for none.
+    `gains`: of the control law, the default ones with contacts for the size of the robot.
+    """
+
+    robot: Robot
+    arms: tuple[Arm, ...]
+    limited: tuple[str, ...]
+    home_moved: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
+    field: float
+    gains: Gains
+
+    def rest(self, arm: Arm) -> tuple[float, ...]:
+        """Return the home of each motor of the arm's part as a fraction of its range: where those stay that are not learned."""
+        part = self.robot.parts[arm.part]
+        low, high = self.robot.limits[part.slice].T
+        return tuple(np.clip((self.robot.home[part.slice] - low) / (high - low), 0.0, 1.0).round(6).tolist())
+
+    def space(self, arm: Arm) -> Lattice:
+        """Return the states and actions of an arm: three levels of each joint, the part's other motors at home."""
+        return Lattice(self.robot, arm.joints, rest=self.rest(arm))
+
+
+def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed: int = 0) -> Derived:
+    """Derive arms, joints to learn, limits, home, tested pairs and fields of a robot.
+
+    A robot whose file makes parts keeps them, and one that has fields keeps its fields, its pairs and its home.
+
+    Args:
+        robot: any robot.
+        parts: the motors to learn of each part that should learn, in place of those that are derived; a part that the robot does not
+            have is made of these motors.
+        seed: of the random poses over which contacts and movements are measured.
+
+    Raises:
+        InvalidValue: no motor moves anything, or `parts` names motors of several parts.
+        UnknownName: `parts` names a motor that the robot does not have.
+    """
+    robot, limited = bounded(robot)
+    if parts:
+        robot, arms = _requested(robot, parts)
+    else:
+        robot, arms = _arms(robot, seed)
+    moved: tuple[str, ...] = ()
+    left_out: set[frozenset[int]] = set()
+    width, gains = 0.0, Gains.default()
+    if not any(shape.role == "field" for shape in robot.shapes):
+        left_out = often_touching(robot, seed)
+        robot = without_links(robot, left_out, LEFT_OUT)
+        home, stuck = free_home(robot, seed)
+        moved = tuple(name for name, one, other in zip(robot.motors, robot.home, home, strict=True) if one != other)
+        table = tuple(replace(motor, home=float(place)) for motor, place in zip(robot.motor_table, home, strict=True))
+        robot = without_links(replace(robot, motor_table=table), stuck, LEFT_OUT)
+        left_out |= stuck
+        reach = _reach(robot, arms)
+        robot, width = with_fields(robot, reach, seed)
+        gains = Gains.for_reach(reach)
+    names = tuple(sorted((robot.links[min(pair)], robot.links[max(pair)]) for pair in left_out))
+    return Derived(robot, arms, tuple(limited), moved, names, width, gains)
+
+
+def _reach(robot: Robot, arms: Sequence[Arm]) -> float:
+    """Return the length [m] of the longest arm at zero pose, from its first joint to the farthest point that it carries."""
+    lengths = []
+    for arm in arms:
+        first = min(joint for name in arm.motors for joint, _, _ in robot.motor_table[robot.motor_index(name)].joints)
+        links = {first + 1}
+        for index, joint in enumerate(robot.joints):
+            if joint.parent in links:
+                links.add(index + 1)
+        lengths.append(reach_of(robot, links, first))
+    return max(lengths)
+
+
+def _arms(robot: Robot, seed: int) -> tuple[Robot, tuple[Arm, ...]]:
+    """Return the robot with a part for each arm, unless it has parts, and the arms that learn."""
+    drive = {joint: index for index, motor in enumerate(robot.motor_table) for joint, _, _ in motor.joints}
+    found: list[tuple[Arm, Chain]] = []
+    taken: set[int] = set()
+    for chain in chains(robot):
+        motors = [k for k in dict.fromkeys(drive[joint] for joint in chain.joints if joint in drive) if k not in taken]
+        part = _main_part(robot, motors)
+        motors = [k for k in motors if robot.motor_table[k].part == part]
+        if motors:
+            taken |= set(motors)
+            moved = movements(robot, chain, motors, seed)
+            joints = joints_to_learn(robot, motors, moved) if moved.max() > 0.0 else ()
+            found.append((Arm(part, tuple(robot.motors[k] for k in motors), joints, float(moved.max())), chain))
+    several = [one for one in found if len(one[0].motors) > 1] or found
+    most = max((arm.movement for arm, _ in several), default=0.0)
+    able = [one for one in several if one[0].movement >= LEAST_ARM * most > 0.0]
+    if not able:
+        raise InvalidValue(f"{robot.name!r} has no chain of joints whose motors move its end: there is nothing to learn.")
+    if len(robot.parts) == 1:
+        robot, able = _parted(robot, able, drive)
+    best: dict[str, Arm] = {}
+    for arm, _ in able:
+        if arm.part not in best or arm.movement > best[arm.part].movement:
+            best[arm.part] = arm
+    learning = sorted(best.values(), key=lambda arm: -arm.movement)[:MOST_ARMS]
+    return robot, tuple(arm for arm in best.values() if arm in learning)
+
+
+def _main_part(robot: Robot, motors: Sequence[int]) -> str:
+    """Return the part that most of these motors belong to; "" for no motors."""
+    parts = [robot.motor_table[motor].part for motor in motors]
+    return max(dict.fromkeys(parts), key=parts.count, default="")
+
+
+def _parted(robot: Robot, arms: list[tuple[Arm, Chain]], drive: dict[int, int]) -> tuple[Robot, list[tuple[Arm, Chain]]]:
+    """Return the robot with a part for each arm, one for each hand, and one for all else; and the arms with their parts."""
+    names = names_of([arm.motors for arm, _ in arms])
+    groups: dict[str, tuple[str, ...]] = {}
+    dealt = {motor for arm, _ in arms for motor in arm.motors}
+    for name, (arm, chain) in zip(names, arms, strict=True):
+        groups[name] = arm.motors
+        hand = tuple(dict.fromkeys(robot.motors[drive[joint]] for joint in chain.hand if joint in drive))
+        hand = tuple(motor for motor in hand if motor not in dealt)
+        dealt |= set(hand)
+        if hand:
+            groups["hand" if len(arms) == 1 else f"{name}_hand"] = hand
+    left = tuple(motor for motor in robot.motors if motor not in dealt)
+    if left:
+        groups["body"] = left
+    return _regrouped(robot, groups), [(replace(arm, part=name), chain) for name, (arm, chain) in zip(names, arms, strict=True)]
+
+
+def _regrouped(robot: Robot, groups: Mapping[str, Sequence[str]]) -> Robot:
+    """Return the robot with these parts; its motors come in their order, and each shape belongs to the part that moves its link."""
+    order = [robot.motor_index(name) for motors in groups.values() for name in motors]
+    of = {name: part for part, motors in groups.items() for name in motors}
+    table = tuple(replace(robot.motor_table[k], part=of[robot.motors[k]]) for k in order)
+    parts, start = {}, 0
+    for part, motors in groups.items():
+        parts[part] = Part(part, tuple(motors), start)
+        start += len(motors)
+    driven = {joint: motor.part for motor in table for joint, _, _ in motor.joints}
+    owner = [next(iter(groups))]
+    for index, joint in enumerate(robot.joints):
+        owner.append(driven.get(index, owner[joint.parent]))
+    shapes = tuple(replace(shape, part=owner[shape.link]) for shape in robot.shapes)
+    clauses = tuple(Clause(of[robot.motors[int(np.flatnonzero(clause.a[0])[0])]], clause.a[:, order], clause.b) for clause in robot.clauses)
+    return replace(robot, motor_table=table, parts=parts, shapes=shapes, clauses=clauses)
+
+
+def _requested(robot: Robot, wanted: Mapping[str, Sequence[str]]) -> tuple[Robot, tuple[Arm, ...]]:
+    """Return the robot with the requested parts, and their arms."""
+    for part, motors in wanted.items():
+        if not motors:
+            raise InvalidValue(f"part {part!r} has no motors: name those that it should learn.")
+        of = {robot.motor_table[robot.motor_index(name)].part for name in motors}
+        if part in robot.parts and of != {part}:
+            raise InvalidValue(f"part {part!r} has not all of {', '.join(motors)}. It has: {', '.join(robot.parts[part].motors)}.")
+    unknown = {part: tuple(motors) for part, motors in wanted.items() if part not in robot.parts}
+    if unknown:
+        dealt = [name for motors in unknown.values() for name in motors]
+        if len(set(dealt)) < len(dealt):
+            raise InvalidValue(f"a motor is named twice in {', '.join(unknown)}: each motor belongs to one part.")
+        rest = {part.name: tuple(name for name in part.motors if name not in dealt) for part in robot.parts.values()}
+        robot = _regrouped(robot, unknown | {name: motors for name, motors in rest.items() if motors})
+    return robot, tuple(Arm(part, robot.parts[part].motors, tuple(motors)) for part, motors in wanted.items())

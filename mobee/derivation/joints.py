@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chooses the joints of an arm that move its end most, and limits for joints that turn without end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.derivation.chains import Chain, end_point
+from mobee.model.kinematics import link_transforms
+from mobee.robot.motor_units import slides
+from mobee.robot.robot import Robot
+
+MOST_JOINTS = 4  # of one arm: 3 levels of each make 81 states
+LEAST_SHARE = 0.1  # of the movement of the best joint: one that moves the end less is left out
+POSES, LEVELS = 16, 5  # random poses, and places in the range of the joint, over which movement is measured
+TURN = 2.0 * np.pi
+
+
+def bounded(robot: Robot) -> tuple[Robot, list[str]]:
+    """Return the robot with half a turn to each side for motors whose range is a turn or more, and their names.
+
+    In a larger range different positions are the same pose, so the states of a lattice would be too.
+    """
+    changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
+    table = []
+    for motor in robot.motor_table:
+        if motor.name in changed:
+            scale = max(abs(scale) for _, scale, _ in motor.joints)
+            centre = motor.home if abs(motor.home) > np.pi / scale else 0.0
+            limits = np.clip(centre + np.array([-np.pi, np.pi]) / scale, *motor.limits)
+            motor = replace(motor, limits=limits, home=float(np.clip(motor.home, *limits)))
+        table.append(motor)
+    moved = {j: np.sort(scale * motor.limits + shift) for motor in table for j, scale, shift in motor.joints}
+    joints = tuple(replace(joint, limits=moved.get(index, joint.limits)) for index, joint in enumerate(robot.joints))
+    narrowed = [name for name, one, other in zip(robot.motors, robot.motor_table, table, strict=True) if np.any(one.limits != other.limits)]
+    return replace(robot, joints=joints, motor_table=tuple(table)), narrowed
+
+
+def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> Array:
+    """Return how far each motor moves the end of a chain over its range [m], the mean over random poses of the others."""
+    low, high = robot.limits.T
+    point = end_point(robot, chain)
+    poses = np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
+    found = np.zeros(len(motors))
+    for number, motor in enumerate(motors):
+        q = np.repeat(poses[:, None], LEVELS, axis=1)
+        q[:, :, motor] = np.linspace(low[motor], high[motor], LEVELS)
+        transforms = link_transforms(robot, q)[..., chain.end, :, :]
+        places = transforms[..., :3, :3] @ point + transforms[..., :3, 3]  # (POSES, LEVELS, 3)
+        apart = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
+        found[number] = apart.max(axis=(1, 2)).mean()
+    return found
+
+
+def joints_to_learn(robot: Robot, motors: Sequence[int], moved: Array) -> tuple[str, ...]:
+    """Return the motors that move the end most, at most MOST_JOINTS, in the order given; `moved`: as `movements` returns it."""
+    best = [k for k in np.argsort(-moved, kind="stable")[:MOST_JOINTS] if moved[k] >= LEAST_SHARE * moved.max()]
+    return tuple(robot.motors[motors[k]] for k in sorted(best))

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pairs that touch too often to be tested, a home without contacts, and fields with their pairs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.derivation.chains import corners_of
+from mobee.model.model import Model
+from mobee.robot.motor_units import angle_unit, outside_zones, slides
+from mobee.robot.robot import LinkPair, Robot, Shape
+from mobee.robot.urdf.hull import convex_hull
+from mobee.robot.urdf.shapes import grown
+
+POSES = 300  # random ones
+OFTEN = 0.5  # of them: solids that touch in more overlap by design, or only as hulls
+FIELD_OFTEN = 0.6  # the same for fields, which would push there nearly always
+FIELD_SHARE = 0.06  # of the robot's reach: the width of its fields
+NARROWEST, WIDEST = 0.005, 0.06  # m
+ROUNDS, DRAWS = 8, 128  # of the search for a home
+
+
+def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Robot:
+    """Return the robot without the tests of these pairs of links."""
+    link = np.array([shape.link for shape in robot.shapes], dtype=np.intp)
+
+    def kept(table: Ints) -> Ints:
+        return table[[frozenset(link[pair].tolist()) not in pairs for pair in table]] if len(table) else table
+
+    untested = dict.fromkeys(pairs, reason) | dict(robot.untested)
+    return replace(robot, solid_pairs=kept(robot.solid_pairs), field_pairs=kept(robot.field_pairs), untested=untested)
+
+
+def often_touching(robot: Robot, seed: int) -> set[LinkPair]:
+    """Return the pairs of links whose solids touch in more than OFTEN of random poses."""
+    counts = _counted(replace(robot, field_pairs=robot.field_pairs[:0]), seed)
+    links: Counter[LinkPair] = Counter()
+    for (first, second), count in counts.items():
+        pair = frozenset((robot.shapes[first].link, robot.shapes[second].link))
+        links[pair] = max(links[pair], count)
+    return {pair for pair, count in links.items() if count > OFTEN * POSES}
+
+
+def _counted(robot: Robot, seed: int) -> Counter[tuple[int, int]]:
+    """Return in how many of POSES random poses each pair of shapes touches."""
+    low, high = robot.limits.T
+    poses = np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
+    table = Model(robot).evaluate(poses).table.numbers
+    return Counter(tuple(sorted(pair)) for pair in table[:, [2, 3]].tolist())
+
+
+def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
+    """Return a home (n,) where no solids touch, near that of the file, and the pairs of links for which none was found.
+
+    Only the motors between links that touch are moved, to random places that are farther from the file's home in each round.
+    """
+    solids = replace(robot, field_pairs=robot.field_pairs[:0])
+    model, rng = Model(solids), np.random.default_rng(seed)
+    inner = _inside(robot)
+    best, touching = robot.home.copy(), _touching(model, robot.home)
+    for round_ in range(ROUNDS):
+        if not touching:
+            break
+        movable = _between(robot, touching)
+        reach = (round_ + 1) / ROUNDS * np.ptp(inner, axis=1)
+        draws = np.repeat(best[None], DRAWS, axis=0)
+        draws[:, movable] += rng.uniform(-1.0, 1.0, (DRAWS, len(movable))) * reach[movable]
+        draws[:, movable] = np.clip(draws[:, movable], *inner[movable].T)
+        counts = np.asarray(model.evaluate(draws).count)
+        apart = np.abs((draws - robot.home) / np.maximum(np.ptp(robot.limits, axis=1), 1e-9)).sum(axis=1)
+        chosen = int(np.lexsort((apart, counts))[0])
+        if counts[chosen] < len(model.evaluate(best).contacts):
+            best, touching = draws[chosen], _touching(model, draws[chosen])
+    return best, touching
+
+
+def _inside(robot: Robot) -> Array:
+    """Return the range of each motor between its limit zones, (n, 2)."""
+    found = []
+    for motor in robot.motor_table:
+        unit = angle_unit(motor.limits, slides(robot, motor))
+        found.append([outside_zones(float(end), motor.limits, unit) for end in motor.limits])
+    return np.array(found)
+
+
+def _touching(model: Model, q: Array) -> set[LinkPair]:
+    links = {shape.name: shape.link for shape in model.robot.shapes}
+    return {frozenset((links[contact.first], links[contact.second])) for contact in model.evaluate(q).contacts}
+
+
+def _between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
+    """Return the motors that move links of a pair against each other, the indices in ascending order."""
+    moving: set[int] = set()
+    for pair in pairs:
+        ways = [_above(robot, link) for link in pair]
+        moving |= ways[0] ^ ways[1]
+    motors = np.flatnonzero(robot.coupling[0][sorted(moving)].any(axis=0))
+    return motors
+
+
+def _above(robot: Robot, link: int) -> set[int]:
+    joints = set()
+    while link:
+        joints.add(link - 1)
+        link = robot.joints[link - 1].parent
+    return joints
+
+
+def with_fields(robot: Robot, reach: float, seed: int) -> tuple[Robot, float]:
+    """Return the robot with a field around each solid, and the width of the fields [m].
+
+    Fields are tested where their solids are, but for pairs that meet at home, or in more than FIELD_OFTEN of random poses; for
+    these a narrower field is tried, of half the width.
+    """
+    width = float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
+    left = robot.solid_pairs
+    for size in (width, width / 4.0):
+        robot, left = _with_fields(robot, left, size, "" if size == width else "_near", seed)
+    return robot, width
+
+
+def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int) -> tuple[Robot, Ints]:
+    """Add fields of one width for these pairs of solids; return the robot and the pairs for which the fields meet too often."""
+    needed = sorted(set(pairs.ravel().tolist()))
+    fields = [_field(robot.shapes[index], width, suffix) for index in needed]
+    number = {index: len(robot.shapes) + k for k, index in enumerate(needed)}
+    base = {number[index] for index in needed if index in robot.base_shapes}
+    wanted = np.array([[number[a], number[b]] for a, b in pairs.tolist()], dtype=np.intp).reshape(-1, 2)
+    grown_robot = replace(robot, shapes=(*robot.shapes, *fields), base_shapes=robot.base_shapes | base)
+    trial = replace(grown_robot, solid_pairs=robot.solid_pairs[:0], field_pairs=wanted)
+    met = _counted(trial, seed)
+    often = {pair for pair, count in met.items() if count > FIELD_OFTEN * POSES}
+    names = {shape.name: index for index, shape in enumerate(trial.shapes)}
+    often |= {(min(pair), max(pair)) for c in Model(trial).evaluate(robot.home).contacts for pair in [(names[c.first], names[c.second])]}
+    meets = np.array([(min(pair), max(pair)) in often for pair in wanted.tolist()], dtype=bool)
+    kept = np.concatenate([robot.field_pairs.reshape(-1, 2), wanted[~meets]])
+    return replace(grown_robot, field_pairs=kept), pairs[meets]
+
+
+ICOSAHEDRON = np.array([np.roll((0.0, a, b), k) for a in (-1.0, 1.0) for b in (-1.618034, 1.618034) for k in range(3)]) / 1.511523
+"""Corners (12, 3) of an icosahedron around the ball of radius 1."""
+FIELD_CORNERS = 32
+
+
+def _field(solid: Shape, width: float, suffix: str) -> Shape:
+    """Return the field that reaches `width` [m] farther than a solid; around a hull it is a hull, closer than a capsule would be."""
+    name = f"{solid.name}_field{suffix}"
+    if solid.vertices is None:
+        return grown(solid, width, name)
+    cloud = (solid.vertices[:, None] + width * ICOSAHEDRON).reshape(-1, 3)
+    return replace(solid, name=name, role="field", vertices=convex_hull(cloud, FIELD_CORNERS))
+
+
+def reach_of(robot: Robot, links: Collection[int], joint: int) -> float:
+    """Return the distance [m] from a joint to the farthest point of these links at zero pose."""
+    points = [corners_of(shape) for shape in robot.shapes if shape.link in links]
+    if not points:
+        return 0.0
+    return float(np.linalg.norm(np.concatenate(points) - robot.joints[joint].point, axis=1).max())
