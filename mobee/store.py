@@ -35,22 +35,31 @@ class AgentFile:
 
     def bind(self, settings: dict[str, Any]) -> None:
         """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
-        given = {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
+        given = _texts(settings)
         with explained(self.path), transaction(self._db):
             known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
             if not known:
-                self._db.executemany("INSERT INTO meta VALUES (?, ?, ?)", [(self.agent, key, value) for key, value in given.items()])
+                self._record(given)
                 return
+        if CONTINUED in known:  # a fact of the record, which no agent is given
+            given[CONTINUED] = known[CONTINUED]
+        self._require_equal(self.path, known, given)
+
+    def _record(self, given: dict[str, str]) -> None:
+        self._db.executemany("INSERT INTO meta VALUES (?, ?, ?)", [(self.agent, key, value) for key, value in given.items()])
+
+    def _require_equal(self, path: Path, known: dict[str, str], given: dict[str, str]) -> None:
+        """Raise MobeeError unless the settings on record in a file are those given, both as JSON."""
         if missing := sorted(given.keys() - known.keys()):
             raise MobeeError(
-                f"{self.path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, or on a plant "
+                f"{path}: {self.agent} has no {', '.join(missing)} on record: it was written by an earlier version, or on a plant "
                 "that does not say what it is. `mobee plan` and `mobee export` read it; to learn on, use another file."
             )
         for key in sorted(known):
             if known[key] != given.get(key):
                 then, now = _differing(json.loads(known[key]), json.loads(given.get(key, "null")))
                 raise MobeeError(
-                    f"{self.path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
+                    f"{path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
                     "A run goes on only with the settings it began with: use those, or another file."
                 )
 
@@ -82,7 +91,20 @@ def _differing(then: Any, now: Any) -> tuple[Any, Any]:
     return {key: pair[0] for key, pair in pairs.items()}, {key: pair[1] for key, pair in pairs.items()}
 
 
+def _texts(settings: dict[str, Any]) -> dict[str, str]:
+    return {key: json.dumps(value, sort_keys=True) for key, value in settings.items()}
+
+
 STORE = "transitions.sqlite"  # of a run, in its folder
+
+
+def store_of(run: Path) -> Path:
+    """Return the file of transitions of a run: itself, or the one in the folder."""
+    return run / STORE if run.is_dir() else run
+
+
+CONTINUED = "continued"  # key of the record of an agent that began with the transitions of another file
+PLANT = "plant"  # key of the plant's settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +157,27 @@ class TransitionStore(AgentFile):
         with explained(self.path):
             self._db.execute(f"INSERT INTO transitions VALUES ({', '.join('?' * len(row))})", row)
         self._last = transition.n
+
+    def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
+        """Begin with a copy of this agent's transitions in another file; nothing is done if this file has a record of the agent.
+
+        They must have been made with the same settings, but for those of the plant, which may be another one: offline and live. The
+        record keeps, as "continued", how many there were and the settings of their plant. Raises MobeeError.
+        """
+        if self._last or self.settings():
+            return
+        with TransitionStore(source, self.agent, read_only=True) as other:
+            known, agents = other.settings(), other.agents()
+            if self.agent not in agents:
+                raise MobeeError(f"{source}: holds no transitions of {self.agent}. It holds those of {', '.join(agents) or 'no agent'}.")
+            origin = {"transitions": other._last, "before": known.pop(CONTINUED, None), "plant": known.pop(PLANT, None)}
+            with explained(other.path):
+                rows = other._db.execute("SELECT * FROM transitions WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
+        self._require_equal(Path(source), _texts(known), {key: text for key, text in _texts(settings).items() if key != PLANT})
+        with explained(self.path), transaction(self._db):
+            self._record(_texts(settings | {CONTINUED: origin}))
+            self._db.executemany(f"INSERT INTO transitions VALUES ({', '.join('?' * len(rows[0]))})", rows)
+        self._last = len(rows)
 
     def load(self, agent: str | None = None) -> list[Transition]:
         """Return all transitions of this agent, or of another one in the file, in order."""

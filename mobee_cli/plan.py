@@ -14,7 +14,7 @@ from mobee.learning.planner import DISCOUNT, Plan, Planner
 from mobee.learning.record import Learned, load_learned
 from mobee.learning.space import Space
 from mobee.robot.robot import Robot
-from mobee.store import STORE
+from mobee.store import STORE, store_of
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, robot_of_run
 from services.common.exit_codes import BAD_INPUT
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Rebuild the agent's model, plan, and print the plan."""
-    file = arguments.run / STORE if arguments.run.is_dir() else arguments.run
+    file = store_of(arguments.run)
     try:
         learned = load_learned(file, arguments.agent, _robot(arguments))
         poses: dict[str, int] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Protocol, cast
 
 from mobee.arrays import Array
@@ -30,6 +31,7 @@ class CuriousAgent(CuriousLearner):
         seed: of the draws among equally good actions; None: as in `settings`.
         settings: None: the defaults.
         store: where transitions are written, and read from at the start; None: they are not kept.
+        continues: file of transitions of the same agent with which a new store begins; they may have been made on another plant.
         **changes: fields of `CuriousSettings` by keyword, in place of those in `settings`.
 
     Raises:
@@ -48,6 +50,7 @@ class CuriousAgent(CuriousLearner):
         *,
         settings: CuriousSettings | None = None,
         store: TransitionStore | None = None,
+        continues: str | Path | None = None,
         **changes: Any,
     ) -> None:
         changes |= {name: value for name, value in (("explorer", explorer), ("seed", seed)) if value is not None}
@@ -57,7 +60,11 @@ class CuriousAgent(CuriousLearner):
         self.plant, self.store = plant, store
         self._state: int | None = None
         self._pending: tuple[int, int] | None = None
+        if continues is not None and store is None:
+            raise InvalidValue(f"continues={str(continues)!r} needs a store, to which the transitions are copied: give store=.")
         if store is not None:
+            if continues is not None:
+                store.continue_from(continues, self.settings)
             store.bind(self.settings)
             self._replay(store.load())
 

@@ -75,6 +75,10 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     """Reward of an action in such a state, nats, added to the information gain; 0: it replaces the information gain."""
     run_dir: str = ""
     """Folder of the run, in which transitions are stored and from which a restarted agent reads them; empty: they are not stored."""
+    continues: str = ""
+    """File of transitions, or folder of a run, with which it begins if it has none of its own, as those learned offline; it is recorded."""
+    rest: tuple[float, ...] = ()
+    """Fraction of its range at which each motor of its part stays while it is not one of `joints`; empty: the middle."""
     transitions: Annotated[int, Meta(ge=0)] = 0
     """Number of transitions after which the agent ends; 0: no limit."""
     targets: tuple[tuple[float, float, float], ...] = ()
@@ -120,7 +124,11 @@ class Config(LearningConfig, frozen=True, kw_only=True):
                 f"{len(self.levels)} levels of {len(joints)} motors make {len(self.levels) ** len(joints):.3g} states, and an agent can "
                 f"have {MAX_STATES}: choose some motors of {self.part!r}, for example joints = {_listed(joints[:4])}."
             )
-        return Lattice(robot, joints, self.levels, self.neighbours or (16 if is_arm else 8), tie_seed=self.tie_seed)
+        return Lattice(robot, joints, self.levels, self._neighbours(len(joints), is_arm), tie_seed=self.tie_seed, rest=self.rest or 0.5)
+
+    def _neighbours(self, joints: int, is_arm: bool) -> int:
+        """Return the number of neighbours: as set, else the published one, or all other states if there are fewer."""
+        return self.neighbours or min(16 if is_arm else 8, len(self.levels) ** joints - 1)
 
     def _given(self, settings: type[Settings]) -> dict[str, Any]:
         return {one.name: getattr(self, one.name) for one in fields(settings) if one.name not in TASK}

@@ -15,7 +15,7 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
-from mobee.store import STORE, TransitionStore
+from mobee.store import STORE, TransitionStore, store_of
 from services.agents.config import Config
 from services.agents.streams import LearnedStream, ReachStream, publish_transition
 from services.common.bus_plant import BusPlant
@@ -54,7 +54,8 @@ class AgentNode:
         self._config = config
         self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
         plant = BusPlant(service, robot, (config.part,))
-        self._agent = CuriousAgent(config.space(robot), plant, settings=config.curious(), store=self._store)
+        continued = store_of(Path(config.continues)) if config.continues else None
+        self._agent = CuriousAgent(config.space(robot), plant, settings=config.curious(), store=self._store, continues=continued)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
         self._work = Work(service, plant)

@@ -16,7 +16,7 @@ from msgspec import structs, to_builtins
 from services.common.config import ServiceConfig
 from services.common.emergency_stop import StopRecord
 from services.common.worlds import is_path
-from services.launcher.scenario import Scenario
+from services.launcher.scenario import FILES, Scenario
 
 _PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco-core", "icub-models", "rerun-sdk")
 
@@ -47,8 +47,8 @@ def _new_folder(runs: Path, name: str) -> Path:
 
 
 def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
-    """Return a service's settings with the endpoint, absolute paths of robot and world files, and the run's directory."""
-    named = {field: getattr(config, field, "") for field in ("robot", "world")}
+    """Return a service's settings with the endpoint, absolute paths of the files that it reads, and the run's directory."""
+    named = {field: getattr(config, field, "") for field in FILES}
     files = {field: str(Path(name).resolve()) for field, name in named.items() if is_path(name)}
     config = structs.replace(config, endpoint=endpoint, **files)
     if "run_dir" in config.__struct_fields__ and "run_dir" not in given:

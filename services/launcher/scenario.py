@@ -14,7 +14,7 @@ from typing import Any
 from msgspec import Struct, structs, to_builtins
 
 from services.common.config import ConfigError, ServiceConfig, WorldConfig, convert, line_of, nearest
-from services.common.worlds import effective_world
+from services.common.worlds import effective_world, is_path
 from services.launcher.catalogue import NAMES, Entry, entry_of
 
 SHIPPED = Path(__file__).parent / "scenarios"
@@ -82,6 +82,7 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
+    _place_files(data, path.parent)
     origins = _override(data, settings)
 
     def place(field: str) -> str:
@@ -99,6 +100,20 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
     _check_shared(file.shared, parts, where)
     kept = _for_lockstep([part for part in parts if part.who not in leave_out])
     return Scenario(path.stem, file.title, file.shared, tuple(sorted(kept, key=lambda part: part.entry.stage)), where)
+
+
+FILES = ("robot", "world", "continues")  # settings that may name a file
+
+
+def _place_files(data: dict[str, Any], folder: Path) -> None:
+    """Replace the names of files that lie beside the scenario, and not in the working directory, by their paths."""
+    services = data.get("services")
+    tables = [data.get("shared"), *(services.values() if isinstance(services, dict) else ())]
+    for table in tables:
+        for name in FILES:
+            value = table.get(name) if isinstance(table, dict) else None
+            if isinstance(value, str) and is_path(value) and not Path(value).exists() and (folder / value).exists():
+                table[name] = str(folder / value)  # type: ignore[index]  # value is set, so this is a table
 
 
 def _find(name_or_path: str) -> Path:

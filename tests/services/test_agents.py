@@ -210,6 +210,17 @@ def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_pa
     assert [(t.s, t.a, t.s_next, t.reward, t.value) for t in stage.made(14)] == whole
 
 
+def test_an_agent_continues_what_was_learned_elsewhere(stage: Stage, tmp_path: Path) -> None:
+    assert stage.agent("--transitions", "6").wait(30.0) == 0
+    (tmp_path / "other").mkdir()
+    there = ("--run-dir", str(tmp_path / "other"), "--continues", str(stage.folder))
+    assert stage.agent("--transitions", "9", *there).wait(30.0) == 0
+    assert [row["s_next"] for row in rows(tmp_path / "other")[:6]] == [row["s_next"] for row in stage.rows()]
+    assert len(rows(tmp_path / "other")) == 9
+    with TransitionStore(tmp_path / "other" / STORE, "torso", read_only=True) as store:
+        assert store.settings()["continued"]["transitions"] == 6
+
+
 def test_an_agent_with_a_goal_goes_there_and_records_its_settings(stage: Stage) -> None:
     given = ("--goal", "26", "--beliefs", "debiased", "--divergence", "kl", "--forgetting", "0.9", "--tolerance", "0.001")
     assert stage.agent(*given, "--transitions", "8").wait(30.0) == 0

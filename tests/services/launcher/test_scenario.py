@@ -103,6 +103,19 @@ def test_a_robot_of_ones_own_has_no_table_and_the_run_s_record_shows_it(tmp_path
     assert {part.config.world for part in read_scenario(str(path), ["shared.robot=icub"]).parts} == {"table"}
 
 
+def test_files_are_found_beside_the_scenario_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "arm.xml").write_text(ARM)
+    (tmp_path / "learned.sqlite").touch()
+    path = tmp_path / "arm.toml"
+    agent = '[services.agent_arm]\ncontinues = "learned.sqlite"\n'
+    path.write_text(f'[shared]\nrobot = "arm.xml"\n[services.robot_sim]\nbackend = "kinematic"\n{agent}')
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    configs = {part.who: part.config for part in read_scenario(str(path)).parts}
+    assert configs["robot_sim"].robot == str(tmp_path / "arm.xml")
+    assert getattr(configs["agent_arm"], "continues", "") == str(tmp_path / "learned.sqlite")
+
+
 def test_the_run_s_record_names_files_so_that_they_are_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("arm.xml").write_text(ARM)
@@ -208,7 +221,7 @@ VERTICAL = '<marker name="left_eye" nz="1"/><marker name="right_eye" nz="1"/>'
             "robot_sim: backend = \"pybullet\" cannot move 'arm'",
             'Set backend = "mujoco"',
         ),
-        (ARM, '[services.agent_arm]\njoints = ["pan"]\n', "agent_arm: neighbours", "2"),
+        (ARM, '[services.agent_arm]\njoints = ["pan"]\nneighbours = 5\n', "agent_arm: neighbours", "2"),
         (
             ARM,
             "[services.agent_arm]\nneighbours = 8\ntargets = [[0, 0, 0]]\nmarker = 'palm'",
