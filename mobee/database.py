@@ -32,10 +32,11 @@ REMEDIES = {
 }
 
 
-def opened(path: Path, read_only: bool) -> sqlite3.Connection:
+def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connection:
     """Open the file, and create its tables if it is new; a file of another program or schema is refused and not changed.
 
-    `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too.
+    `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too. `durable`: a commit
+    waits for the disk, and survives a power cut; else it survives the end of the process only.
     Every error is a MobeeError of one line.
     """
     with explained(path):
@@ -47,7 +48,7 @@ def opened(path: Path, read_only: bool) -> sqlite3.Connection:
                 if not _is_ours(path, database):
                     raise MobeeError(f"{path} holds no transitions yet: it is empty.")
             else:
-                _prepare(path, database)
+                _prepare(path, database, durable)
         except BaseException:
             database.close()
             raise
@@ -84,8 +85,8 @@ def _address(path: Path) -> str:
     return f"{path.absolute().as_uri()}?{mode}"
 
 
-def _prepare(path: Path, database: sqlite3.Connection) -> None:
-    database.execute("PRAGMA synchronous = FULL")
+def _prepare(path: Path, database: sqlite3.Connection, durable: bool) -> None:
+    database.execute(f"PRAGMA synchronous = {'FULL' if durable else 'OFF'}")
     with transaction(database):  # agents that start together must not make the tables twice
         if not _is_ours(path, database):
             for statement in TABLES.split(";")[:-1]:

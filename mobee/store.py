@@ -24,14 +24,15 @@ class AgentFile:
         path: the SQLite file; made if missing, its folder must exist.
         agent: the name under which this agent's share is kept.
         read_only: open the file for reading only, also in a write-protected folder; nothing is created or changed.
+        durable: False: a commit does not wait for the disk, so that it survives a kill but not a power cut; for learning offline.
 
     Raises:
         MobeeError: from every method, in one line with the file and what to do.
     """
 
-    def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
+    def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
         self.path, self.agent = Path(path), agent
-        self._db: sqlite3.Connection = opened(self.path, read_only)
+        self._db: sqlite3.Connection = opened(self.path, read_only, durable)
 
     def bind(self, settings: dict[str, Any]) -> None:
         """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
@@ -130,11 +131,11 @@ class TransitionStore(AgentFile):
     """The transitions of one agent in the file of a run; each survives a kill and a power cut as soon as `append` has returned.
 
     Args:
-        path, agent, read_only: see `AgentFile`, also for the errors.
+        path, agent, read_only, durable: see `AgentFile`, also for the errors.
     """
 
-    def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
-        super().__init__(path, agent, read_only)
+    def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
+        super().__init__(path, agent, read_only, durable)
         self._last = self._newest()
 
     def append(self, transition: Transition) -> None:

@@ -16,6 +16,7 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, INTERRUPTED
 
 VERBS = {
+    "play": "make any robot curious: derive its parts, learn offline, go on live",
     "launch": "start a scenario and supervise it",
     "status": "print the state of the running system",
     "stop": "end the running system",
@@ -24,6 +25,7 @@ VERBS = {
     "router": "run only the router, for services that are started one by one",
     "robots": "list the robots and worlds that come with mobee",
     "convert": "convert a robot from zero-position XML to URDF, or back",
+    "learn": "learn offline on any robot, with the transitions in a file",
     "plan": "plan a path by what an agent has learned",
     "reach": "move a hand to a place, on the running robot or offline",
     "roadmap": "build, show, query and play roadmaps of whole-body motions",

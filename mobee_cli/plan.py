@@ -64,11 +64,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _robot(arguments: argparse.Namespace) -> Robot | None:
     """Return the robot of the options or of the settings of the run; None for the shipped one of the recorded name."""
-    arguments.robot = arguments.robot or robot_of_run(arguments.run)
+    arguments.robot = arguments.robot or robot_of_run(arguments.run) or _beside(arguments.run)
     if arguments.robot is None:
         require_none(arguments, "only valid with --robot FILE")
         return None
     return robot_given(arguments)
+
+
+def _beside(store: Path) -> str | None:
+    """Return the robot that `mobee learn` writes beside a file of transitions, under the same name; None if there is none."""
+    robot = store.with_suffix(".xml")
+    return str(robot) if robot.is_file() else None
 
 
 def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:

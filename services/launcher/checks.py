@@ -212,7 +212,8 @@ def _read(scenario: Scenario, part: Part, field: str, read: Callable[[str], Any]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)  # for example a misspelt name
-            warnings.simplefilter("default", OlderVersion)  # such a file is read completely
+            for harmless in (OlderVersion, Simplified):  # such a file is read completely, or as far as this library can use it
+                warnings.simplefilter("default", harmless)
             return read(getattr(part.config, field))
     except UserWarning as warning:
         raise ConfigError(f"{warning}. The launcher ignores nothing: correct it or take it out.") from None

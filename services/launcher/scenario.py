@@ -113,7 +113,7 @@ def _place_files(data: dict[str, Any], folder: Path) -> None:
         for name in FILES:
             value = table.get(name) if isinstance(table, dict) else None
             if isinstance(value, str) and is_path(value) and not Path(value).exists() and (folder / value).exists():
-                table[name] = str(folder / value)  # type: ignore[index]  # value is set, so this is a table
+                table[name] = str(folder / value)
 
 
 def _find(name_or_path: str) -> Path:

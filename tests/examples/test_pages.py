@@ -35,6 +35,7 @@ GIVEN = {
     "docs/installation.md": "",
     "docs/law.md": TABLE + "q = goal = robot.home\nf, wrench = np.zeros(41), np.zeros(6)\n",
     "docs/model.md": "",
+    "docs/play.md": "",
     "docs/reach.md": "",
     "docs/reaching.md": TABLE
     + """
@@ -68,6 +69,8 @@ RUN_HERE = (
     "mobee roadmap play palm.npz --to -0.3 0.2 --from -0.4 0",
     "mobee reach --target -0.3 0.2 0.1 --offline --json",
     "mobee experiment run hypercube-exploration",
+    "mobee learn --robot katana --transitions 200 --store katana.sqlite",
+    "mobee plan --run katana.sqlite --to 8",
 )
 """Commands on the pages that run here in this order, in one folder."""
 
@@ -86,6 +89,7 @@ RUN_ELSEWHERE = {
     r"mobee roadmap show palm.npz --view": "tests/mobee_cli/test_roadmap.py",
     r"mobee roadmap play palm.npz --to [-. 0-9]+ --live": "tests/system/test_reach.py",
     r"mobee roadmap (build own_task.py|show own_task.npz|build sweep.py|show sweep.npz).*": "tests/examples/test_documentation.py",
+    r"mobee play.*": "tests/mobee_cli/test_play.py",
     r"mobee plan .*": "tests/mobee_cli/test_plan.py",
     r"mobee check .*": "tests/mobee_cli/test_check.py",
     r"mobee convert .*": "tests/mobee_cli/test_convert.py",

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mobee learn`: agents learn offline on any robot, and their transitions are kept in a file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from experiments.kit.command_line import positive_whole
+from mobee.errors import MobeeError
+from mobee.robot.load import load_robot
+from mobee_cli.errors import UserError
+from mobee_cli.playing.files import Files, write_files
+from mobee_cli.playing.offline import learn, opened
+from mobee_cli.playing.setup import add_setup_options, setup_of
+from mobee_cli.robot_options import DEFAULT, add_robot, add_world
+from services.common.exit_codes import BAD_INPUT
+
+_NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the robot
+(docs/play.md). Every transition is on disk before the next action: the same
+command continues the file, also after Ctrl-C. Beside FILE.sqlite are written the
+robot, FILE.xml, and a scenario, FILE.toml, that goes on live: mobee launch."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add robot, number of transitions, file and options."""
+    parser.epilog = _NOTES
+    add_robot(parser, f"default: {DEFAULT}")
+    add_world(parser)
+    parser.add_argument("--transitions", type=positive_whole, required=True, metavar="N", help="number of transitions in all, of all parts")
+    parser.add_argument("--store", type=Path, required=True, metavar="FILE", help="file of the transitions, FILE.sqlite")
+    add_setup_options(parser)
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Derive, learn, and print what was learned."""
+    if arguments.store.suffix != ".sqlite":
+        raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)
+    files = Files(arguments.store)
+    lines: list[str] = []
+    say = lines.append if arguments.json else print
+    try:
+        setup = setup_of(arguments, arguments.robot or DEFAULT)
+        write_files(setup, files)
+        for line in setup.lines:
+            say(line)
+        robot = load_robot(setup.shipped or files.robot)
+        with opened(setup, robot, files.store) as learning:
+            learn(learning, None, arguments.transitions, say)
+            numbers, summary = learning.numbers(), learning.summary()
+            say(learning.report())
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    if arguments.json:
+        print(json.dumps(numbers | {"store": str(files.store), "scenario": str(files.scenario)}, indent=2))
+        return 0
+    print(summary)
+    print(f"Kept in {files.store}. Plan with it: mobee plan --run {files.store}; go on live: mobee launch {files.scenario}")
+    return 0

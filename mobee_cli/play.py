@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mobee play`: any robot becomes curious: derives its parts, learns offline for some seconds, and goes on live."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from experiments.kit.command_line import positive_number, positive_whole
+from mobee.errors import MobeeError
+from mobee.robot.load import load_robot
+from mobee_cli.errors import UserError
+from mobee_cli.playing.files import Files, free_folder, write_files, write_readme
+from mobee_cli.playing.offline import learn, opened
+from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
+from mobee_cli.robot_options import add_urdf_options, add_world
+from services.common.exit_codes import BAD_INPUT
+from services.launcher.run import Options, launch
+
+SECONDS = 5.0  # s of real time in which it learns offline
+_NOTES = """ROBOT: a shipped robot, a URDF, MJCF or zero-position XML file, or with the
+package mujoco-menagerie a robot of MuJoCo Menagerie; without it, the iCub at its
+table. --learned goes on live with a file of `mobee learn`. The page's address is
+in the table of services; Ctrl-C ends everything. docs/play.md."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the robot and the options."""
+    parser.epilog = _NOTES
+    parser.add_argument("robot", nargs="?", default=ICUB, metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
+    add_urdf_options(parser)
+    add_world(parser)
+    add_setup_options(parser)
+    parser.add_argument("--seconds", type=positive_number, metavar="S", help=f"learn offline for S seconds (default: {SECONDS:g})")
+    parser.add_argument("--transitions", type=positive_whole, metavar="N", help="learn offline until there are N transitions")
+    parser.add_argument("--save", type=Path, metavar="DIR", help="write the robot, the scenario and a README to edit into DIR")
+    parser.add_argument("--learned", type=Path, metavar="FILE.sqlite", help="go live with what `mobee learn` has learned")
+    parser.add_argument("--offline-only", action="store_true", help="end after learning offline")
+    parser.add_argument("--headless", action="store_true", help="without the live page")
+    parser.add_argument("--duration", type=positive_number, metavar="S", help="end S seconds after all services are ready")
+    parser.add_argument("--endpoint", metavar="ADDRESS", help="address of the router (default: tcp/127.0.0.1:7447)")
+    parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="parent of the folders of runs (default: runs)")
+    parser.add_argument("--json", action="store_true", help="print JSON: what was learned offline, or the summary of the live run")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Derive, learn offline, go live; returns the exit code of the live system."""
+    if arguments.learned is not None:
+        files = Files(arguments.learned)
+        if not files.store.is_file() or not files.scenario.is_file():
+            raise UserError(f"{files.scenario}: no such scenario beside {files.store}: make both with `mobee learn`", BAD_INPUT)
+        return _live(arguments, files)
+    say = _to_stderr if arguments.json else _to_stdout
+    try:
+        setup = setup_of(arguments, arguments.robot)
+        files = _files(arguments, setup)
+        for line in setup.lines:
+            say(line)
+        write_files(setup, files)
+        write_readme(setup, files)
+        numbers = _offline(arguments, setup, files, say)
+    except MobeeError as error:
+        raise UserError(str(error), BAD_INPUT) from None
+    if arguments.offline_only:
+        if arguments.json:
+            print(json.dumps(numbers | {"store": str(files.store), "scenario": str(files.scenario)}, indent=2))
+        say(f"mobee launch {files.scenario} goes on live.")
+        return 0
+    say(f"Goes on live: mobee launch {files.scenario}")
+    return _live(arguments, files)
+
+
+def _files(arguments: argparse.Namespace, setup: Setup) -> Files:
+    """Return the files in the folder of the options, or in a new one; raises UserError if the folder has some of another play."""
+    if arguments.save is None:
+        name = f"{time.strftime('%Y%m%d-%H%M%S')}-play-{setup.name}"
+        return Files(free_folder(arguments.runs, name) / f"{setup.name}.sqlite")
+    files = Files(arguments.save / f"{setup.name}.sqlite")
+    if files.scenario.exists():
+        raise UserError(f"{files.scenario} exists: run it with `mobee launch {files.scenario}`, or save into another folder", BAD_INPUT)
+    return files
+
+
+def _offline(arguments: argparse.Namespace, setup: Setup, files: Files, say: Any) -> dict[str, Any]:
+    """Learn offline; returns the numbers of what was learned."""
+    seconds = arguments.seconds or (None if arguments.transitions else SECONDS)
+    with opened(setup, load_robot(setup.shipped or files.robot), files.store) as learning:
+        learn(learning, seconds, arguments.transitions, say)
+        say(learning.report())
+        say(learning.summary())
+        return learning.numbers()
+
+
+def _live(arguments: argparse.Namespace, files: Files) -> int:
+    return launch(
+        Options(
+            scenario=str(files.scenario),
+            headless=arguments.headless,
+            duration=arguments.duration,
+            json=arguments.json,
+            endpoint=arguments.endpoint,
+            runs=arguments.runs,
+        )
+    )
+
+
+def _to_stdout(line: str) -> None:
+    print(line, flush=True)
+
+
+def _to_stderr(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Learns offline, many times faster than real time, and tells what was found out meanwhile."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.kit.command_line import Progress
+from mobee.control.stability import largest_step
+from mobee.learning.agent import CuriousAgent, run
+from mobee.model.model import Model
+from mobee.robot.robot import Robot
+from mobee.simulation.plant import OfflinePlant
+from mobee.store import Transition, TransitionStore
+from mobee_cli.playing.setup import Setup
+from services.common.worlds import world_around
+
+CHUNK = 10  # transitions between two checks of the clock
+TICKS = (0.02, 0.01, 0.005)  # s: the longest at which the gains are stable is the control tick
+FIRST_REPORT = 5.0  # min of robot time; the next report follows after twice the time, and so on
+
+
+@dataclass(slots=True, eq=False)
+class Learning:
+    """Agents that learn on one offline plant, and counts over what they have made."""
+
+    plant: OfflinePlant
+    agents: tuple[CuriousAgent, ...]
+    begun: int  # transitions that were on record at the start
+    seconds: float = 0.0  # s of real time
+
+    @property
+    def touched(self) -> Counter[str]:
+        """Objects of the world, and how many actions ended in contact with each."""
+        return Counter(name for agent in self.agents for made in _made(agent) for name in made.touched)
+
+    @property
+    def transitions(self) -> int:
+        """Number of transitions made now."""
+        return sum(agent.transitions for agent in self.agents) - self.begun
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what was made and learned, as plain values."""
+        return {
+            "transitions": self.transitions,
+            "transitions_ever": self.transitions + self.begun,
+            "robot_time_s": round(self.plant.time, 3),
+            "real_time_s": round(self.seconds, 3),
+            "touched": dict(self.touched),
+            "agents": {agent.part: _of_agent(agent) for agent in self.agents},
+        }
+
+    def summary(self) -> str:
+        """Return the numbers of all agents in one line."""
+        speed = self.plant.time / self.seconds if self.seconds else 0.0
+        return f"{self.transitions} transitions, {self.plant.time / 60.0:.0f} min of robot time, {speed:.0f} x real time"
+
+    def report(self) -> str:
+        """Return what has been found out until now, in one line."""
+        tried = sum(int((agent.model.tries > 0).sum()) for agent in self.agents)
+        every = sum(agent.space.state_actions for agent in self.agents)
+        surprised = sum(_surprises(agent) for agent in self.agents)
+        contacts = "".join(f"; {name} touched {count} times" for name, count in self.touched.most_common(1))
+        return f"{self.plant.time / 60.0:5.0f} min: {tried} of {every} actions tried, {surprised} miss their goals{contacts}"
+
+
+def _surprises(agent: CuriousAgent) -> int:
+    """Return how many of the state-actions that were tried have ended in another state than their goal at least once."""
+    return len({(made.s, made.a) for made in _made(agent) if made.s_next != agent.space.goal(made.s, made.a)})
+
+
+def _made(agent: CuriousAgent) -> list[Transition]:
+    return agent.store.load() if agent.store is not None else []
+
+
+def _of_agent(agent: CuriousAgent) -> dict[str, Any]:
+    return {
+        "joints": list(agent.space.joints),
+        "states": len(agent.space),
+        "state_actions": agent.space.state_actions,
+        "tried": int((agent.model.tries > 0).sum()),
+        "missed_goal": _surprises(agent),
+        "transitions": agent.transitions,
+    }
+
+
+@contextmanager
+def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
+    """Make the agents of a setup on an offline plant, with their transitions in a file; raises MobeeError.
+
+    `robot`: as the live system reads it, so that both have the same spaces to the last bit.
+    """
+    world = world_around(setup.world, setup.shipped or store)
+    dt = next((tick for tick in TICKS if tick < largest_step(robot, setup.law)), TICKS[-1])
+    with ExitStack() as open_meanwhile:
+        stores = {part: open_meanwhile.enter_context(TransitionStore(store, part, durable=False)) for part in setup.agents}
+        begun = sum(len(one.load()) for one in stores.values())
+        seed = next(iter(setup.agents.values())).seed
+        plant = OfflinePlant(Model(robot, world), seed + begun, setup.law, dt=dt, active=list(setup.agents))
+        agents = tuple(
+            CuriousAgent(config.space(robot), plant, settings=config.curious(), store=stores[part]) for part, config in setup.agents.items()
+        )
+        yield Learning(plant, agents, begun)
+
+
+def learn(learning: Learning, seconds: float | None, transitions: int | None, say: Callable[[str], None]) -> None:
+    """Learn for so many seconds of real time, or until so many transitions are on record in all.
+
+    A progress bar is shown on a terminal; `say` is called with each report.
+    """
+    start, following = time.monotonic(), FIRST_REPORT
+    with Progress() as progress:
+        while True:
+            ever = learning.begun + learning.transitions
+            learning.seconds = time.monotonic() - start
+            if transitions is not None and ever >= transitions or seconds is not None and learning.seconds >= seconds:
+                return
+            shares = [ever / transitions if transitions else 0.0, learning.seconds / seconds if seconds else 0.0]
+            progress.show(max(shares), learning.summary())
+            run(learning.agents, CHUNK if transitions is None else min(CHUNK, transitions - ever))
+            if learning.plant.time / 60.0 >= following:
+                progress.clear()
+                say(learning.report())
+                following *= 2.0

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chooses what learns on a robot: the published agents of the iCub at its table, or agents derived from any robot."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from mobee.control.gains import Gains
+from mobee.derivation import Arm, Derived, derive
+from mobee.errors import InvalidValue
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from mobee_cli.robot_options import urdf_options
+from services.agents.config import Config as AgentConfig
+from services.common.worlds import effective_world
+
+WIDTH = 80  # columns
+ICUB = "icub"
+PUBLISHED = ("torso", "left_arm", "right_arm")  # the parts that learn in thesis 7.4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Setup:
+    """A robot and its agents. `shipped`: the name under which the robot is loaded; "" where it is written to a file of its own."""
+
+    name: str
+    shipped: str
+    robot: Robot
+    world: str
+    gains: str
+    contact_gain: float
+    agents: dict[str, AgentConfig]
+    lines: tuple[str, ...]
+
+    @property
+    def law(self) -> Gains:
+        """The gains of the control law."""
+        return Gains.named(self.gains, self.contact_gain)
+
+
+def add_setup_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for what learns."""
+    text = "motors that a part learns with, for example arm=joint1,joint2,joint4; may be repeated (default: derived)"
+    parser.add_argument("--part", dest="parts", action="append", default=[], metavar="PART=M1,M2", help=text)
+    parser.add_argument("--explorer", default="curious", metavar="NAME", help="how the agents choose actions (default: curious)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (default: 0)")
+
+
+def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
+    """Return the setup of a robot, given as for `load_robot`, with the options of the command; raises MobeeError."""
+    options = {name: value for name, value in urdf_options(arguments).items() if value is not None}
+    parts = _parts(arguments.parts)
+    common = {"explorer": arguments.explorer, "seed": arguments.seed}
+    world = effective_world(arguments.world, robot)
+    if robot == ICUB and not parts and not options:
+        agents = {part: AgentConfig(part=part, **common) for part in PUBLISHED}
+        return Setup(ICUB, ICUB, load_robot(ICUB), world, "published_2014", 0.0, agents, _PUBLISHED_LINES)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        loaded = load_robot(robot, **options)
+    derived = derive(loaded, parts, arguments.seed)
+    agents = {
+        arm.part: AgentConfig(part=arm.part, joints=arm.joints, rest=derived.rest(arm), neighbours=_neighbours(derived, arm), **common)
+        for arm in derived.arms
+    }
+    gain = derived.gains.contact_gain if derived.gains != Gains.default() else 0.0
+    remarks = [str(one.message).rpartition(":1: ")[2] for one in caught]
+    name = re.sub(r"[^a-z0-9_]+", "_", loaded.name.lower()).strip("_") or "robot"
+    return Setup(name, "", derived.robot, world, "default", gain, agents, tuple(_described(derived, remarks)))
+
+
+_PUBLISHED_LINES = (
+    "icub: 41 motors; torso, left_arm and right_arm learn, as in thesis 7.4",
+    "  the joints of each are at 3 levels: 27 states of the torso, 81 of an arm",
+)
+
+
+def _neighbours(derived: Derived, arm: Arm) -> int:
+    space = derived.space(arm)
+    return int(space.goals.shape[1])
+
+
+def _parts(texts: list[str]) -> dict[str, tuple[str, ...]]:
+    """Return the motors of each part in the options; raises InvalidValue."""
+    parts: dict[str, tuple[str, ...]] = {}
+    for text in texts:
+        name, equals, motors = text.partition("=")
+        listed = tuple(filter(None, motors.split(",")))
+        if not equals or not listed or not re.fullmatch(r"[a-z0-9_]+", name):
+            raise InvalidValue(f"--part {text}: give a name of a-z, 0-9 and _ and its motors, as --part arm=joint1,joint2.")
+        parts[name] = listed
+    return parts
+
+
+def _described(derived: Derived, remarks: Sequence[str]) -> Iterator[str]:
+    """Yield at most ten lines of at most WIDTH columns that say what was derived."""
+    robot = derived.robot
+    yield _cut(f"{robot.name}: {len(robot.motors)} motors in {len(robot.parts)} parts, {len(robot.shapes)} shapes")
+    for remark in remarks[:2]:
+        yield _cut(f"  note   {remark}")
+    for arm in derived.arms:
+        yield _cut(f"  learns {arm.part}: {len(derived.space(arm))} states of {_listed(arm.joints)}")
+    if derived.limited:
+        yield _cut(f"  limits half a turn to each side: {_listed(derived.limited)}")
+    if derived.home_moved:
+        yield _cut(f"  home   moved out of contact: {_listed(derived.home_moved)}")
+    if derived.left_out:
+        pairs = ", ".join(f"{one}/{other}" for one, other in derived.left_out)
+        yield _cut(f"  pairs  {len(derived.left_out)} not tested, as they touch in most poses: {pairs}")
+    if derived.field:
+        yield _cut(f"  fields {1e3 * derived.field:.0f} mm wide, {len(robot.field_pairs)} pairs")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names with what they all begin with once: "panda_joint1, 2, 3"."""
+    start = len(os.path.commonprefix(names)) if len(names) > 1 else 0
+    return ", ".join([names[0], *(name[start:] or name for name in names[1:])])
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= WIDTH else f"{text[: WIDTH - 4]} ..."

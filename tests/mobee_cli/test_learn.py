@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from mobee.robot.load import load_robot
+from mobee.store import TransitionStore
+from mobee_cli.__main__ import main
+
+ARM = """
+<robot name="Tiny Arm"><link name="base"/>
+<link name="upper"><collision><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.03" length="0.2"/></geometry></collision></link>
+<link name="lower"><collision><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.03" length="0.2"/></geometry></collision></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" velocity="1" effort="9"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="9"/></joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    return path
+
+
+def learned(arm: Path, *options: str) -> int:
+    return main(["learn", "--robot", str(arm), "--store", str(arm.with_name("out.sqlite")), *options])
+
+
+def test_it_learns_on_and_its_file_can_be_planned_with(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = arm.with_name("out.sqlite")
+    assert learned(arm, "--transitions", "12", "--json") == 0
+    first = json.loads(capsys.readouterr().out)
+    assert (first["transitions"], first["agents"]["arm"]["states"]) == (12, 9)
+    with TransitionStore(store, "arm", read_only=True) as kept:
+        before = kept.load()
+    assert learned(arm, "--transitions", "20") == 0
+    said = capsys.readouterr().out
+    assert "8 transitions" in said and all(len(line) <= 80 for line in said.splitlines()[:-1])
+    with TransitionStore(store, "arm", read_only=True) as kept:
+        assert kept.load()[:12] == before and len(kept.load()) == 20
+    assert main(["plan", "--run", str(store), "--to", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["path"][-1] == 0
+
+
+def test_the_scenario_beside_it_names_robot_agents_and_transitions(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3", "--explorer", "least_tried") == 0
+    scenario = tomllib.loads(arm.with_name("out.toml").read_text())
+    assert scenario["shared"]["robot"] == "out.xml"
+    agent = scenario["services"]["agent_arm"]
+    assert (agent["joints"], agent["continues"], agent["explorer"]) == (["shoulder", "elbow"], "out.sqlite", "least_tried")
+    assert load_robot(arm.with_name("out.xml")).parts.keys() == {"arm"}
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--part", "arm"], "--part arm: give a name"),
+        (["--part", "arm=shoulder,elbw"], "Did you mean 'elbow'"),
+        (["--explorer", "curios"], "Did you mean 'curious'"),
+        (["--robot", "nothing.urdf"], "no such file"),
+        (["--store", "x.db"], "must end in .sqlite"),
+    ],
+)
+def test_mistakes_are_answered_in_one_line(arm: Path, options: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3", *options) == 2
+    said = capsys.readouterr().err
+    assert says in said and said.count("\n") == 1
+
+
+def test_a_file_of_other_settings_is_not_continued(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    assert learned(arm, "--transitions", "6", "--explorer", "random") == 2
+    assert 'has explorer = "curious" on record, now "random"' in capsys.readouterr().err

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mobee_cli.__main__ import main
+from mobee_cli.playing.files import Files
+from mobee_cli.playing.setup import PUBLISHED
+from services.agents.config import Config as AgentConfig
+from services.launcher.scenario import read_scenario
+from tests.mobee_cli.test_learn import ARM
+
+
+def test_without_a_robot_the_icub_finds_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["play", "--offline-only", "--transitions", "60", "--runs", str(tmp_path), "--json"]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert tuple(found["agents"]) == PUBLISHED and found["transitions"] == 60
+    assert found["touched"]["table"] > 0
+    assert len(printed.err.splitlines()) <= 10 and all(len(line) <= 80 for line in printed.err.splitlines()[:-1])
+    agents = {part.who: part.config for part in read_scenario(found["scenario"]).parts if isinstance(part.config, AgentConfig)}
+    assert set(agents) == {f"agent_{part}" for part in PUBLISHED}
+    assert all(config.continues == found["store"] for config in agents.values())
+
+
+def test_what_it_saves_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
+    arm.write_text(ARM)
+    assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["README.md", "tiny_arm.sqlite", "tiny_arm.toml", "tiny_arm.xml"]
+    assert "mobee check tiny_arm.xml" in (folder / "README.md").read_text()
+    capsys.readouterr()
+    assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 2
+    assert "tiny_arm.toml exists: run it with `mobee launch" in capsys.readouterr().err
+
+
+def test_a_file_that_mobee_learn_did_not_write_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Files(tmp_path / "x.sqlite").store.touch()
+    assert main(["play", "--learned", str(tmp_path / "x.sqlite")]) == 2
+    assert "x.toml: no such scenario beside" in capsys.readouterr().err
