@@ -53,6 +53,7 @@ EXPERIMENTS = {
     "trm": "experiments.claims.ch3_roadmaps.trm",
     "unreachable-states": "experiments.claims.ch7_learning.unreachable_states",
     "urdf-files": "experiments.claims.robot_files.urdf_files",
+    "zoo": "experiments.claims.robot_files.zoo",
 }
 
 FORMER_NAMES = {  # still accepted, and read in the records of older runs

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Compare every file that is not in the records yet; returns the results."""
-    files = dict(_files(_folders(arguments.folders), arguments.only))
+    files = dict(_files(named_folders(arguments.folders), arguments.only))
     if not files:
         raise InvalidValue("there is no .urdf file to compare; name folders with --folders DIR, or install icub-models.")
     path = folder / RECORDS
@@ -92,7 +92,7 @@ def _set_of(one: FileRecord) -> str:
     return one.name.partition("/")[0]
 
 
-def _folders(given: Sequence[str]) -> dict[str, Path]:
+def named_folders(given: Sequence[str]) -> dict[str, Path]:
     """Return the folders by the names of their sets."""
     if not given:
         return dict(_installed())
@@ -100,17 +100,17 @@ def _folders(given: Sequence[str]) -> dict[str, Path]:
     for text in given:
         name, _, path = text.rpartition("=")
         if not Path(path).is_dir():
-            raise InvalidValue(f"{path}: there is no such folder. Give one that holds .urdf files.")
+            raise InvalidValue(f"{path}: there is no such folder. Give one that holds robot files.")
         folders[name or Path(path).resolve().name] = Path(path)
     return folders
 
 
 def _installed() -> Iterator[tuple[str, Path]]:
     yield "icub_models", Path(sys.prefix) / "share" / "iCub" / "robots"
-    for package in ("pybullet_data", "mujoco"):
+    for package, inner in (("pybullet_data", ""), ("mujoco", ""), ("robosuite", "models/assets/robots"), ("dm_control", "suite")):
         spec = importlib.util.find_spec(package)
         if spec is not None and spec.origin is not None:
-            yield package, Path(spec.origin).parent
+            yield package, Path(spec.origin).parent / inner
     try:
         robots = importlib.metadata.distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots")
     except importlib.metadata.PackageNotFoundError:

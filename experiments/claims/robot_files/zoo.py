@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The zoo: whether robots of others become curious without an edit, and how near they come to themselves meanwhile.
+
+Claim: every robot of five collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
+home, comes no deeper than 2 mm into itself in ten minutes of curiosity with the default gains, and its agent tries every action of the
+states that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.
+Published number: none.  Run time: 15 seconds for each robot.
+
+The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite and dm_control (MJCF), as far as they are installed,
+or --folders.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its motors
+are compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions transitions.
+Robots are on disk one by one; --resume continues.  The figure is a table in Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from experiments.claims.robot_files.urdf_files import SKIPPED_FOLDER, named_folders
+from experiments.kit.command_line import Progress, positive_number
+from experiments.kit.experiment import Experiment, Steps
+from experiments.kit.records import Records, Row, read_records
+from mobee import CuriousAgent, Derived, Model, OfflinePlant, derive, load_robot
+from mobee import run as run_agents
+from mobee.check.robot import check_robot
+from mobee.errors import InvalidValue, MobeeError
+from mobee.robot.mjcf.compiled import is_mjcf
+
+RECORDS, REFUSED, TABLE = "zoo.csv", "refused.csv", "zoo.md"
+MAX_DEPTH = 0.002  # m
+CHECKED = 5  # ticks of 20 ms between two comparisons with the solids
+DT = 0.02  # s
+NO_ROBOT = ("no joint moves", "nothing to learn", "the robot has no link")  # in messages about things that are no robots
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    text = "where to look for URDF and MJCF files, as NAME=PATH or PATH (default: packages that are installed)"
+    parser.add_argument("--folders", nargs="+", default=[], metavar="DIR", help=text)
+    parser.add_argument("--only", default="", metavar="TEXT", help="files with this in their path")
+    parser.add_argument("--minutes", type=positive_number, default=10.0, metavar="M", help="of robot time (default: 10)")
+    parser.add_argument("--actions", type=int, default=10_000, metavar="N", help="of the single agent (default: 10000; 0: none)")
+
+
+@dataclass(frozen=True, slots=True)
+class Measured(Row):
+    """The measures of one robot; depth in mm, times in s."""
+
+    robot: str
+    motors: float
+    arms: str  # names of the parts that learn
+    joints: str  # numbers of joints of these
+    errors: float  # findings of `mobee check` about what was derived
+    warnings: float
+    at_home: float  # contacts of solids and fields
+    load_s: float
+    derive_s: float
+    transitions: float
+    depth_mm: float
+    touching: str  # the two solids of the deepest contact
+    tried: float  # state-actions that the single agent has tried
+    can_be_tried: float  # the actions of all states that it has come to
+    state_actions: float
+
+
+def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Measure the robots that are not in the records yet; returns the results."""
+    files = dict(robot_files(named_folders(arguments.folders), arguments.only))
+    if not files:
+        raise InvalidValue("there is no URDF or MJCF file; name folders with --folders DIR, or install icub-models.")
+    done = {one.robot for one in read(folder)} | {row["robot"] for row in read_refused(folder)}
+    with (
+        Records(folder / RECORDS, Measured.columns()) as records,
+        Records(folder / REFUSED, ("robot", "why")) as refused,
+        Progress() as progress,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")  # the readers' warnings are for `mobee check`
+        for number, (name, file) in enumerate(files.items()):
+            progress.show(number / len(files), name)
+            if name in done:
+                continue
+            try:
+                records.append(measure(name, file, arguments.minutes, arguments.actions, arguments.seed).record())
+            except MobeeError as error:
+                refused.append({"robot": name, "why": _ascii(" ".join(str(error).replace(f"{file.parent}/", "").split()))})
+    figure(folder)
+    return results(folder)
+
+
+def robot_files(folders: dict[str, Path], only: str) -> Iterator[tuple[str, Path]]:
+    """Yield the name, which is ASCII, and the path of every URDF and MJCF file."""
+    for name, folder in folders.items():
+        for path in sorted((*folder.rglob("*.urdf"), *folder.rglob("*.xml"))):
+            label = _ascii(f"{name}/{path.relative_to(folder).as_posix()}")
+            if SKIPPED_FOLDER not in path.parts and only in label and (path.suffix == ".urdf" or is_mjcf(path)):
+                yield label, path
+
+
+def _ascii(text: str) -> str:
+    return text.encode("ascii", "backslashreplace").decode()
+
+
+def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> Measured:
+    """Measure a robot; raises MobeeError where it cannot be read, or nothing can learn."""
+    start = time.perf_counter()
+    robot = load_robot(file)
+    loaded = time.perf_counter()
+    derived = derive(robot, seed=seed)
+    ready = time.perf_counter()
+    severities = [finding.severity for finding in check_robot(derived.robot)]
+    transitions, depth, touching = babble(derived, minutes, seed)
+    agent, visited = explore(derived, actions, seed)
+    return Measured(
+        robot=name,
+        motors=float(len(robot.motors)),
+        arms=" ".join(arm.part for arm in derived.arms),
+        joints=" ".join(str(len(arm.joints)) for arm in derived.arms),
+        errors=float(severities.count("error")),
+        warnings=float(severities.count("warning")),
+        at_home=float(len(Model(derived.robot).evaluate(derived.robot.home).contacts)),
+        load_s=loaded - start,
+        derive_s=ready - loaded,
+        transitions=float(transitions),
+        depth_mm=1e3 * depth,
+        touching=touching,
+        tried=float((agent.model.tries > 0).sum()),
+        can_be_tried=float(sum(len(agent.space.actions(state)) for state in visited)),
+        state_actions=float(agent.space.state_actions),
+    )
+
+
+def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str]:
+    """Let all arms learn at once; returns the number of transitions, the deepest solid contact [m] and the two solids."""
+    plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part for arm in derived.arms])
+    solids = Model(replace(derived.robot, field_pairs=derived.robot.field_pairs[:0]))
+    deepest = [(0.0, "")]
+
+    def compare(seconds: float) -> None:
+        deepest.extend((contact.depth, f"{contact.first} {contact.second}") for contact in solids.evaluate(plant.motors.q).contacts)
+        deepest[:] = [max(deepest)]
+
+    plant.every(CHECKED, compare)
+    agents = [CuriousAgent(derived.space(arm), plant, seed=seed) for arm in derived.arms]
+    while plant.time < 60.0 * minutes:
+        run_agents(agents, len(agents))
+    return sum(agent.transitions for agent in agents), deepest[0][0], _ascii(deepest[0][1])
+
+
+def explore(derived: Derived, actions: int, seed: int) -> tuple[CuriousAgent, set[int]]:
+    """Let the arm that moves its end farthest learn alone, until all that can be tried is tried; returns its agent and its states."""
+    arm = max(derived.arms, key=lambda one: one.movement)
+    plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part])
+    agent = CuriousAgent(derived.space(arm), plant, seed=seed)
+    exists, visited = agent.space.goals >= 0, {agent.state} if actions else set[int]()
+    while agent.transitions < actions and (exists & (agent.model.tries == 0))[list(visited)].any():
+        agent.step()
+        visited.add(agent.state)
+    return agent, visited
+
+
+def read(folder: Path) -> list[Measured]:
+    """Return the measured robots of a run."""
+    return [Measured.of_record(row) for row in read_records(folder / RECORDS, Measured.columns())]
+
+
+def read_refused(folder: Path) -> list[dict[str, str]]:
+    """Return the files that were refused, and why."""
+    return read_records(folder / REFUSED, ("robot", "why"))
+
+
+def failures(one: Measured) -> list[str]:
+    """Return in words what a robot cannot do; empty if it meets the claim."""
+    judged = {
+        f"comes {one.depth_mm:.1f} mm into itself ({one.touching})": one.depth_mm > 1e3 * MAX_DEPTH,
+        f"touches itself at home ({one.at_home:.0f} contacts)": one.at_home > 0,
+        f"tries {one.tried:.0f} of {one.can_be_tried:.0f} actions": one.tried < one.can_be_tried,
+        f"has {one.errors:.0f} errors by `mobee check`": one.errors > 0,
+    }
+    return [text for text, failed in judged.items() if failed]
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Return the robots that do not meet the claim, with what they cannot do, and the files without a robot."""
+    found, refused = read(folder), read_refused(folder)
+    failed = {one.robot: "; ".join(failures(one)) for one in found if failures(one)}
+    things = [row["robot"] for row in refused if any(text in row["why"] for text in NO_ROBOT)]
+    return {
+        "passed": not failed if found else None,
+        "robots": len(found),
+        "meet the claim": len(found) - len(failed),
+        "within 2 mm": sum(one.depth_mm <= 1e3 * MAX_DEPTH for one in found),
+        "tried all that can be tried": sum(one.tried >= one.can_be_tried > 0 for one in found),
+        "cannot": failed,
+        "refused": {row["robot"]: row["why"] for row in refused if row["robot"] not in things},
+        "no robots": len(things),
+    }
+
+
+def figure(folder: Path) -> Path:
+    """Write the table, a line per robot, and a line for each file that is refused; returns its path."""
+    path = folder / TABLE
+    refused = [row for row in read_refused(folder) if not any(text in row["why"] for text in NO_ROBOT)]
+    lines = [*table(read(folder)), "", "| refused | why |", "|---|---|", *(f"| {row['robot']} | {row['why']} |" for row in refused), ""]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def table(found: Sequence[Measured]) -> list[str]:
+    """Return the lines of the table in Markdown."""
+    heads = (
+        "robot | motors | arms (joints) | load and derive [s] | transitions | deepest [mm] | tried of what can be tried | of all | cannot"
+    )
+    lines = [f"| {heads} |", "|---" * 9 + "|"]
+    for one in found:
+        arms = ", ".join(f"{part} ({joints})" for part, joints in zip(one.arms.split(), one.joints.split(), strict=True))
+        cells = [one.robot, f"{one.motors:.0f}", arms, f"{one.load_s:.1f}, {one.derive_s:.1f}", f"{one.transitions:.0f}"]
+        tried = f"{one.tried:.0f} of {one.can_be_tried:.0f}" if one.can_be_tried else ""
+        cells += [f"{one.depth_mm:.2f}", tried, f"{one.state_actions:.0f}", "; ".join(failures(one))]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
+EXPERIMENT = Experiment(
+    name="zoo",
+    claim="robots of five collections become curious without an edit, and stay out of themselves within 2 mm",
+    source="aims of this reproduction",
+    notes=__doc__,
+    method=Steps(add_arguments, run, figure),
+)
