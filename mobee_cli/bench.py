@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from experiments.bench.against import MIN_RATIO
+from experiments.bench.against_cases import CASES
 from experiments.kit.command_line import positive_number, positive_whole
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT, FAILED, OK
@@ -140,9 +140,9 @@ BENCHES = {
             "--old-python": {"metavar": "PYTHON", "help": "that runs it, with its libraries (default: this one)"},
             "--cases": {
                 "nargs": "+",
-                "choices": tuple(MIN_RATIO),
+                "choices": tuple(CASES),
                 "metavar": "CASE",
-                "help": f"of {', '.join(map(repr, MIN_RATIO))} (default: all)",
+                "help": f"of {', '.join(map(repr, CASES))} (default: all)",
             },
             "--rounds": _number("runs of each case in each checkout (default: 5)"),
         },

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts
-from experiments.bench.verdicts import judged
+from experiments.bench.against_cases import CASES
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from mobee.errors import MobeeError
 
@@ -33,23 +33,7 @@ TURNS = 6  # of each checkout in a round
 TURNS_OF_LONG_CASES = {"lockstep": 1, "trm evolution": 2}
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "NUMBA", "MKL")}
 
-# The old time over the new must be at least this.
-MIN_RATIO = {
-    "one arm": 2.0,
-    "64 plants": 1.5,  # times one plant
-    "reaching": 2.0,
-    "three agents": 2.5,
-    "chapter 8": 1.6,
-    "lockstep": 1.3,
-    "vi cold": 1.0,
-    "vi warm": 1.0,
-    "ik least squares": 1.0,
-    "ik evolution": 1.0,
-    "trm least squares": 1.0,
-    "trm evolution": 1.0,
-    "edges": 1.0,
-}
-NO_SLOWER = 0.97  # counts as a ratio of 1: two runs of one checkout differ by a little
+NO_SLOWER = 0.97  # least ratio of the old time to the new: two runs of one checkout differ by a little
 
 Pair = dict[str, dict[str, Any]]  # of "old" and "new": seconds of the work, and counts of the work done
 
@@ -61,7 +45,7 @@ class Settings:
     old: str
     new: str = str(REPOSITORY)
     old_python: str = sys.executable
-    cases: Sequence[str] = tuple(MIN_RATIO)
+    cases: Sequence[str] = tuple(CASES)
     rounds: int = 5
 
 
@@ -170,8 +154,8 @@ def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds
             case = cases[index]
             progress.show(done / (len(cases) * rounds), f"{case}, round {number + 1} of {rounds}")
             pairs[case].append(_round(old, new, case, turns=TURNS_OF_LONG_CASES.get(case, TURNS)))
-    found = {case: compared(of_case) for case, of_case in pairs.items()}
-    return {"rounds": rounds, "cases": found, **verdict(found)}
+    result = {"rounds": rounds, "cases": {case: compared(of_case) for case, of_case in pairs.items()}}
+    return result | verdict(result, [Requirement(case, ("cases", case, "ratio"), at_least=NO_SLOWER) for case in cases])
 
 
 def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
@@ -206,12 +190,6 @@ def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
     }
 
 
-def verdict(found: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return whether every case is as much faster as required; a little less than 1 counts as no slower."""
-    required = [judged(case, one["ratio"], at_least=MIN_RATIO[case] if MIN_RATIO[case] > 1.0 else NO_SLOWER) for case, one in found.items()]
-    return verdicts.verdict(required)
-
-
 def report(result: Mapping[str, Any]) -> str:
     """Format the measurements."""
     lines = [f"Processor time of the same work, medians of {result['rounds']} rounds; ratio: old over new"]
@@ -221,7 +199,7 @@ def report(result: Mapping[str, Any]) -> str:
         lines.append(f"{case:<20}{one['old_s']:>9.3f}{one['new_s']:>9.3f}{one['ratio']:>8.2f}{quartiles:>15}{spread:>15}")
         if not one["same_work"]:
             lines += [f"    {which}: {_counts_text(work)}" for which, work in one["work"].items()]
-    return verdicts.report_text([*lines, "required"], result)
+    return report_text([*lines, "required"], result)
 
 
 def _counts_text(work: Mapping[str, float]) -> str:

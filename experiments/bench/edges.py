@@ -6,17 +6,15 @@ The roadmap is the thesis' pre-grasp map: a palm over the table every few millim
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 import mobee
-from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration
 from experiments.bench.timing import medians, one_core, processor_time
-from experiments.bench.verdicts import Requirement
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp
 from experiments.kit.command_line import Progress
 from experiments.kit.roadmap_task import RIGHT, build
@@ -65,12 +63,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     found = medians(rounds)
     result = {"core": core, "spacing": settings.spacing, "step": STEP, "vertices": len(trm.q), "edges": len(trm.edges), **found}
     result |= {"speed": speeds.median, "thesis_s": found["both_s"] / found["both_poses"] * THESIS_POSES}
-    return result | verdict(result, agree=all(one["differing"] == 0 for one in rounds))
-
-
-def verdict(result: Mapping[str, Any], agree: bool) -> dict[str, Any]:
-    """Return whether all methods of checking agree, and are as fast as required."""
-    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS], agree=agree)
+    return result | verdict(result, REQUIREMENTS, agree=all(one["differing"] == 0 for one in rounds))
 
 
 def _round(model: mobee.Model, trm: Roadmap, speeds: Calibration) -> dict[str, float]:
@@ -141,4 +134,4 @@ def report(result: dict[str, Any]) -> str:
         f"A cup put on the table blocks {result['blocked']:.0f} edges: found among the {result['change_edges']:.0f} near it in",
         f"{1e3 * result['change_s']:.0f} ms, among all in {1e3 * result['all_s']:.0f} ms. All methods agree: {agree}.",
     ]
-    return verdicts.report_text(lines, result)
+    return report_text(lines, result)

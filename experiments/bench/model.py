@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts
 from experiments.bench.agreement import DEPTH_TOLERANCE, MIN_OVERLAP, Agreement, agreements
 from experiments.bench.calibration import Crew
 from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
 from experiments.bench.scenes import ICUB, MAKERS, MIXED, OBJECTS, PLAIN, Scene, boxes_world, upper_body, upper_body_poses, upper_body_scene
 from experiments.bench.timing import Contestant, cores_text, one_core, rates
-from experiments.bench.verdicts import Requirement, judged
+from experiments.bench.verdicts import Requirement, requirement_lines, verdict
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.model.model import Model
@@ -83,8 +82,9 @@ REQUIREMENTS = (
         for ours, least in ((BATCH, 4.0), (CALL, 2.0))
         for count in _OBJECT_COUNTS
     ),
+    Requirement("2 threads' gain over 2 processes'", ("share_of_processes",), at_least=0.9),
+    Requirement("depth errors along the normal, m", ("depth_error",), at_most=DEPTH_TOLERANCE),
 )
-MIN_THREADS_GAIN = 0.9  # of the gain that two processes have over one
 
 
 def measure(settings: Settings) -> dict[str, Any]:
@@ -139,12 +139,11 @@ def summarized(
 
     others = {name: tables(found) for name, found in measured.items() if name != ICUB}
     result = {**tables(measured[ICUB]), "others": others, "threads": threads, "agreement": [asdict(one) for one in compared]}
-    required = [one.judge(result) for one in REQUIREMENTS if one.is_measured(result)]
+    result["depth_error"] = depth_error
     if threads is not None:
-        required.append(judged("2 threads' gain over 2 processes'", threads["gain"] / threads["processes"], at_least=MIN_THREADS_GAIN))
-    required.append(judged("depth errors along the normal, m", depth_error, at_most=DEPTH_TOLERANCE))
-    verdict = verdicts.verdict(required)
-    return result | verdict | {"passed": verdict["passed"] and all(one.passed for one in compared)}
+        result["share_of_processes"] = threads["gain"] / threads["processes"]
+    judged = verdict(result, [one for one in REQUIREMENTS if one.is_measured(result)])
+    return result | judged | {"passed": judged["passed"] and all(one.passed for one in compared)}
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
@@ -253,7 +252,7 @@ def report(result: dict[str, Any]) -> str:
         f"Processor time {cores_text(result['core'])}, medians of {about['rounds']} rounds: "
         "ratios can be compared, rates only within one run."
     )
-    required = "\n".join(["required", *verdicts.requirement_lines(result["requirements"])])
+    required = "\n".join(["required", *requirement_lines(result["requirements"])])
     return "\n\n".join([head, *_tables(result), _others(result), required, *([_agreement(result)] if result["agreement"] else [])])
 
 

@@ -10,17 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts
 from experiments.bench.peers import CmaStrategy, load_cma
 from experiments.bench.timing import processor_time
-from experiments.bench.verdicts import judged
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array
 from mobee.roadmap.evolution.nes import NES
 
 TARGET, STD = 1e-8, 0.5  # cost at which a search has succeeded; first standard deviation
 MAX_EVALUATIONS = 400_000  # far more than any search that succeeds needs
-MAX_RATIO = 1.05  # evaluations over those of CMA-ES
 XNES_MAX_DIMENSIONS = 10  # up to which xNES as published is run too
 
 FUNCTIONS: dict[str, Callable[[Array], Array]] = {
@@ -35,6 +33,7 @@ STRATEGIES: dict[str, Callable[[Array, int], Any]] = {  # of a start and a seed
     "xnes": lambda start, seed: NES(start, STD, method="xnes", seed=seed),
     "snes": lambda start, seed: NES(start, STD, method="snes", seed=seed),
 }
+REQUIREMENTS = (Requirement("evaluations over CMA-ES's, median of rows", ("ratio",), at_most=1.05),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +57,8 @@ def measure(settings: Settings) -> dict[str, Any]:
             progress.show(number / len(rows), f"{name}, {d} dimensions")
             found.append(_row(name, d, settings.runs))
     ratio = float(np.median([row["ratio"] for row in found]))
-    required = [judged("evaluations over CMA-ES's, median of rows", ratio, at_most=MAX_RATIO)]
-    return {"target": TARGET, "std": STD, "runs": settings.runs, "rows": found, **verdicts.verdict(required)}
+    result = {"target": TARGET, "std": STD, "runs": settings.runs, "rows": found, "ratio": ratio}
+    return result | verdict(result, REQUIREMENTS)
 
 
 def _row(name: str, d: int, runs: int) -> dict[str, Any]:
@@ -106,4 +105,4 @@ def report(result: dict[str, Any]) -> str:
         ours, theirs = (f"{row[key]:.0f} ({row[f'{key}_us']:.1f})" for key in ("nes", "cma"))
         published = f"{row['xnes']:>8.0f}" if "xnes" in row else ""
         lines.append(f"  {row['function']:<14}{row['dimensions']:>3}{ours:>18}{theirs:>18}{row['ratio']:>7.2f}{published}")
-    return verdicts.report_text(lines, result)
+    return report_text(lines, result)

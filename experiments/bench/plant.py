@@ -7,7 +7,7 @@ One arm goes to random states of its lattice, one arm reaches, and three curious
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration
 from experiments.bench.mujoco_peer import load_mujoco, us_per_tick
 from experiments.bench.timing import cores_text, medians, one_core, some_cores
-from experiments.bench.verdicts import Requirement
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from mobee import Gains, Lattice, Model, OfflinePlant, ReachTarget, World, advance_together
 from mobee.robot.robot import Robot
@@ -83,12 +82,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     result |= {"tick": DT, "core": core, "rounds": settings.rounds, "speed": speeds.median}
     result |= {"mujoco_us_per_tick": float(np.median(mujoco)), "times_mujoco": float(np.median(ratios))}
     result["batch"] = measure_batch(settings.batched, max(5, settings.rounds) if settings.rounds > 1 else 1)
-    return result | verdict(result, hashes[0] == hashes[1])
-
-
-def verdict(result: Mapping[str, Any], same_hash: bool) -> dict[str, Any]:
-    """Return whether the plant is as fast as required, and the same seed gave the same trajectory twice."""
-    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS], same_hash=same_hash)
+    return result | verdict(result, REQUIREMENTS, same_hash=hashes[0] == hashes[1])
 
 
 def report(result: dict[str, Any]) -> str:
@@ -108,7 +102,7 @@ def report(result: dict[str, Any]) -> str:
     )
     lines.append(batch_text(result["batch"]))
     same = "yes" if result["same_hash"] else "NO"
-    return "\n".join([verdicts.report_text(lines, result), f"  same seed, same trajectory hash: {same}"])
+    return "\n".join([report_text(lines, result), f"  same seed, same trajectory hash: {same}"])
 
 
 @dataclass(frozen=True, slots=True)

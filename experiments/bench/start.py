@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.verdicts import Requirement
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of
 
@@ -93,7 +92,7 @@ def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[
         "times_numpy": ratios,
         "system": system,
     }
-    return result | verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
+    return result | verdict(result, REQUIREMENTS)
 
 
 def _times_in_new_process(program: str) -> tuple[float, float]:
@@ -153,4 +152,4 @@ def report(result: Mapping[str, Any]) -> str:
     system = result["system"]
     lines.append(f"default system without its page: ready after {system['ready_s']:.1f} s, {system['total_megabytes']:.0f} MB:")
     lines.append("  " + ", ".join(f"{service} {size:.0f}" for service, size in system["megabytes"].items()))
-    return verdicts.report_text([*lines, verdicts.calibration_line(system["speed"])], result)
+    return report_text(lines, result, system["speed"])

@@ -4,17 +4,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 import mobee
-from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.timing import some_cores
-from experiments.bench.verdicts import Requirement, judged
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.claims.ch3_roadmaps.trm import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.command_line import Progress
@@ -32,7 +31,7 @@ MIN_VERTICES = 4000
 LARGER_IS_WORSE = ("wall_s", "processor_s", "standard_wall_s", "evaluations", "largest_hole")
 
 REQUIREMENTS = tuple(
-    Requirement(f"{method}, {name}", (method, key), at_least, at_most)
+    Requirement(f"{method}, {name}", ("rows", method, key), at_least, at_most)
     for method, seconds in ((LEAST_SQUARES, 2.0), (NES, 25.0))
     for name, key, at_least, at_most in (
         ("s on 2 cores", "standard_wall_s", None, seconds),
@@ -76,14 +75,9 @@ def measure(settings: Settings) -> dict[str, Any]:
             each = [figures | _quality(example, trm, points, spacing) for trm, figures in runs]
             rows[method] = {key: (max if key in LARGER_IS_WORSE else min)(one[key] for one in each) for key in each[0]}
     about = {"cores": cores, "speed": speeds.median, "spacing": settings.spacing, "reachable": len(points), "rows": rows}
-    return about | verdict(rows, settings.vertices)
-
-
-def verdict(rows: Mapping[str, Mapping[str, float]], vertices: int) -> dict[str, Any]:
-    """Return whether the maps are built as fast, as complete and as valid as required."""
-    required = [one.judge(rows) for one in REQUIREMENTS if one.is_measured(rows)]
-    required += [judged(f"{method}, vertices", row["vertices"], at_least=vertices) for method, row in rows.items()]
-    return verdicts.verdict(required)
+    required = [one for one in REQUIREMENTS if one.is_measured(about)]
+    required += [Requirement(f"{method}, vertices", ("rows", method, "vertices"), at_least=settings.vertices) for method in rows]
+    return about | verdict(about, required)
 
 
 def _build(example: Example, spacing: float, method: Any, seed: int) -> Roadmap:
@@ -135,4 +129,4 @@ def report(result: dict[str, Any]) -> str:
         shares = f"{100.0 * row['coverage']:>7.2f} %{row['largest_hole']:>6.2f}{valid_share:>6.1f} %{edges:>5.1f} %"
         lines.append(f"  {name:<13}{counts}{shares}")
     lines.append(f"  hole: in spacings; edges: share no longer than {MAX_TURN:g} rad, {NEIGHBOURS} neighbours")
-    return verdicts.report_text(lines, result)
+    return report_text(lines, result)

@@ -6,14 +6,14 @@ A number that is judged is a ratio, a size or a count, or a time on the standard
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A bound on one number of a benchmark's result; `aim` is printed and decides nothing."""
+    """A bound on one number of a benchmark's result; `aim`, a better value, is printed and decides nothing."""
 
     name: str
     keys: tuple[str | int, ...]  # of the result, from the outermost
@@ -22,8 +22,11 @@ class Requirement:
     aim: float | None = None
 
     def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Return name, number, bounds and verdict, as they are in the JSON of the benchmark; raises KeyError if it was not measured."""
-        return judged(self.name, self._number_in(result), at_least=self.at_least, at_most=self.at_most, aim=self.aim)
+        """Return name, number, bounds and verdict, as JSON has them; NaN never passes.  Raises KeyError if it was not measured."""
+        found = self._number_in(result)
+        passed = (self.at_least is None or found >= self.at_least) and (self.at_most is None or found <= self.at_most)
+        bounds = {"at_least": self.at_least, "at_most": self.at_most, "aim": self.aim}
+        return {"name": self.name, "found": found, **{key: at for key, at in bounds.items() if at is not None}, "passed": passed}
 
     def is_measured(self, result: Mapping[str, Any]) -> bool:
         """Whether the result has the number."""
@@ -40,29 +43,10 @@ class Requirement:
         return float(found)
 
 
-def judged(
-    name: str, found: float, *, at_least: float | None = None, at_most: float | None = None, aim: float | None = None
-) -> dict[str, Any]:
-    """Return the verdict on one number as JSON has it; `aim`: a better value, which decides nothing.  NaN never passes."""
-    passed = (at_least is None or found >= at_least) and (at_most is None or found <= at_most)
-    bounds = {"at_least": at_least, "at_most": at_most, "aim": aim}
-    return {
-        "name": name,
-        "found": float(found),
-        **{key: bound for key, bound in bounds.items() if bound is not None},
-        "passed": bool(passed),
-    }
-
-
-def verdict(requirements: Sequence[Mapping[str, Any]], **conditions: bool) -> dict[str, Any]:
+def verdict(result: Mapping[str, Any], requirements: Iterable[Requirement], **conditions: bool) -> dict[str, Any]:
     """Return the part of a result that says whether it passes: every requirement is met and every named condition holds."""
-    passed = all(one["passed"] for one in requirements) and all(conditions.values())
-    return {"requirements": list(requirements), **conditions, "passed": passed}
-
-
-def calibration_line(speed: float) -> str:
-    """Return the line of a report with the speed of this machine, as a multiple of the standard machine."""
-    return f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"
+    judged = [one.judge(result) for one in requirements]
+    return {"requirements": judged, **conditions, "passed": all(one["passed"] for one in judged) and all(conditions.values())}
 
 
 def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -73,10 +57,11 @@ def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def report_text(lines: Iterable[str], result: Mapping[str, Any]) -> str:
+def report_text(lines: Iterable[str], result: Mapping[str, Any], speed: float | None = None) -> str:
     """Return the lines of a benchmark, then the speed of this machine if it was measured, then the requirements."""
-    speed = [calibration_line(result["speed"])] if "speed" in result else []
-    return "\n".join([*lines, *speed, *requirement_lines(result["requirements"])])
+    speed = result.get("speed", speed)
+    calibration = [] if speed is None else [f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"]
+    return "\n".join([*lines, *calibration, *requirement_lines(result["requirements"])])
 
 
 def _number(value: float) -> str:

@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
-from experiments.bench import verdicts
 from experiments.bench.peers import QUANTECON, DecisionProblem, load_quantecon
 from experiments.bench.timing import Contestant, cores_text, one_core, rates
-from experiments.bench.verdicts import Requirement
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from experiments.kit.learning.arm import arm_space
 from mobee import CuriousAgent
@@ -77,12 +76,7 @@ def measure(settings: Settings) -> dict[str, Any]:
         result |= {f"{ours}_times_{key}": float(np.median(found[peer] / found[name])) for ours, name in (("cold", COLD), ("warm", WARM))}
     result |= {"large_seconds": {name: float(np.median(values)) for name, values in large.items()}}
     result["large_times_scipy"] = float(np.median(large[SCIPY] / large[COLD]))
-    return result | verdict(result)
-
-
-def verdict(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return whether plans are as exact, and as fast beside the peers, as required."""
-    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
+    return result | verdict(result, REQUIREMENTS)
 
 
 def report(result: dict[str, Any]) -> str:
@@ -94,7 +88,7 @@ def report(result: dict[str, Any]) -> str:
     lines += [f"  {name:<40}{us:10.1f}" for name, us in result["us"].items()]
     large = ", ".join(f"{name} {seconds:.2f}" for name, seconds in result["large_seconds"].items())
     lines += [f"{LARGE_STATES} states, in s: {large}", f"{result['problems']} random problems, both methods, and requirements:"]
-    return verdicts.report_text(lines, result)
+    return report_text(lines, result)
 
 
 @dataclass(frozen=True, slots=True)

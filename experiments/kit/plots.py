@@ -64,11 +64,16 @@ def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[Array
     axes.errorbar(at, means, spread, **style)
 
 
+def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
+    """Draw many numbers as adjacent bars at 0, 1, ... in one patch: a rectangle for each of thousands takes seconds."""
+    axes.stairs(values, np.arange(np.size(values) + 1) - 0.5, fill=True, **style)
+
+
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
     """Draw runs of equally many numbers as stacked bars, a colour for each run; returns the heights of the bars."""
     heights = np.zeros(len(runs[0]))
     for run in runs:
-        axes.bar(np.arange(len(run)), run, bottom=heights, width=1.0)
+        draw_heights(axes, heights + run, baseline=heights)
         heights = heights + run
     axes.set_xlim(-0.5, len(heights) - 0.5)
     axes.tick_params(labelsize=7)

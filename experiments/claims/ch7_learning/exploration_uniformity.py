@@ -24,7 +24,7 @@ from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim,
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, draw_tries, explored, relative_tries_of
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import draw_heights, new_figure
 from experiments.kit.rules import decides, of_each, row, texts
 from experiments.kit.statistics import estimate, gini, interquartile_mean, interval, ratio, ratio_interval, relative_spread
 from experiments.kit.sweep import Cells, Condition, Sweep
@@ -166,7 +166,7 @@ def plot(found: Cells) -> Any:
     panels = drawing.subplots(len(shown), 2, squeeze=False, sharex="col", sharey="col", width_ratios=(1, 3))
     chosen = constraint_actions(sum(shown.values(), []))
     for (left, right), (explorer, (run, *_)) in zip(panels, shown.items(), strict=True):
-        left.bar(np.arange(len(run.visits)), run.visits, width=1.0, color="0.4")
+        draw_heights(left, run.visits, color="0.4")
         left.set_ylabel(TITLES[explorer])
         draw_tries(right, run.tries, chosen, 2.5, "at constraints")
         right.set_xlim(-1, len(run.tries))

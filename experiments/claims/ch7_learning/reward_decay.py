@@ -21,7 +21,7 @@ import numpy as np
 from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import draw_heights, new_figure
 from experiments.kit.rules import of_each, stands_below, texts
 from experiments.kit.statistics import interquartile_mean, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -109,7 +109,7 @@ def plot(found: Cells) -> Any:
     for column, (explorer, runs) in enumerate(groups.items()):
         for row, time in enumerate(times):
             rewards, axes = runs[0]["rewards"][row], panels[row][column]
-            axes.bar(np.arange(len(rewards)), rewards, width=1.0, color="C0")
+            draw_heights(axes, rewards, color="C0")
             axes.axhline(rewards.mean(), color="C3", linewidth=0.8)
             axes.set_xlim(-0.5, len(rewards) - 0.5)
             axes.tick_params(labelsize=7)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from experiments.kit.cells import CellResult
+from experiments.kit.plots import draw_heights
 from experiments.kit.sweep import runs_by
 from mobee import Lattice
 from mobee.arrays import Array, Ints
@@ -133,5 +134,5 @@ def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> l
 def draw_tries(axes: Any, tries: Ints, chosen: NDArray[np.bool_], width: float, label: str) -> None:
     """Draw the tries (E,) of every state-action as bars, the chosen ones in red and as wide as `width`."""
     number = np.arange(len(tries))
-    axes.bar(number[~chosen], tries[~chosen], width=1.0, color="0.6", label="others")
+    draw_heights(axes, np.where(chosen, 0, tries), color="0.6", label="others")
     axes.bar(number[chosen], tries[chosen], width=width, color="C3", label=label)

@@ -10,16 +10,11 @@ from pathlib import Path
 import pytest
 
 from experiments.bench import against
-from experiments.bench.against import MIN_RATIO, REPOSITORY, AgainstFailed, Checkout, checkout, compared, measure_checkouts, report, verdict
-from experiments.bench.against_cases import CASES
+from experiments.bench.against import NO_SLOWER, REPOSITORY, AgainstFailed, Checkout, checkout, compared, measure_checkouts, report
 
 
 def one_round(old: float, new: float, poses: int = 10) -> against.Pair:
     return {"old": {"seconds": old, "work": {"poses": 10}}, "new": {"seconds": new, "work": {"poses": poses}}}
-
-
-def test_every_case_has_its_requirement() -> None:
-    assert CASES.keys() == MIN_RATIO.keys()
 
 
 def test_the_median_of_the_rounds_ratios_counts() -> None:
@@ -32,21 +27,8 @@ def test_the_median_of_the_rounds_ratios_counts() -> None:
 def test_counts_are_printed_where_the_work_differs() -> None:
     found = {"edges": compared([one_round(2.0, 1.0, poses=11)])}
     assert not found["edges"]["same_work"]
-    lines = report({"rounds": 1, "cases": found, **verdict(found)}).splitlines()
+    lines = report({"rounds": 1, "cases": found, "requirements": []}).splitlines()
     assert [line.strip() for line in lines if "poses" in line] == ["old: poses 10", "new: poses 11"]
-
-
-def test_each_case_must_be_as_much_faster_as_required_or_no_slower() -> None:
-    ratios = {"one arm": 1.9, "lockstep": 1.3, "edges": 0.98, "vi warm": 0.9}
-    found = {case: compared([one_round(ratio, 1.0)]) for case, ratio in ratios.items()}
-    passed = {one["name"]: one["passed"] for one in verdict(found)["requirements"]}
-    assert passed == {"one arm": False, "lockstep": True, "edges": True, "vi warm": False}
-
-
-def test_the_report_fits_80_columns() -> None:
-    found = {case: compared([one_round(123.456, 100.0)]) for case in MIN_RATIO}
-    result = {"rounds": 5, "cases": found, **verdict(found)}
-    assert max(map(len, report(result).splitlines())) <= 80
 
 
 @pytest.fixture
@@ -71,6 +53,8 @@ def test_each_checkout_works_with_its_own_library(toys: tuple[Checkout, Checkout
     result = measure_checkouts(*toys, ["edges", "one arm"], rounds=2)
     assert [result["cases"][case]["ratio"] for case in ("edges", "one arm")] == [3.0, 3.0]
     assert result["passed"] and result["rounds"] == 2
+    back = measure_checkouts(toys[1], toys[0], ["edges"], rounds=1)
+    assert not back["passed"] and back["requirements"][0]["at_least"] == NO_SLOWER
 
 
 def test_a_failing_case_is_reported_with_its_last_line(toys: tuple[Checkout, Checkout]) -> None:

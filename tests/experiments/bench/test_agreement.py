@@ -19,7 +19,6 @@ from experiments.bench.agreement import (
 )
 from experiments.bench.scenes import MAKERS, Maker, Scene, upper_body_scene
 from mobee.model.world_object import WorldObject
-from mobee.robot.robot import Shape
 
 POSES = 20
 
@@ -94,21 +93,6 @@ def test_a_depth_that_is_not_minimal_does_not_pass(scene: Scene) -> None:
     assert found.depth_error() == pytest.approx(1e-6, rel=1e-3)
 
 
-def test_a_peer_with_longer_separations_changes_nothing(scene: Scene, ours: ModelContacts) -> None:
-    found = compared_with(scene, ours, "MuJoCo", turned=True)
-    assert found.passed and found.beaten <= DEPTH_TOLERANCE
-
-
-def test_the_model_and_all_peers_agree_among_boxes() -> None:
-    for module in ("mujoco", "pinocchio"):
-        pytest.importorskip(module)
-    found, depth_error = agreements(upper_body_scene(30, POSES), with_coal=True)
-    assert [one.peer for one in found] == ["MuJoCo", "python-fcl", "coal"]
-    assert [one.peer for one in found if not one.passed] == []
-    assert all(one.contacts > 50 for one in found)
-    assert depth_error < DEPTH_TOLERANCE
-
-
 @pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.name)
 def test_the_model_and_all_peers_agree_on_robots_of_other_makers(maker: Maker) -> None:
     for module in ("mujoco", "pinocchio"):
@@ -148,12 +132,6 @@ def test_extents_of_the_primitives(geometry: mobee.Geometry, along_x: float, alo
     moved = np.array([0.0, 0.0, 5.0]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # its z is now along x
     assert extent(one, moved, X) == pytest.approx(along_z)
     assert extent(one, moved, Z) >= 5.0
-
-
-def test_a_hull_extends_to_its_farthest_corner() -> None:
-    corners = np.array([[0.1, 0.0, 0.0], [-0.3, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.4]])
-    hull = Shape("it", 1, "convex", (), *UPRIGHT, "solid", "body", corners)
-    assert [extent(hull, UPRIGHT, direction) for direction in (X, -X, Z)] == pytest.approx([0.1, 0.3, 0.4])
 
 
 def test_the_separation_is_the_overlap_along_a_direction() -> None:

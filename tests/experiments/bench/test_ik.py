@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,22 +9,17 @@ import pytest
 import mobee
 from experiments.bench.calibration import Calibration
 from experiments.bench.ik import (
-    ALL_MOTORS,
     BOXES,
-    HYBRID,
     MOTORS,
-    NES,
     RIVALS,
     TARGETS_PER_TURN,
     Entrant,
     Settings,
     Solve,
-    fine_target,
     measure,
     scene,
     solve_by_turns,
     targets,
-    verdict,
 )
 from experiments.bench.ik_rivals import MinkPeer, Target
 from mobee.errors import NotInstalled
@@ -59,14 +53,6 @@ def test_rivals_reach_an_easy_target_and_stop(model: mobee.Model, name: str) -> 
     assert np.linalg.norm(model.evaluate(found).position("right_palm") - there - [0.0, 0.0, 0.02]) <= 0.02
 
 
-@pytest.mark.parametrize("name", RIVALS)
-def test_rivals_give_up(model: mobee.Model, name: str) -> None:
-    if name.startswith("CMA"):
-        pytest.importorskip("cma")
-    problem = Problem(model, [mobee.costs.position("right_palm", [3.0, 0.0, 0.0])], None, MOTORS)
-    assert RIVALS[name](problem, 0, 250) is None
-
-
 def test_mink_finds_poses_that_are_good_by_our_own_model(model: mobee.Model) -> None:
     pytest.importorskip("mink")
     peer = MinkPeer(model.robot)
@@ -81,33 +67,11 @@ def test_mink_finds_poses_that_are_good_by_our_own_model(model: mobee.Model) -> 
         np.testing.assert_array_equal(found[still], model.robot.home[still])
 
 
-def test_mink_gives_up_on_what_is_out_of_reach(model: mobee.Model) -> None:
-    pytest.importorskip("mink")
-    aim = replace(targets(model, 1)[0], position=np.array([3.0, 0.0, 0.0]))
-    problem = Problem(model, aim.costs(), None, MOTORS)
-    assert MinkPeer(model.robot).solve(problem, aim, 0, 100) is None
-    assert 100 <= problem.evaluations < 200
-
-
-def test_a_finer_target_is_met_more_finely(model: mobee.Model) -> None:
-    fine = fine_target(targets(model, 1)[0])
-    ik = mobee.solve_ik(model, fine.costs(), motors=MOTORS)
-    assert ik.reached and ik.residuals["position right_palm"] <= 0.001
-    assert ik.residuals["orientation right_palm"] <= np.deg2rad(1.0)
-
-
 def test_without_mink_it_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("cma")
     monkeypatch.setitem(sys.modules, "mink", None)
     with pytest.raises(NotInstalled, match=r"\[bench\]"):
         measure(Settings())
-
-
-def test_times_are_judged_as_on_the_standard_machine_or_beside_a_peer() -> None:
-    one = {"reached": 1.0, "ms": 1000.0, "standard_ms": 0.5, "standard_ms_95": 2.0, "times_cma": 200.0}
-    assert verdict({HYBRID: one, NES: one, ALL_MOTORS: one})["passed"]
-    assert not verdict({HYBRID: one | {"times_cma": 50.0}, NES: one, ALL_MOTORS: one})["passed"]
-    assert not verdict({HYBRID: one, NES: one | {"standard_ms": 100.0}, ALL_MOTORS: one})["passed"]
 
 
 def test_solvers_take_turns_and_every_target_has_its_own_seed() -> None:

@@ -4,12 +4,9 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
-import pytest
-from scipy.spatial import ConvexHull
 
 from experiments.bench import scenes
-from experiments.bench.scenes import CORNERS, HULLS, MAKERS, MIXED, OBJECTS, PLAIN, Maker, boxes_world, upper_body, upper_body_poses
-from mobee import Model
+from experiments.bench.scenes import MIXED, PLAIN, boxes_world, upper_body
 from mobee.model.fcl_engine import tested_pairs as pairs_of
 from mobee.model.snapshot import NO_HANDS
 
@@ -22,24 +19,6 @@ def test_the_upper_body_has_the_size_that_is_documented() -> None:
     assert len(robot.untested) == 159
 
 
-def test_as_solids_it_has_the_same_pairs() -> None:
-    fields, solids = upper_body("field"), upper_body("solid")
-    assert np.array_equal(solids.solid_pairs, fields.field_pairs)
-    assert len(solids.field_pairs) == 0
-
-
-def test_fewer_primitives_are_the_first_of_all() -> None:
-    some = upper_body(primitives=20)
-    assert [shape.name for shape in some.shapes] == [f"s{index}" for index in range(20)]
-    assert some.field_pairs.max() == 19
-
-
-def test_each_world_is_the_beginning_of_the_next() -> None:
-    few, many = boxes_world(10), boxes_world(100)
-    assert (len(few.objects), len(many.objects)) == (10, 100)
-    assert all(np.array_equal(few.objects[name].position, many.objects[name].position) for name in few.objects)
-
-
 def test_pairs_of_base_and_boxes_are_not_tested_as_neither_moves() -> None:
     robot = upper_body()
     first, second, _ = pairs_of(robot, boxes_world(10).snapshot, NO_HANDS)
@@ -49,27 +28,6 @@ def test_pairs_of_base_and_boxes_are_not_tested_as_neither_moves() -> None:
     assert len(first) == 7451 + 10 * (129 - 3)
 
 
-def test_poses_are_the_same_each_time_and_within_the_limits() -> None:
-    low, high = upper_body().limits.T
-    poses = upper_body_poses(50)
-    assert ((low <= poses) & (poses <= high)).all()
-    assert upper_body_poses(20) == pytest.approx(poses[:20])
-
-
-@pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.name)
-def test_kinds_come_in_equal_parts(maker: Maker) -> None:
-    counted = Counter(shape.kind for shape in maker.robot().shapes)
-    assert counted.keys() == set(maker.kinds) and len(set(counted.values())) == 1
-    around = Counter(one.kind for one in maker.world(OBJECTS).objects.values())
-    assert around.keys() == set(maker.around) and len(set(around.values())) == 1
-
-
-def test_hulls_have_as_many_corners_as_they_say() -> None:
-    for shape in HULLS.robot().shapes:
-        assert shape.vertices is not None
-        assert len(ConvexHull(shape.vertices).vertices) == CORNERS
-
-
 def test_the_seed_decides_robot_world_and_poses() -> None:
     one, again, other = (scenes._random_robot.__wrapped__(MIXED, seed) for seed in (1, 1, 2))
     assert [shape.size for shape in one.shapes] == [shape.size for shape in again.shapes] != [shape.size for shape in other.shapes]
@@ -77,14 +35,6 @@ def test_the_seed_decides_robot_world_and_poses() -> None:
     assert list(many)[:3] == list(few)
     np.testing.assert_array_equal([few[name].position for name in few], [many[name].position for name in few])
     np.testing.assert_array_equal(MIXED.poses(5), MIXED.poses(9)[:5])
-
-
-@pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.name)
-def test_random_poses_are_within_the_limits_and_have_some_contacts(maker: Maker) -> None:
-    robot, q = maker.robot(), maker.poses(40)
-    assert ((robot.limits[:, 0] <= q) & (q <= robot.limits[:, 1])).all()
-    found = [len(Model(robot, maker.world(count)).evaluate(q).table) / len(q) for count in (0, OBJECTS)]
-    assert 0.5 < found[0] < 20.0 and 1.5 * found[0] < found[1] < 60.0
 
 
 def test_links_that_are_mounted_on_each_other_are_not_tested() -> None:

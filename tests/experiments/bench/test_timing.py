@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from experiments.bench import timing
-from experiments.bench.timing import Contestant, medians, one_core, rates
+from experiments.bench.timing import Contestant, one_core, rates
 
 
 class ProcessorTime:
@@ -58,7 +58,3 @@ def test_every_thread_stays_on_one_core_and_is_free_again_after() -> None:
     thread.join()
     assert seen == [{core}]
     assert os.sched_getaffinity(0) == before
-
-
-def test_medians_are_taken_of_each_number() -> None:
-    assert medians([{"a": 1.0, "b": 5.0}, {"a": 3.0, "b": 4.0}, {"a": 2.0, "b": 9.0}]) == {"a": 2.0, "b": 5.0}

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
-from experiments.kit.plots import draw_bars, draw_curve, draw_points, draw_stacked_bars, new_figure
+from experiments.kit.plots import MatplotlibMissing, draw_bars, draw_curve, draw_points, draw_stacked_bars, new_figure
 from experiments.kit.statistics import interquartile_mean, interval
 from mobee.errors import InvalidValue
 
@@ -43,9 +45,15 @@ def test_points_stand_at_the_means(axes):
 
 def test_stacked_bars_are_as_high_as_the_sums(axes):
     assert draw_stacked_bars(axes, [np.array([1.0, 2.0]), np.array([0.0, 4.0])]).tolist() == [1.0, 6.0]
-    assert max(bar.get_y() + bar.get_height() for bar in axes.patches) == 6.0
+    assert max(patch.get_path().vertices[:, 1].max() for patch in axes.patches) == 6.0
 
 
 def test_a_figure_without_rows_is_refused():
     with pytest.raises(InvalidValue, match="--resume"):
         new_figure(13.0, 2.4 * 0)
+
+
+def test_without_matplotlib_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MatplotlibMissing, match=r'pip install "mobee\[figures\]"'):
+        new_figure(4.0, 3.0)

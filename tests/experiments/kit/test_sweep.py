@@ -107,13 +107,6 @@ def test_a_cell_that_fails_is_named_and_the_others_are_finished(tmp_path, jobs):
     assert "the toy is broken" in (tmp_path / "cells" / "toy-s1.failed.txt").read_text()
 
 
-def test_of_many_failed_cells_the_first_are_named(tmp_path):
-    with pytest.raises(CellsFailed) as error:
-        run_cells(useless, cells(5), tmp_path, inline(tmp_path))
-    first, *named, rest = str(error.value).splitlines()
-    assert first.startswith("5 of 5 cells failed") and len(named) == 3 and rest == "  and 2 more"
-
-
 def test_a_cell_whose_process_dies_is_named_and_the_others_are_finished(tmp_path):
     with pytest.raises(CellsFailed, match=r"toy-s0: its process died: killed by signal 9"):
         run_cells(work, cells(4, dies=0), tmp_path, options(str(tmp_path), "--jobs", "2"))
@@ -203,15 +196,6 @@ def test_the_remaining_time_follows_the_costs_of_finished_cells():
     time_left.finished(4.0, 140.0)
     assert time_left.fraction == 0.5 and time_left.seconds == 50.0
     assert str(time_left) == "50 s left"
-
-
-def test_long_times_are_shown_in_minutes_and_hours():
-    time_left = TimeLeft([1.0, 100.0], [1.0, 100.0], start=0.0)
-    time_left.finished(1.0, 18.0)
-    assert str(time_left) == "30 min left"
-    time_left = TimeLeft([1.0, 100.0], [1.0, 100.0], start=0.0)
-    time_left.finished(1.0, 180.0)
-    assert str(time_left) == "5 h 00 min left"
 
 
 def test_a_sweep_without_work_is_over():

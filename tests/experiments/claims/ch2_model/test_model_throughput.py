@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import builtins
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +22,9 @@ from experiments.claims.ch2_model.model_throughput_endurance import (
     witnesses,
 )
 from experiments.claims.ch2_model.model_throughput_threads import Oscillator
-from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.records import read_records
 from mobee.model.snapshot import changed
-from tests.experiments.small_run import options_of
-
-HEAD = "robot,objects,edits,seconds,evaluations\n"
+from tests.experiments.options import options_of
 
 
 def run(folder, *options):
@@ -75,22 +70,6 @@ def test_an_exception_in_the_models_thread_is_raised(monkeypatch):
         list(flood_model("katana", first=1, last=3, edits=5, seed=0, is_over=lambda: False))
 
 
-def test_an_interrupted_run_continues_after_its_records(tmp_path):
-    part = run(tmp_path, "--robots", "katana", "--objects", "2")
-    assert part["complete"]
-    assert part["katana"]["objects_reached"] == 2
-    whole = run(tmp_path, "--objects", "4")
-    assert whole["complete"]
-    with (tmp_path / "flood.csv").open() as file:
-        flooded = [(row["robot"], int(row["objects"])) for row in csv.DictReader(file) if int(row["edits"])]
-    assert flooded == [(robot, n) for robot in ("katana", "icub") for n in (1, 2, 3, 4)]
-
-
-def test_a_run_out_of_time_says_that_it_is_not_complete(tmp_path):
-    result = run(tmp_path, "--robots", "katana", "--objects", "1000", "--edits", "1", "--duration", "1e-6")
-    assert not result["complete"]
-
-
 def test_rates_weigh_records_by_their_time():
     def record(objects, seconds, evaluations):
         return {"robot": "icub", "objects": objects, "edits": 10, "seconds": seconds, "evaluations": evaluations}
@@ -115,10 +94,6 @@ def test_a_flood_too_short_in_all_has_no_rate():
     records = [short(number, 20) for number in range(1, 6)]
     assert not dict(rates(records))
     assert not list(binned(records, 1.0))
-
-
-def test_a_flood_shorter_than_a_bin_is_one_point():
-    assert list(binned([short(number, 10) for number in range(1, 62)], 1.0)) == [(31.0, pytest.approx(1000.0))]
 
 
 def test_four_threads_edit_for_some_seconds_and_nothing_is_torn(tmp_path):
@@ -211,58 +186,3 @@ def test_a_leak_has_a_slope_and_a_first_rise_has_none():
     assert slope_mb_per_minute(seconds, 50.0 + seconds / 60.0) == pytest.approx(1.0)
     assert slope_mb_per_minute(seconds, np.where(seconds < 15.0, 50.0 + seconds, 65.0)) == pytest.approx(0.0, abs=1e-9)
     assert slope_mb_per_minute(seconds[:50], seconds[:50]) is None
-
-
-def test_the_figure_is_drawn_from_the_records(tmp_path):
-    pytest.importorskip("matplotlib")
-    (tmp_path / "flood.csv").write_text(HEAD + "icub,0,0,0.5,500\nicub,1,2000,0.3,200\nkatana,1,2000,0.3,900\n")
-    picture = model_throughput.EXPERIMENT.method.figure(tmp_path)
-    assert picture.parent == tmp_path
-    assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_of_an_endurance_run_its_course_is_drawn(tmp_path):
-    pytest.importorskip("matplotlib")
-    endure(tmp_path, threads=1, duration=0.2, seed=0)
-    assert model_throughput.EXPERIMENT.method.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
-
-
-def axes_of(tmp_path, rows):
-    """The axes that are drawn of these rows."""
-    pytest.importorskip("matplotlib")
-    (tmp_path / "flood.csv").write_text(HEAD + rows)
-    return model_throughput.plot(model_throughput.read_flood(tmp_path / "flood.csv")).axes[0]
-
-
-def test_a_curve_of_one_point_has_a_marker_and_the_axis_ends_with_the_data(tmp_path):
-    axes = axes_of(tmp_path, "".join(f"icub,{n},200,0.01,10\n" for n in range(1, 61)))
-    (line,) = (line for line in axes.lines if line.get_label() == "iCub, with edits")
-    assert len(line.get_xdata()) == 1 and line.get_marker() == "s"
-    assert 60.0 < axes.get_xlim()[1] < 70.0
-    assert not axes.collections, "the thesis speaks of hundreds of objects"
-
-
-def test_the_thesis_band_ends_with_the_data(tmp_path):
-    axes = axes_of(tmp_path, "icub,300,2000,0.5,500\n")
-    (band,) = axes.collections
-    assert band.get_paths()[0].get_extents().x1 == 300.0
-
-
-def test_without_records_there_is_nothing_to_draw(tmp_path):
-    (tmp_path / "flood.csv").write_text(HEAD)
-    with pytest.raises(mobee.InvalidValue, match="no records"):
-        model_throughput.EXPERIMENT.method.figure(tmp_path)
-
-
-def test_without_matplotlib_the_error_says_what_to_install(tmp_path, monkeypatch):
-    (tmp_path / "flood.csv").write_text(HEAD + "icub,0,0,0.5,500\n")
-    real = builtins.__import__
-
-    def missing(name, *rest, **more):
-        if name.startswith("matplotlib"):
-            raise ImportError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(MatplotlibMissing, match=r'pip install "mobee\[figures\]"'):
-        model_throughput.EXPERIMENT.method.figure(tmp_path)

@@ -7,7 +7,7 @@ import pytest
 from experiments.claims.ch3_roadmaps import ngik
 from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
 from tests.experiments.finished_cells import finished_trials
-from tests.experiments.small_run import options_of
+from tests.experiments.options import options_of
 
 SEEDS = 6
 

@@ -11,7 +11,6 @@ from experiments.claims.ch3_roadmaps.trm import (
     COLUMNS,
     GRAPH,
     MAPS,
-    METHODS,
     NAMES,
     PREGRASP,
     SIZE,
@@ -26,7 +25,7 @@ from experiments.claims.ch3_roadmaps.trm import (
     rebuilt,
     valid,
 )
-from experiments.claims.ch3_roadmaps.trm_pictures import caption_of, cloud_panel, planned
+from experiments.claims.ch3_roadmaps.trm_pictures import planned
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell
 from experiments.kit.roadmap_task import build
@@ -37,7 +36,6 @@ from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
 from tests.experiments.finished_cells import finished
-from tests.experiments.small_run import options_of
 from tests.mobee.planar import planar_arm
 
 SPACING = np.array([0.15, 0.15])
@@ -115,15 +113,6 @@ def test_a_pose_of_every_example_is_found_where_its_film_begins(name: str) -> No
     assert np.abs(example.task.of(example.model.evaluate(ik.q[None]))[0] - y).max() <= 0.1 * np.max(example.spacing)
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_an_example_has_all_that_its_pictures_need(name: str) -> None:
-    example = EXAMPLES[name]()
-    low, high = example.task.box.T
-    assert all(len(y) == len(low) and (low <= y).all() and (y <= high).all() for y in example.via)
-    assert set(example.markers) <= set(example.model.robot.markers)
-    assert all(thing.role != "ghost" or thing.link is not None for thing in example.model.world.objects.values())
-
-
 @pytest.fixture(scope="module")
 def pushing() -> Roadmap:
     return build(EXAMPLES["push-over"](), "least_squares")
@@ -148,28 +137,12 @@ def test_a_film_goes_through_the_points_of_its_task(pushing: Roadmap) -> None:
     assert (np.diff(motion.times) > 0.0).all()
 
 
-def test_task_coordinates_are_in_cm_and_degrees() -> None:
-    both = EXAMPLES["both-held"]().task.coordinates + EXAMPLES["inspect"]().task.coordinates
-    assert caption_of(both, np.array([-0.301, 0.12, np.pi / 2])) == "x -30, z 12, 90° cm"
-
-
-def test_a_cloud_has_the_places_of_all_markers(pushing: Roadmap) -> None:
-    panel = cloud_panel(EXAMPLES["push-over"](), pushing, 40)
-    assert panel.picture.shape[0] == 40 and "push over" in panel.caption
-
-
 def test_a_map_is_measured_and_can_be_rebuilt() -> None:
     example = EXAMPLES["inspect"]()
     values = built(example, "least_squares", 0)
     assert values["valid"] == 1.0 and 0.0 < values["connected"] <= 1.0 and values["vertices"] == len(values["q"])
     again = rebuilt(example, values)
     np.testing.assert_array_equal(again.y, example.task.of(example.model.evaluate(values["q"])))
-
-
-def test_cells_are_what_can_be_reached_and_a_map_for_every_method_and_seed() -> None:
-    cells = trm.cells(options_of(trm.EXPERIMENT, "--seed", "3", "--seeds", "2", "--tasks", "inspect", "unscrew"))
-    assert len({cell.name for cell in cells}) == len(cells) == 2 * (1 + 2 * len(METHODS))
-    assert len(trm.cells(options_of(trm.EXPERIMENT, "--seeds", "1", "--quick"))) == len(trm.QUICK) * (1 + len(METHODS))
 
 
 def test_claims_hold_of_sound_maps_and_fail_with_one_that_is_not() -> None:

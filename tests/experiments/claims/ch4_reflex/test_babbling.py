@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.claims.ch4_reflex import babbling
-from experiments.claims.ch4_reflex.babbling import EXPERIMENT, as_table, depth_histogram, summarise, verdict
+from experiments.claims.ch4_reflex.babbling import EXPERIMENT, summarise, verdict
 from experiments.claims.ch4_reflex.babbling_trial import (
     COMMANDS,
     COUNT,
@@ -34,21 +34,17 @@ from experiments.claims.ch4_reflex.babbling_trial import (
     judge,
     measure,
     moved_motors,
-    path_length,
     read_commands,
-    read_trial,
     scenario,
-    write_trial,
 )
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch
 from mobee import load_robot
 from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main
-from tests.experiments.small_run import options_of
+from tests.experiments.options import options_of
 
 ROBOT = load_robot("icub")
 DT = 0.02
-HAND = "l_hand table"
 PARTS = ("torso", "head", "left_arm", "right_arm")
 TICKS = 100
 ENDINGS = dict.fromkeys(ROBOT.parts, "over")
@@ -116,13 +112,6 @@ def test_trials_add_up() -> None:
     assert row["path_a_minute_rad"] == 8.0
 
 
-def test_the_table_has_80_columns_and_a_line_a_pair() -> None:
-    many = trial(tuple(0.001 for _ in range(1234)), seconds=7200.0)
-    lines = as_table(rows(off=many)).splitlines()
-    assert max(len(line) for line in lines) <= 80
-    assert any("l_forearm - table" in line and "1234" in line for line in lines)
-
-
 def test_a_finished_run_is_printed_as_a_table_with_the_verdicts_below(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(babbling, "_run_until_repeatable", lambda *settings: None)
     monkeypatch.setattr(babbling, "read_trials", lambda folder, mode: [GOOD[mode]])
@@ -131,12 +120,6 @@ def test_a_finished_run_is_printed_as_a_table_with_the_verdicts_below(tmp_path, 
     assert "collisions (solid contacts)" in said and "passed: yes" in said
     assert "2.0 moves more smoothly than 1.0: yes" in said
     assert all(len(line) <= 80 for line in said.splitlines() if not line.startswith("run: "))
-
-
-def test_minutes_are_cut_into_trials() -> None:
-    assert babbling.trial_lengths(120.0, 10.0) == [10.0] * 12
-    assert babbling.trial_lengths(25.0, 10.0) == [10.0, 10.0, 5.0]
-    assert babbling.trial_lengths(1.0, 10.0) == [1.0]
 
 
 def test_every_mode_is_a_scenario_that_the_launcher_accepts(tmp_path: Path) -> None:
@@ -221,12 +204,6 @@ def test_the_figure_shows_the_finished_trials(tmp_path: Path, monkeypatch: pytes
     assert EXPERIMENT.method.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
 
 
-def test_every_event_is_in_one_range_of_the_histogram() -> None:
-    depths = [0.00005, 0.00015, 0.0002, 0.0007, 0.0015, 0.02]
-    histogram = depth_histogram(Touch(HAND, i, i, depth) for i, depth in enumerate(depths))
-    assert histogram == {"<0.1": 1, "0.1-0.2": 1, "0.2-0.5": 1, "0.5-1": 1, "1-2": 1, ">2": 1}
-
-
 def part(name: str) -> slice:
     return ROBOT.parts[name].slice
 
@@ -283,14 +260,6 @@ def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
     assert measured.jerk_squared == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_measures_of_a_trial_are_read_as_they_were_written(tmp_path: Path) -> None:
-    left_by_a_trial(tmp_path)
-    measured = measure(tmp_path, ROBOT, DT)
-    write_trial(tmp_path / "trial.json", measured)
-    assert read_trial(tmp_path / "trial.json") == measured
-    assert not list(tmp_path.glob("*.new"))
-
-
 def test_ended_commands_are_in_the_log_and_an_incomplete_line_is_ignored(tmp_path: Path) -> None:
     path = tmp_path / "deep" / COMMANDS
     log = CommandLog(path)
@@ -318,10 +287,6 @@ def test_beyond_a_limit_is_positive_and_inside_negative() -> None:
     assert np.allclose(beyond_limits(0.5 * q, limits), [-0.25, -0.375])
 
 
-def test_the_path_counts_motion_back() -> None:
-    assert path_length(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]])) == pytest.approx(2.0)
-
-
 def test_the_jerk_of_a_cubic_is_constant() -> None:
     t = np.arange(10) * DT
     assert np.allclose(jerk(np.column_stack([t**3, -2.0 * t**3]), DT), [6.0, -12.0])
@@ -345,14 +310,6 @@ def test_postures_fill_the_ranges_and_leave_the_hands_at_home() -> None:
     assert (q[:, still] == ROBOT.home[still]).all()
 
 
-def test_a_seed_is_a_sequence() -> None:
-    one, same, other = Targets(ROBOT, 1), Targets(ROBOT, 1), Targets(ROBOT, 2)
-    first = one.next()
-    assert np.array_equal(first, same.next())
-    assert not np.array_equal(first, other.next())
-    assert not np.array_equal(first, one.next())
-
-
 @given(start=angles, target=angles, speed=st.floats(0.05, 2.0))
 def test_a_move_goes_from_start_to_target_within_its_speed(start: np.ndarray, target: np.ndarray, speed: float) -> None:
     move = PositionMove(start, target, np.full(3, speed))
@@ -363,17 +320,3 @@ def test_a_move_goes_from_start_to_target_within_its_speed(start: np.ndarray, ta
     if move.duration > 0.0:
         assert np.abs(np.diff(course, axis=0)).max() / (times[1] - times[0]) <= speed * (1.0 + 1e-6)
     assert (np.diff(course, axis=0) * np.sign(target - start) >= -1e-12).all()
-
-
-def test_the_speed_is_reached_and_the_jerk_is_least() -> None:
-    move = PositionMove(np.zeros(1), np.ones(1), np.full(1, 0.5))
-    times = np.linspace(0.0, move.duration, 2001)
-    course = np.array([move.at(t)[0] for t in times])
-    assert np.isclose(np.gradient(course, times).max(), 0.5, rtol=1e-4)
-    assert np.abs(np.diff(course, n=6)).max() < 1e-12  # a polynomial of fifth degree
-
-
-def test_a_motor_with_a_short_distance_does_not_wait_for_the_others() -> None:
-    move = PositionMove(np.zeros(2), np.array([1.0, 0.1]), np.ones(2))
-    assert move.at(0.2 * move.duration)[1] == 0.1
-    assert move.at(0.2 * move.duration)[0] < 0.2

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch5_control import forced_contact
-from tests.experiments.small_run import small_run
 
 DT = 0.01
 
@@ -24,12 +23,3 @@ def test_more_force_drives_a_field_deeper_into_the_table(monkeypatch) -> None:
     still, pushed = forced_contact.press("default", "table-left-hand", (0.0, 300.0), 0)
     assert still.field_mm == 0.0 and pushed.field_mm > 5.0
     assert still.clause_deg < 0.0 and still.limit_deg < 0.0
-
-
-def test_walls_and_targets_are_summed_up_separately(tmp_path, monkeypatch) -> None:
-    pytest.importorskip("matplotlib")
-    monkeypatch.setattr(forced_contact, "LEVELS", (0.0, 3.0))
-    monkeypatch.setattr(forced_contact, "LEVEL_SECONDS", 2.0)
-    monkeypatch.setattr(forced_contact, "DRAWN_SECONDS", 4.0)
-    found = small_run(forced_contact.EXPERIMENT, tmp_path, "--gains", "default", "--walls", "chest", "--targets", "in-reach")
-    assert set(found["default"]) == {"chest", "drawn: in-reach"}

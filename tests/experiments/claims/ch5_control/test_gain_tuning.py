@@ -13,14 +13,12 @@ from experiments.claims.ch5_control.gain_tuning import (
     gains_with,
     numbers_of,
     objective,
-    press,
-    press_targets,
     read_tried,
     search,
 )
 from experiments.kit.control.plant_runs import icub
 from mobee import Gains
-from tests.experiments.small_run import options_of, small_run
+from tests.experiments.options import options_of
 
 GOOD = Judged(2.0, 0.0, 0.0, 20.0, 0.0, 0.5, 0.5, 0.5, -5.0, -5.0, 0.0, 30.0)
 
@@ -62,20 +60,8 @@ def test_an_interrupted_search_continues_with_the_same_results(imagined, tmp_pat
     assert [[*one.numbers.values()] for one in parts] == [pytest.approx([*one.numbers.values()], rel=1e-5) for one in whole]
 
 
-def test_the_result_is_a_table_before_and_after(imagined, tmp_path) -> None:
-    pytest.importorskip("matplotlib")
-    found = small_run(EXPERIMENT, tmp_path, "--sets", "5")
-    assert set(found["gains"]) == set(TUNED) and found["judged"] == 5
-    assert found["objective"][1] <= found["objective"][0]
-
-
 def test_numbers_become_gains() -> None:
     numbers = {**numbers_of(Gains.default()), "max_spring of the torso": 7.0, "damping": 33.0}
     gains = gains_with(numbers)
     assert gains.damping == 33.0
     assert gains.of_motors("max_spring", icub().robot.motors)[:3].tolist() == [7.0] * 3
-
-
-def test_a_press_finds_the_table_with_a_field() -> None:
-    pressed = press(Gains.default(), press_targets(1)[0], age=1)
-    assert pressed.field > 0.005

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 
 import mobee
 from experiments.claims.ch5_control import motor_identification_fitting, motor_identification_recording
-from experiments.claims.ch5_control.motor_identification import EXPERIMENT, csv_table, summary, toml_data
-from experiments.claims.ch5_control.motor_identification_fitting import Fit, check_method, fit, known_motors, respond, synthetic
+from experiments.claims.ch5_control.motor_identification import toml_data
+from experiments.claims.ch5_control.motor_identification_fitting import Fit, check_method, fit, respond, synthetic
 from experiments.claims.ch5_control.motor_identification_recording import (
     DT,
     PRELOAD,
@@ -68,12 +66,6 @@ def test_no_signal_leaves_its_room_and_every_one_takes_up_the_play_first(seed):
         assert (signal[:PRELOAD] >= 0.0).all()
 
 
-def test_known_motors_cover_those_without_friction_and_play():
-    known = known_motors(41, seed=0)
-    assert min(known.friction) == min(known.backlash) == 0.0
-    assert np.ptp(known.lag) > 0.05
-
-
 def test_postures_begin_at_home_and_leave_the_motor_its_room(rng):
     model = mobee.Model(ICUB, mobee.World())
     motor = ICUB.motor_index("l_wrist_pitch")  # which is at a limit at home
@@ -126,20 +118,3 @@ def test_the_data_that_is_written_is_read_back(fitted, tmp_path, monkeypatch):
     for name in ("lag", "delay", "backlash", "friction"):
         assert getattr(found, name) == pytest.approx(getattr(fitted.parameters, name), abs=6e-5), name
     assert found.encoder_noise == pytest.approx(np.deg2rad(0.1), abs=1e-6)
-
-
-def test_the_table_has_a_line_a_motor_in_degrees(fitted):
-    rows = list(csv.DictReader(csv_table(ICUB, fitted).splitlines()))
-    assert [row["motor"] for row in rows] == list(ICUB.motors)
-    assert float(rows[3]["backlash_deg"]) == pytest.approx(np.rad2deg(fitted.parameters.backlash[3]), rel=1e-4)
-    assert float(rows[3]["noise_deg"]) == pytest.approx(0.1)
-
-
-def test_the_distance_from_the_published_settings_is_in_deviations(fitted):
-    found = summary(ICUB, fitted)["parameters"]["lag"]
-    assert found["farthest_from_published_in_deviations"] == pytest.approx(np.abs(np.array(fitted.parameters.lag) - 0.05).max() / 0.01)
-
-
-def test_a_run_without_a_fit_has_no_figure(tmp_path):
-    with pytest.raises(mobee.InvalidValue, match="--resume"):
-        EXPERIMENT.method.figure(tmp_path)

@@ -8,7 +8,6 @@ from experiments.claims.ch5_control import push_disturbance
 from experiments.kit.control.plant_runs import icub_at_table
 from mobee.control.law import FRICTION, INERTIA
 from mobee.simulation import OfflinePlant
-from tests.experiments.small_run import small_run
 
 
 def test_a_push_speeds_a_joint_up_as_inertia_and_friction_say() -> None:
@@ -34,10 +33,3 @@ def test_with_mobee_the_hand_comes_back_and_without_it_does_not() -> None:
     held, free = (push_disturbance.push_hand(law, "outward", 10.0, seed=0) for law in ("default", "off"))
     assert held.moved_mm > 20.0 and held.away_mm < 2.0
     assert free.away_mm > 20.0 and free.moved_mm > held.moved_mm
-
-
-def test_the_least_force_that_makes_solids_touch_is_found(tmp_path, monkeypatch) -> None:
-    pytest.importorskip("matplotlib")
-    monkeypatch.setattr(push_disturbance, "FORCES", (2.0, 50.0))
-    found = small_run(push_disturbance.EXPERIMENT, tmp_path, "--laws", "default", "--directions", "down-to-table")
-    assert found["passed"] and found["default"]["down-to-table"]["solids_touch_from_N"] == 50.0

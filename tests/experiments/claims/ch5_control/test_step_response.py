@@ -5,16 +5,9 @@ import pytest
 
 from experiments.claims.ch5_control.step_response import EXPERIMENT
 from mobee import UnknownName
-from tests.experiments.small_run import options_of, small_run
+from tests.experiments.options import options_of
 
 OPTIONS = ("--gains", "default", "--periods", "20", "--postures", "1", "--motors")
-
-
-def test_motors_and_postures_are_summed_up_separately(tmp_path) -> None:
-    pytest.importorskip("matplotlib")
-    found = small_run(EXPERIMENT, tmp_path, *OPTIONS, "l_elbow")
-    assert found["passed"]
-    assert {kind: part["steps"] for kind, part in found["default"].items()} == {"20 ms, motors": 1, "20 ms, postures": 1}
 
 
 def test_an_unknown_motor_is_refused_before_anything_is_run(tmp_path) -> None:

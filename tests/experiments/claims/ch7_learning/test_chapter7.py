@@ -12,8 +12,8 @@ from experiments.claims.ch7_learning import chapter7
 from experiments.kit.experiment import Claim, Experiment, Steps
 from experiments.kit.run_folder import new_run
 from experiments.kit.sweep import sweep_arguments
-from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS
-from mobee.errors import MobeeError, UnknownName
+from experiments.registry import EXPERIMENTS
+from mobee.errors import MobeeError
 
 CLAIM = Claim("thesis 7", "a toy works", "it does")
 
@@ -53,12 +53,6 @@ def toys(monkeypatch):
     return SimpleNamespace(calls=calls, broken=broken)
 
 
-@pytest.mark.parametrize("name", (*CHAPTER7, *BEYOND))
-def test_a_part_needs_no_option(name):
-    given = chapter7.options_of_part(name, options("--seed", "3", "--jobs", "1"))
-    assert given.seed == 3
-
-
 def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys):
     folder = new_run(tmp_path, "chapter7", {})
     results = chapter7.run(options("--seed", "3"), folder)
@@ -70,11 +64,6 @@ def test_every_part_runs_in_its_own_folder_with_its_own_defaults(tmp_path, toys)
         "experiment": "hypercube-exploration",
         "options": {"seeds": 10, "jobs": None, "engine": "processes", "quick": False, "seed": 3},
     }
-
-
-def test_options_for_all_are_passed_on(tmp_path, toys):
-    chapter7.run(options("--seeds", "2", "--quick", "--only", "exploration-coverage"), new_run(tmp_path, "chapter7", {}))
-    assert toys.calls == [("exploration-coverage", 2, 0, True)]
 
 
 @pytest.mark.parametrize(
@@ -105,25 +94,3 @@ def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
     folder = new_run(tmp_path, "chapter7", {})
     chapter7.run(options("--only", "exploration-coverage", "--seeds", seeds), folder)
     assert json.loads((folder / "exploration-coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
-
-
-def test_the_time_of_an_interrupted_part_is_counted(tmp_path, toys, monkeypatch):
-    clock = iter([0.0, 60.0, 60.0, 100.0, 220.0, 220.0])
-    monkeypatch.setattr(chapter7.time, "monotonic", lambda: next(clock))
-    folder = new_run(tmp_path, "chapter7", {})
-    toys.broken["hypercube-exploration"] = MobeeError("broken")
-    chapter7.run(options("--only", "hypercube-exploration"), folder)
-    toys.broken.clear()
-    assert chapter7.run(options("--only", "hypercube-exploration"), folder)["minutes"] == pytest.approx(3.0)
-
-
-def test_an_unknown_part_is_refused(tmp_path):
-    with pytest.raises(UnknownName, match="experiment of chapter 7 'tabel'"):
-        chapter7.run(options("--only", "tabel"), tmp_path)
-
-
-def test_the_option_all_adds_the_experiments_beyond_the_chapter(tmp_path, toys, monkeypatch):
-    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration",))
-    monkeypatch.setattr(chapter7, "BEYOND", ("exploration-coverage",))
-    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube-exploration"]
-    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube-exploration", "exploration-coverage"]

@@ -5,7 +5,6 @@ import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import (
     DISCOUNTS,
-    ENTERING,
     FAILING,
     INITIAL,
     fail,
@@ -52,8 +51,3 @@ def test_claims_stay_open_while_settings_were_not_run():
     results = findings(finished(lambda cell: explored(0), [Cell("a", 0, {"initial": "50-50", "discount": 0.9, "least": 5})]))
     assert {claim["verdict"] for claim in results["claims"]} == {"open"}
     assert results["runs"]["50-50, discount 0.9"]["failing_actions_fail"] == 1.0
-
-
-def test_all_named_actions_are_in_the_lattice():
-    for source, goal in (*FAILING, *ENTERING):
-        assert goal in SPACE.actions(source)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from experiments.claims.ch7_learning.neighbour_count import attempt, drawn_tasks, fewest_actions, findings, trial
+from experiments.claims.ch7_learning.neighbour_count import attempt, fewest_actions, findings, trial
 from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
 from mobee import TransitionModel
 from tests.experiments.finished_cells import Cell, finished
@@ -30,16 +30,3 @@ def test_a_known_model_leads_the_arm_to_its_goal_by_the_shortest_path():
             model.observe(state, action, int(goal))
     found = attempt(model, arm_plant(0), 0, 15, most=12)
     assert found.reached and found.actions == 4
-
-
-def test_an_attempt_that_takes_too_long_is_a_failure():
-    space = arm_space(HYPERCUBE)
-    found = attempt(TransitionModel(space), arm_plant(0), 0, 15, most=2)
-    assert not found.reached and found.actions == 2
-
-
-def test_tasks_are_pairs_of_different_states_and_depend_on_the_seed():
-    space = arm_space(HYPERCUBE)
-    tasks = drawn_tasks(space, 20, seed=3)
-    assert tasks == drawn_tasks(space, 20, seed=3) != drawn_tasks(space, 20, seed=4)
-    assert all(start != goal for start, goal in tasks)

@@ -34,11 +34,6 @@ def test_offline_seeds_that_differ_widely_leave_the_claim_open():
     assert measured({"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})}).verdict == "refuted"
 
 
-def test_without_compared_actions_the_claim_is_open():
-    none = Distance(float("nan"), float("nan"), 0)
-    assert measured({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"
-
-
 @pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
 def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
     offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch7_learning.unreachable_states import Run, SelfContactPlant, contacts_by_pair
-from experiments.kit.learning.arm import LEFT, RANK4, STRETCHED, arm_plant, arm_space, robot
+from experiments.kit.learning.arm import RANK4, STRETCHED, arm_plant, arm_space
 
 
 def test_recording_contacts_does_not_change_the_actions():
@@ -15,19 +15,6 @@ def test_recording_contacts_does_not_change_the_actions():
         assert np.array_equal(one.q, other.q)
         assert (one.settled, one.duration) == (other.settled, other.duration)
     assert len(watched.contacts) == 4
-
-
-def test_the_deepest_self_contact_of_an_action_is_named():
-    plant = SelfContactPlant(arm_plant(0))
-    target = robot().home[robot().part("left_arm").slice].copy()
-    plant.act("left_arm", target)
-    for name, degrees in zip(LEFT, (-60.0, 0.0, 70.0, 100.0), strict=True):  # the forearm across the chest
-        target[robot().part("left_arm").motors.index(name)] = np.deg2rad(degrees)
-    plant.act("left_arm", target)
-    assert plant.contacts[0] is None
-    assert plant.contacts[1] is not None
-    assert any(link.startswith("l_") for link in plant.contacts[1].pair)
-    assert plant.contacts[1].depth == pytest.approx(0.02, abs=0.02)
 
 
 SPACE = arm_space(RANK4)

@@ -15,18 +15,6 @@ def scene():
     return make_scene(3, 6)
 
 
-def test_a_seed_gives_the_same_scene_again(scene):
-    again = make_scene(3, 6)
-    for name in ("balls", "shifts", "turns", "starts", "goals", "is_hard"):
-        assert np.array_equal(getattr(scene, name), getattr(again, name))
-    assert not np.array_equal(make_scene(4, 2).balls, scene.balls)
-
-
-def test_half_of_the_queries_are_hard_and_none_begins_in_its_goal(scene):
-    assert scene.is_hard.sum() == 3
-    assert all(space().state_of(q) != goal for q, goal in zip(scene.starts, scene.goals, strict=True))
-
-
 def test_balls_and_joints_have_errors_of_the_stated_size(scene):
     assert np.linalg.norm(scene.shifts, axis=1) == pytest.approx(np.full(4, SHIFT))
     assert np.abs(scene.turns) == pytest.approx(np.full(4, TURN))

@@ -62,13 +62,6 @@ def test_a_roadmap_must_be_below_95_percent_and_below_the_mdp(tmp_path, once, md
     assert [claim.verdict for claim in claims] == [verdict, verdict]
 
 
-def test_a_scene_with_fewer_queries_counts_in_the_blocks_it_has(folder):
-    few = {key: values[:BLOCK_SIZE] if values.ndim else values for key, values in rival("MDP, 4000 learned", 1.0, 40.0).items()}
-    write_cell(folder, Cell("mdp-s9", 9, {"learned": 4000}), {"hard": HARD[:BLOCK_SIZE], **few}, 1.0)
-    curve = summary_of(load_cells(folder)).row("MDP, 4000 learned", "").curve
-    assert curve[:, 0].tolist() == [19.5, 19.0]
-
-
 def test_the_figure_of_an_unfinished_run_is_drawn(folder):
     pytest.importorskip("matplotlib")
     assert EXPERIMENT.method.figure(folder).stat().st_size > 10_000

@@ -41,12 +41,6 @@ def test_the_command_draws_what_a_run_has_learned(
     assert "From above: state" in capsys.readouterr().out
 
 
-def test_a_run_that_has_not_learned_to_reach_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "none.sqlite").touch()
-    with pytest.raises(SystemExit, match=r"none\.sqlite"):
-        main([str(tmp_path / "none.sqlite")])
-
-
 STRAIGHT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.3, 0.0], 20)
 FAR = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.5, 0.0], 20)
 ABOVE = np.linspace([-0.2, 0.3, 0.3], [-0.2, 0.3, 0.1], 20)
@@ -57,8 +51,3 @@ SHORT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], 20)
 def test_one_path_of_each_kind_is_selected() -> None:
     found = selected([STRAIGHT, SHORT, ABOVE, TURNING, FAR])
     assert found == {"From above": 2, "Far": 4, "Around the target": 3}
-
-
-def test_no_path_is_selected_twice_and_short_paths_never() -> None:
-    assert selected([SHORT]) == {}
-    assert selected([SHORT, FAR]) == {"From above": 1}

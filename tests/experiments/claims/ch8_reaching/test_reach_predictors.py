@@ -1,19 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import argparse
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching import reach_predictors
 from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, CHECKPOINTS, GRID, ORACLE, PUBLISHED, RECOMMENDED, fractions, measured
 from experiments.kit.cells import Cell
-from experiments.kit.reaching.learning import LEARNERS
-from mobee.learning.reaching.failures import FAILURES
-from mobee.learning.reaching.predictors import PREDICTORS
-from mobee.learning.reaching.strategies import STRATEGIES
 
 SEEDS, TARGETS = 6, {GRID: 27, BETWEEN: 8}
 
@@ -49,17 +43,3 @@ def test_the_aims_decide_the_claims():
 def test_claims_about_a_learner_that_was_not_run_stay_open():
     cells = {name: one for name, one in found(0.98, 0.5).items() if one.cell.settings["what"] != RECOMMENDED}
     assert verdicts(cells) == ["open"] * 5
-
-
-def test_all_learners_exist():
-    for learner in LEARNERS.values():
-        assert learner.predictor in PREDICTORS and learner.strategy in STRATEGIES and learner.failures in FAILURES
-
-
-def test_cells_are_distinct_and_every_target_has_its_truth():
-    parser = argparse.ArgumentParser()
-    reach_predictors.add_arguments(parser)
-    arguments = parser.parse_args(["--seeds", "2"])
-    arguments.seed = 0
-    names = [cell.name for cell in reach_predictors.cells(arguments) + reach_predictors.truths(arguments)]
-    assert len(set(names)) == len(names) == 2 * (len(LEARNERS) + 1) + 27 + 8

@@ -11,21 +11,20 @@ import pytest
 
 from experiments.claims.robot_files.original_comparison import compare
 from experiments.claims.robot_files.original_files import find_originals
-from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.robot.xml.write import write_upgraded
 from tests.experiments.claims.robot_files.random_original import random_original
 from tests.mobee.robot.same_robot import assert_same_robot
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(10))
 def test_random_files_of_that_time_are_read_as_the_program_of_2014_read_them(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "robot.xml"
     path.write_text(random_original(seed), encoding="utf-8")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         robot = load_robot(path)
-    found = compare(path, robot, poses=12, seed=seed)
+    found = compare(path, robot, poses=6, seed=seed)
     assert found.agrees, found
     write_upgraded(path, tmp_path / "today.xml")
     with warnings.catch_warnings():
@@ -60,11 +59,3 @@ def test_every_version_of_a_history_is_found_once(tmp_path: Path) -> None:
     assert {one.content for one in found[:2]} == {random_original(seed).encode() for seed in (1, 2)}
     assert len({one.name for one in found}) == 3
     assert subprocess.run([*git, "cat-file", "-t", found[0].hash], capture_output=True, check=True).stdout == b"blob\n"
-
-
-def test_files_without_a_history_are_found_and_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "robot.xml").write_text(random_original(5))
-    (one,) = find_originals([tmp_path])
-    assert (one.path, one.date) == ("robot.xml", "")
-    with pytest.raises(InvalidValue, match="is no folder"):
-        find_originals([tmp_path / "robot.xml"])

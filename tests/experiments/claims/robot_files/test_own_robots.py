@@ -9,14 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.claims.robot_files.own_robots import Measured, arm_of, failures, figure, read, results, run, table
-from experiments.claims.robot_files.sample_robots import BULLET, EXAMPLES, GENERATED, ROBOTS, examples_folder, robot_file
-from mobee import Lattice, load_robot
-from mobee.errors import InvalidValue
-
-
-def test_there_are_28() -> None:
-    assert len(set(ROBOTS)) == len(EXAMPLES) + len(BULLET) + len(GENERATED) == 28
+from experiments.claims.robot_files.own_robots import failures, read, results, run
+from experiments.claims.robot_files.sample_robots import GENERATED, robot_file
+from mobee import load_robot
 
 
 @pytest.mark.parametrize("name", GENERATED)
@@ -61,27 +56,3 @@ def test_a_robot_that_cannot_be_read_is_refused_and_not_tried_again(tmp_path: Pa
         found = run(arguments(robots=["tiago"], data=tmp_path / "data"), tmp_path)
     assert "no such file" in found["refused"]["tiago"]
     assert (tmp_path / "refused.csv").read_text().count("tiago.urdf") == 1
-
-
-def test_the_table_has_a_line_for_each_robot(done: Path) -> None:
-    head, rule, *rows = figure(done).read_text().splitlines()
-    assert len(rows) == 2 and rows[1].startswith("| panda_bullet | 8 (1) |")
-    assert {line.count("|") for line in (head, rule, *rows)} == {15}
-    assert table([])[0] == head
-
-
-def test_records_are_read_as_they_were_written(done: Path) -> None:
-    one = read(done)[0]
-    assert Measured.of_record({name: str(value) for name, value in one.record().items()}) == one
-
-
-def test_an_arm_is_the_longest_revolute_chain_of_one_part() -> None:
-    icub = load_robot("icub")
-    Lattice(icub, arm_of(icub))
-    assert arm_of(icub) == list(icub.part("left_arm").motors[:4])
-
-
-def test_without_the_package_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.path", [])
-    with pytest.raises(InvalidValue, match="pip install --target erd example-robot-data==6.0.0"):
-        examples_folder()

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.robot_files import urdf_files
-from experiments.claims.robot_files.urdf_comparison import FileRecord, PeerFailed, UrdfPeer, compare_file
-from mobee.errors import InvalidValue
+from experiments.claims.robot_files.urdf_comparison import PeerFailed, UrdfPeer, compare_file
 from mobee.robot.load import load_robot
 from tests.mobee.robot.urdf_files import ARM, arm_with, foreign, srdf_file, urdf_file
 
@@ -42,19 +41,6 @@ def test_a_run_is_resumed_summarized_and_drawn(tmp_path: Path) -> None:
     table = (tmp_path / "urdf-files.md").read_text()
     assert "| own/sub/toy.urdf | 2 | 4 | toy.srdf: up |" in table and "| own/broken.urdf | broken.urdf:" in table
     assert urdf_files.figure(tmp_path).read_bytes().startswith(b"\x89PNG")
-
-
-def test_empty_and_absent_folders_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidValue, match="there is no .urdf file to compare"):
-        urdf_files.run(given(str(tmp_path)), tmp_path)
-    with pytest.raises(InvalidValue, match="no such folder"):
-        urdf_files.run(given(str(tmp_path / "none")), tmp_path)
-
-
-def test_installed_packages_are_compared_without_folders(tmp_path: Path) -> None:
-    found = urdf_files.run(given(only="pybullet_data/cube"), tmp_path)["sets"]["pybullet_data"]
-    assert found["load"] == 2  # cube_rotate, and cube_no_rotation, whose limits mean none
-    assert found["refused"] == 0 and found["things"] > 0
 
 
 @pytest.mark.parametrize("name", ["kuka_iiwa/model.urdf", "franka_panda/panda.urdf", "r2d2.urdf", "quadruped/minitaur.urdf"])
@@ -90,9 +76,3 @@ def test_a_file_that_the_peer_cannot_read_is_reported(tmp_path: Path) -> None:
     assert (found.outcome, found.links, found.contacts) == ("loads", -1, -1)
     assert found.message.startswith("Pinocchio: ") and "toy.urdf" in found.message
     assert str(tmp_path) not in found.message
-
-
-def test_records_are_read_as_they_were_written() -> None:
-    one = FileRecord("a/b.urdf", "loads", "x", 3, 4, "s.srdf", "home", 0.25, 1e-16, 5, 0, 0.0, 1, 2)
-    assert FileRecord.of_record(one.record()) == one
-    assert FileRecord.of_record(FileRecord("a", "refused", "\u00e9").record()).message == "\\xe9"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.kit.control.plant_runs import PlantRun
-from experiments.kit.control.safety import clause_label, clause_violations, deepest, is_listed, limit_violations, oscillation
+from experiments.kit.control.safety import clause_violations, deepest, is_listed, limit_violations, oscillation
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
@@ -40,11 +40,6 @@ def test_beyond_a_limit_is_positive_and_inside_negative() -> None:
     q = np.stack([with_motors(l_elbow=110.0), with_motors(l_elbow=20.5)])
     elbow = ICUB.motors.index("l_elbow")
     assert np.rad2deg(limit_violations(ICUB, q)[:, elbow]) == pytest.approx([4.0, -5.0])
-
-
-def test_the_label_of_a_clause_is_its_inequality() -> None:
-    labels = [clause_label(ICUB, i) for i in range(len(ICUB.clauses))]
-    assert "-1 elbow > -90 or -1 wrist_prosup > -45" in labels
 
 
 def elbow_run(angles: np.ndarray) -> PlantRun:

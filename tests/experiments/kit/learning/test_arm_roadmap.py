@@ -37,11 +37,6 @@ def test_the_way_is_the_cheapest_and_detours_around_what_was_taken_out(square):
     assert square.path({0: 0.0}, 3, {edge(2, 3), edge(1, 0)}) is None
 
 
-def test_where_to_begin_is_part_of_the_cost(square):
-    assert square.path({0: 0.0, 2: 0.5}, 3, set()) == [2, 3]
-    assert square.path({0: 0.0, 2: 9.0}, 3, set()) == [0, 2, 3]
-
-
 def test_ways_cost_what_trying_all_of_them_finds():
     rng = np.random.default_rng(0)
     vertices = rng.uniform(size=(6, 4))

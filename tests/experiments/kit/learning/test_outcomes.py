@@ -9,7 +9,6 @@ from experiments.kit.cells import Cell
 from experiments.kit.learning.outcomes import (
     Explored,
     constraint_actions,
-    ends_of,
     exists_in,
     explored,
     failure_shares,
@@ -17,7 +16,6 @@ from experiments.kit.learning.outcomes import (
     first_places,
     first_tries,
     goals_of,
-    outcome_counts,
     relative_tries,
     relative_tries_of,
     tries_of,
@@ -48,15 +46,6 @@ def test_a_failure_is_an_end_elsewhere_and_what_was_never_tried_has_no_share():
     shares = failure_shares(SPACE, SEEN)
     assert shares[0, :2] == pytest.approx([1 / 3, 0.0])
     assert np.isnan(shares[1]).all()
-
-
-def test_ends_are_given_by_frequency():
-    assert list(ends_of(SPACE, SEEN, 0, 1).items()) == [(1, 2), (4, 1)]
-    assert ends_of(SPACE, SEEN, 5, 4) == {}
-
-
-def test_outcomes_are_counted_once_each():
-    assert outcome_counts(SPACE, SEEN)[0].tolist() == [2, 1, 0, 0]
 
 
 FEWER = np.array([[0, 0, 1], [0, 0, 4], [0, 1, 3]])

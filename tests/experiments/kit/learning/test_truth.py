@@ -27,10 +27,6 @@ def test_a_walk_tries_every_action_often_enough_and_begins_where_it_ended():
     assert np.array_equal(seen[1:, 0], seen[:-1, 2])
 
 
-def test_a_walk_ends_at_its_limit():
-    assert len(walk(SPACE, plant_of, tries=3, most=100, seed=0)) == 100
-
-
 def test_the_truth_is_the_frequencies_of_what_was_seen():
     truth = truth_of(SPACE, np.array([[0, 0, 1], [0, 0, 1], [0, 0, 40], [80, 3, 0], [0, 1, 1]]))
     assert truth.tries.sum() == 5 and truth.tries[0, 0] == 3 and truth.tries[80, 3] == 1
@@ -94,12 +90,6 @@ def test_the_error_is_told_over_all_and_over_the_stochastic_actions():
     assert overall == pytest.approx((0.0 + 1.0 + 1.9) / 3)
     assert stochastic == pytest.approx(1.0)
     assert most_likely(TRUTH)[0, 1] == 0.5
-
-
-def test_without_stochastic_actions_their_error_is_not_a_number():
-    certain = Table(np.zeros((1, 1, 1), dtype=int), np.ones((1, 1, 1)))
-    assert model_error(certain, certain)[0] == 0.0
-    assert np.isnan(model_error(certain, certain)[1])
 
 
 def test_the_error_of_a_truth_is_that_of_drawing_it_anew():

@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART
-from experiments.kit.reaching.targets import AT_CENTRE, between, counts, distances, grid, joints_of, nearest_pose, targets_at
+from experiments.kit.reaching.targets import AT_CENTRE, between, grid, nearest_pose, targets_at
 from mobee import Model
-
-PAGE = Path(__file__).parents[4] / "experiments" / "kit" / "reaching" / "README.md"
 
 
 def test_the_grid_is_three_places_a_direction_and_its_cells_lie_between():
@@ -20,17 +16,6 @@ def test_the_grid_is_three_places_a_direction_and_its_cells_lie_between():
     assert np.abs(grid() - grid().mean(axis=0)).max(axis=0) == pytest.approx([0.1, 0.2, 0.2])
     assert np.ptp(between(), axis=0) == pytest.approx([0.1, 0.2, 0.2])
     assert all(target.radius == 0.05 and target.aim == "surface" for target in targets_at(grid(), "surface"))
-
-
-def test_what_the_page_says_is_reachable_is():
-    page = PAGE.read_text()
-    for count in (4, 7):
-        centre, surface = counts(distances(between(), joints_of(count)))
-        assert f"| {count} | the 8 between | {centre} | {surface} |" in page
-
-
-def test_the_joints_of_the_lattice_come_first():
-    assert joints_of(4) == RIGHT
 
 
 @pytest.mark.parametrize("seed", range(4))

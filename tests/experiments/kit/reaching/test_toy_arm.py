@@ -11,15 +11,11 @@ from experiments.kit.reaching.toy_arm import (
     STARTS,
     UPPER,
     ToyArm,
-    blocked,
-    cell_centres,
     grid,
     hands,
-    jacobians,
     missing,
     oracle,
     swept,
-    toy_space,
     true_rewards,
 )
 from mobee.reach import reward_of
@@ -33,11 +29,6 @@ def test_the_arm_hangs_down_and_its_elbow_bends_forward():
     np.testing.assert_allclose(hands(BENT), [FORE, 0.0, -UPPER], atol=1e-15)
     np.testing.assert_allclose(hands(BENT + [-np.pi / 2.0, 0.0, 0.0, 0.0]), [UPPER, 0.0, FORE], atol=1e-15)
     np.testing.assert_allclose(hands(BENT + [0.0, np.pi / 2.0, 0.0, 0.0]), [FORE, UPPER, 0.0], atol=1e-15)
-
-
-def test_the_jacobian_tells_where_the_hand_goes():
-    pose, step = np.array([-0.5, 0.7, 0.2, 1.0]), 1e-4 * np.array([1.0, -2.0, 0.5, 1.5])
-    np.testing.assert_allclose(hands(pose + step) - hands(pose), jacobians(pose) @ step, atol=1e-7)
 
 
 def test_a_reach_comes_to_where_a_pose_nearby_has_the_hand_and_no_farther_than_its_tether():
@@ -56,23 +47,12 @@ def test_a_target_on_the_way_is_swept_and_one_that_the_arm_leaves_is_not():
     assert swept(start[None], end[None, None], hands(start), 0.07).tolist() == [[False]]
 
 
-def test_a_tenth_of_all_actions_is_blocked():
-    exist = (toy_space().goals >= 0).sum()
-    assert np.mean([blocked(target.position).sum() / exist for target in grid()]) == pytest.approx(0.11, abs=0.02)
-
-
 def test_reaches_on_the_plant_bring_the_true_rewards_on_average():
     arm, target = ToyArm(3, start=40), grid()[13]
     arm.present(target)
     ends = {arm.reach(arm.space.part, MARKER).missing for _ in range(12 * STARTS)}
     assert len(ends) == STARTS
     assert np.mean([reward_of(end) for end in ends]) == pytest.approx(true_rewards(target.position)[40])
-
-
-def test_targets_between_are_in_the_middles_of_the_cells():
-    places = np.array([target.position for target in grid()])
-    assert len(cell_centres()) == 8
-    np.testing.assert_allclose(cell_centres()[0].position, (places[0] + places[13]) / 2.0)
 
 
 def test_who_knows_the_truth_reaches_nearly_all_that_can_be_reached():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, MARKER, PART, Problem, robot
-from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure, read_block, write_block
-from experiments.kit.live.launch import append_done, read_done, read_job, write_job
+from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure
+from experiments.kit.live.launch import append_done
 from experiments.kit.live.recordings import CONTACTS, POSITIONS
 from mobee import Model
 from mobee.reach import RADIUS
@@ -78,13 +78,3 @@ def test_the_first_motion_is_counted_in_ticks_from_the_request(folder: Path) -> 
     append_done(folder, tried(0, [END], asked=50, first=2))
     found = measure(folder, Job("first motion", 0, "", [problem(0, 0.0)]), RATE, True).tries[0]
     assert (found.first, found.first_motion) == (2, END - 1 - 50)
-
-
-def test_jobs_tries_and_blocks_are_read_as_they_were_written(folder: Path) -> None:
-    job = Job("learner", 3, "run.sqlite", [problem(0, 0.0)], 5)
-    write_job(folder, job)
-    assert read_job(folder, Job) == job and read_done(folder, Tried) == []
-    append_done(folder, tried(0, [END]))
-    block = measure(folder, job, RATE, True)
-    write_block(folder, block)
-    assert read_block(folder) == block

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import Any
 
 from experiments.kit.experiment import Experiment
 
@@ -18,10 +16,3 @@ def options_of(experiment: Experiment, *given: str) -> argparse.Namespace:
     arguments = parser.parse_args(given)
     arguments.jobs = 1  # no other processes
     return arguments
-
-
-def small_run(experiment: Experiment, folder: Path, *given: str) -> dict[str, Any]:
-    """Run it and draw its figure."""
-    results = experiment.method.run(options_of(experiment, *given), folder)
-    assert experiment.method.figure(folder).read_bytes().startswith(b"\x89PNG")
-    return results

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest run of each experiment that ends in seconds, in this process: its claims, record, figure and resume."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.claims_table import found_in, page, rows
+from experiments.kit.experiment import Experiment
+from experiments.kit.run_folder import RESULTS, new_run, write
+from experiments.registry import EXPERIMENTS, load_experiment
+from tests.experiments.options import options_of
+
+QUICK = ("--quick", "--seeds", "1")
+SHORTEST = {
+    "constraint-discovery": QUICK,
+    "constraint-violations": ("--gains", "default", "--tries", "2", "--forced-tries", "2"),
+    "exploration-uniformity": QUICK,
+    "forced-contact": ("--gains", "default", "--walls", "chest", "--targets", "in-reach"),
+    "hypercube-exploration": QUICK,
+    "information-gain": QUICK,
+    "mdp-planner": QUICK,
+    "model-throughput": ("--edits", "5", "--objects", "3"),
+    "neighbour-count": QUICK,
+    "nes": QUICK,
+    "ngik": QUICK,
+    "reward-decay": QUICK,
+    "push-disturbance": ("--laws", "default", "--directions", "down-to-table"),
+    "shallow-contact-recovery": ("--angles", "60", "--spots", "1", "--repeat", "1"),
+    "step-response": ("--gains", "default", "--periods", "20", "--postures", "1", "--motors", "l_elbow"),
+}
+SMALLER = {  # constants of the modules, where no option makes the run shorter
+    "forced-contact": {"LEVELS": (0.0, 3.0), "LEVEL_SECONDS": 2.0, "DRAWN_SECONDS": 4.0},
+    "push-disturbance": {"FORCES": (2.0, 50.0)},
+}
+NO_NUMBERS = ("nes",)  # its claims are about dimensions that take long
+PACKAGES = {"nes": "cma", "ngik": "cma"}
+
+
+@dataclass(frozen=True)
+class Run:
+    name: str
+    experiment: Experiment
+    folder: Path
+    results: dict[str, Any]
+
+    def again(self) -> dict[str, Any]:
+        return self.experiment.method.run(options_of(self.experiment, *SHORTEST[self.name]), self.folder)
+
+
+@pytest.fixture(scope="session", params=SHORTEST)
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    name = request.param
+    if name in PACKAGES:
+        pytest.importorskip(PACKAGES[name])
+    experiment = load_experiment(name)
+    with pytest.MonkeyPatch.context() as patch:
+        for constant, value in SMALLER.get(name, {}).items():
+            patch.setattr(importlib.import_module(EXPERIMENTS[name]), constant, value)
+        options = options_of(experiment, *SHORTEST[name])
+        folder = new_run(tmp_path_factory.mktemp("runs"), name, vars(options))
+        yield Run(name, experiment, folder, experiment.method.run(options, folder))
+
+
+def test_every_claim_has_a_number_and_a_row_in_the_record(run: Run) -> None:
+    claims = run.results.get("claims", [])
+    assert [(claim["source"], claim["text"]) for claim in claims] == [(claim.source, claim.text) for claim in run.experiment.claims]
+    assert all(claim["ours"] for claim in claims) or run.name in NO_NUMBERS
+    write(run.folder / RESULTS, run.results)
+    record = found_in([run.folder])
+    table = {claim.text: claim for name, claim in rows(record) if name == run.name}
+    assert all(table[claim["text"]].ours.startswith(claim["ours"]) for claim in claims)
+    assert all(claim["text"].replace("|", "\\|") in page(record) for claim in claims)
+
+
+def test_it_resumes_without_repeating_or_changing_anything(run: Run) -> None:
+    before = {path: path.read_bytes() for path in run.folder.rglob("*") if path.is_file() and path.suffix != ".png"}
+    assert json.dumps(run.again()) == json.dumps(run.results)
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_its_figure_is_drawn(run: Run) -> None:
+    pytest.importorskip("matplotlib")
+    assert run.experiment.method.figure(run.folder).read_bytes().startswith(b"\x89PNG")
