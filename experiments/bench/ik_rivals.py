@@ -7,6 +7,7 @@ differential inverse kinematics on MuJoCo by quadratic programs, here with resta
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,14 +67,7 @@ def xnes(problem: Problem, seed: int, most: int) -> Array | None:
     low, high = problem.limits.T
     start, restart = problem.start[problem.free], Restart(patience=XNES_PATIENCE)
     search = Search(start, STD * (high - low), problem.limits, restart, method="xnes", seed=seed)
-    while problem.evaluations < most:
-        q = problem.whole(search.ask())
-        costs, good = problem.evaluate(q)
-        if good.any():
-            found: Array = q[int(good.argmax())]
-            return found
-        search.tell(costs)
-    return None
+    return _search(problem, most, lambda: problem.whole(search.ask()), search.tell)
 
 
 def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
@@ -84,62 +78,71 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
     rng = np.random.default_rng(seed)
     start = _units(problem, problem.start[problem.free])
     strategy = CmaStrategy(start, STD, seed, limits=(0.0, 1.0))
-    while problem.evaluations < most:
-        samples = strategy.ask()
-        q = _poses(problem, samples)
-        parts = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
-        costs, good = (np.concatenate(part) for part in zip(*parts, strict=True))
-        if good.any():
-            found: Array = q[int(good.argmax())]
-            return found
+
+    def tell(costs: Array) -> None:
+        nonlocal strategy
         strategy.tell(costs)
         if strategy.stopped:
             strategy = CmaStrategy(rng.uniform(size=len(start)), STD, int(rng.integers(1 << 30)), limits=(0.0, 1.0))
-    return None
+
+    return _search(problem, most, lambda: _poses(problem, strategy.ask()), tell, batched)
 
 
 def annealing(problem: Problem, seed: int, most: int) -> Array | None:
     """Search by simulated annealing: one pose at a time; steps and temperature fall together, then it restarts at the best pose."""
     rng = np.random.default_rng(seed)
-    best = here = _units(problem, problem.start[problem.free])
+    best = here = there = _units(problem, problem.start[problem.free])
     cost = least = np.inf
-    while problem.evaluations < most:
+    done = 0.0
+
+    def ask() -> Array:
+        nonlocal here, cost, there, done
         done = problem.evaluations % ANNEALING_PERIOD / ANNEALING_PERIOD
         if done == 0.0:
             here, cost = best, least
         step = FIRST_STEP * (LAST_STEP / FIRST_STEP) ** done * rng.standard_normal(len(here))
         there = np.clip(here + step, 0.0, 1.0)
-        q = _poses(problem, there[None])
-        costs, good = problem.evaluate(q)
-        if good[0]:
-            first: Array = q[0]
-            return first
-        if costs[0] < cost or rng.uniform() < np.exp(
-            (cost - costs[0]) / (FIRST_TEMPERATURE * (LAST_TEMPERATURE / FIRST_TEMPERATURE) ** done)
-        ):
+        return _poses(problem, there[None])
+
+    def tell(costs: Array) -> None:
+        nonlocal best, here, cost, least
+        temperature = FIRST_TEMPERATURE * (LAST_TEMPERATURE / FIRST_TEMPERATURE) ** done
+        if costs[0] < cost or rng.uniform() < np.exp((cost - costs[0]) / temperature):
             here, cost = there, float(costs[0])
             if cost < least:
                 best, least = here, cost
-    return None
+
+    return _search(problem, most, ask, tell)
 
 
 def particles(problem: Problem, seed: int, most: int) -> Array | None:
     """Search by a particle filter: resample by the costs, add noise that shrinks; when it is small, restart with uniform particles."""
     rng = np.random.default_rng(seed)
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
-    while problem.evaluations < most:
-        q = _poses(problem, places)
-        costs, good = problem.evaluate(q)
-        if good.any():
-            found: Array = q[int(good.argmax())]
-            return found
+
+    def tell(costs: Array) -> None:
+        nonlocal noise, places
         noise = FIRST_STEP if noise == 0.0 else noise * NOISE_DECAY
         if noise < LAST_STEP / 10.0:
             noise, places = 0.0, rng.uniform(size=places.shape)
-            continue
+            return
         shares = np.exp(-SELECTIVITY * (costs - costs.min()) / max(float(costs.std()), 1e-9))
         drawn = rng.choice(PARTICLES, PARTICLES, p=shares / shares.sum())
         places = np.clip(places[drawn] + noise * rng.standard_normal(places.shape), 0.0, 1.0)
+
+    return _search(problem, most, lambda: _poses(problem, places), tell)
+
+
+def _search(problem: Problem, most: int, ask: Callable[[], Array], tell: Callable[[Array], object], batched: bool = True) -> Array | None:
+    """Evaluate the poses (B, n) that `ask` returns and give `tell` their costs (B,), until one is good: that pose, or None after `most`."""
+    while problem.evaluations < most:
+        q = ask()
+        parts = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
+        costs, good = (np.concatenate(part) for part in zip(*parts, strict=True))
+        if good.any():
+            found: Array = q[int(good.argmax())]
+            return found
+        tell(costs)
     return None
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TextIO
+from typing import Any, ClassVar, Self, TextIO
 
 
 class Records:
@@ -55,7 +55,9 @@ def _whole(file: TextIO) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Base class of records that are dataclasses with fields of type str, float and bool."""
+    """Base class of records that are dataclasses with fields of type str, int, float and bool."""
+
+    PLACES: ClassVar[int | None] = 6  # of numbers in the record; None: all digits
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
@@ -63,12 +65,16 @@ class Row:
         return tuple(field.name for field in fields(cls))
 
     def record(self) -> dict[str, object]:
-        """Return the record for the file or as the values of a cell; numbers are rounded to six places."""
-        values = {name: getattr(self, name) for name in self.columns()}
-        return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
+        """Return the record for the file, in ASCII, or as the values of a cell; numbers are rounded to PLACES."""
+        return {name: self._written(getattr(self, name)) for name in self.columns()}
+
+    def _written(self, value: object) -> object:
+        if isinstance(value, float) and self.PLACES is not None:
+            return round(value, self.PLACES)
+        return value.encode("ascii", "backslashreplace").decode() if isinstance(value, str) else value
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Self:
         """Return the record read from a row of the file."""
-        read: dict[str, Any] = {"float": float, "bool": "True".__eq__, "str": str}
+        read: dict[str, Any] = {"float": float, "int": int, "bool": "True".__eq__, "str": str}
         return cls(**{field.name: read[str(field.type)](row[field.name]) for field in fields(cls)})

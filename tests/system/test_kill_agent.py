@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """kill -9 of a learning agent at random moments, many times in a row: nothing observed is lost or doubled, and it learns on as ever.
 
-MOBEE_KILLS=50 kills fifty times instead of ten.
+MOBEE_KILLS=50 kills fifty times instead of six.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tests.system.learner import curious_agent, digest
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]
 
-KILLS = int(os.environ.get("MOBEE_KILLS", "10"))
+KILLS = int(os.environ.get("MOBEE_KILLS", "6"))
 AT_START = 0.2  # share of the kills while the agent starts; the others come while it learns
 REPORT = re.compile(r"^(\d+) ([0-9a-f]{64})\n", re.MULTILINE)
 

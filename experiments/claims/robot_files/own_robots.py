@@ -19,7 +19,7 @@ import argparse
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ import numpy as np
 from experiments.claims.robot_files.sample_robots import ROBOTS, examples_folder, robot_file
 from experiments.kit.command_line import Progress
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.records import Records, read_records
+from experiments.kit.records import Records, Row, read_records
 from mobee import CuriousAgent, Lattice, Model, OfflinePlant, load_robot
 from mobee.arrays import Array
 from mobee.check.touching import leave_out_touching
@@ -134,8 +134,10 @@ def table(found: Sequence[Measured]) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(Row):
     """The measures of one robot; lengths in mm, angles in deg, times in s, -1 where there is nothing to measure."""
+
+    PLACES = 4
 
     robot: str
     motors: int
@@ -154,21 +156,6 @@ class Measured:
     field_drift_deg: float  # the same with fields of FIELD_SIZE
     field_actions_s: float
     field_solid: int
-
-    @classmethod
-    def columns(cls) -> tuple[str, ...]:
-        """Return the names of the fields."""
-        return tuple(field.name for field in fields(cls))
-
-    @classmethod
-    def of_record(cls, row: dict[str, str]) -> Measured:
-        """Return the measures read from the texts of a CSV file."""
-        kinds = {"str": str, "int": int, "float": float}
-        return cls(**{field.name: kinds[str(field.type)](row[field.name]) for field in fields(cls)})
-
-    def record(self) -> dict[str, Any]:
-        """Return the measures for a CSV file."""
-        return {name: round(value, 4) if isinstance(value, float) else value for name, value in asdict(self).items()}
 
 
 def measure(name: str, urdf: Path, folder: Path, seed: int) -> Measured:

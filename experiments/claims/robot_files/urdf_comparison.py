@@ -6,13 +6,14 @@ from __future__ import annotations
 import contextlib
 import time
 import warnings
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from experiments.bench.peers import import_peer, make_searches_precise
+from experiments.kit.records import Row
 from mobee.arrays import Array
 from mobee.check.subject import Subject
 from mobee.errors import MobeeError
@@ -29,8 +30,10 @@ EMPTY_SRDF = '<robot name="none"/>\n'
 
 
 @dataclass(frozen=True, slots=True)
-class FileRecord:
+class FileRecord(Row):
     """The results of one file; measures that are missing are nan, counts -1."""
+
+    PLACES = None  # frames differ by 1e-16
 
     name: str
     outcome: str  # "loads", "thing" (no robot), "refused" or "crash"
@@ -46,21 +49,6 @@ class FileRecord:
     deepest_other: float = np.nan  # m
     at_home: int = -1  # solid contacts, with default options
     at_home_without: int = -1  # the same without an SRDF
-
-    @classmethod
-    def columns(cls) -> tuple[str, ...]:
-        """Return the column names of the file of records."""
-        return tuple(one.name for one in fields(cls))
-
-    def record(self) -> dict[str, str]:
-        """Return the record as ASCII text."""
-        return {name: str(value).encode("ascii", "backslashreplace").decode() for name, value in asdict(self).items()}
-
-    @classmethod
-    def of_record(cls, row: dict[str, str]) -> FileRecord:
-        """Return the record read from the text that `record` wrote."""
-        kinds = {one.name: {"str": str, "int": int, "float": float}[str(one.type)] for one in fields(cls)}
-        return cls(**{name: kinds[name](text) for name, text in row.items()})
 
 
 def compare_file(name: str, path: Path, poses: int, seed: int, scratch: Path) -> FileRecord:

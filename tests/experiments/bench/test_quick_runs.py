@@ -77,6 +77,15 @@ def test_completeness_and_validity_of_a_map_are_measured() -> None:
     assert 0.0 < row["short_edges"] <= 1.0 and row["processor_s"] > 0.0
 
 
+def test_ratios_are_those_of_the_numbers_beside_them() -> None:
+    rows = measured("nes")["rows"]
+    assert [row["function"] for row in rows] == list(nes.FUNCTIONS) and all(row["ratio"] == row["nes"] / row["cma"] for row in rows)
+    plans = measured("vi")
+    assert plans["cold_times_scipy"] == pytest.approx(plans["us"]["SciPy sparse, cold"] / plans["us"]["ours, cold"])
+    assert plans["warm_times_quantecon"] == pytest.approx(plans["us"]["quantecon value iteration"] / plans["us"]["ours, warm"])
+    assert all(one["passed"] for one in plans["requirements"] if one["name"].startswith("largest"))
+
+
 @pytest.mark.parametrize("name", BENCHES)
 def test_the_command_finds_settings_measurement_and_report(name: str) -> None:
     module = importlib.import_module(f"experiments.bench.{name}")

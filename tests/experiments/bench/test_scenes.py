@@ -4,9 +4,10 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from experiments.bench import scenes
-from experiments.bench.scenes import MIXED, PLAIN, boxes_world, upper_body
+from experiments.bench.scenes import MAKERS, MIXED, OBJECTS, PLAIN, Maker, boxes_world, upper_body, upper_body_poses
 from mobee.model.fcl_engine import tested_pairs as pairs_of
 from mobee.model.snapshot import NO_HANDS
 
@@ -42,3 +43,18 @@ def test_links_that_are_mounted_on_each_other_are_not_tested() -> None:
     tested = {frozenset((robot.shapes[i].link, robot.shapes[j].link)) for i, j in robot.field_pairs.tolist()}
     assert not tested & robot.untested.keys()
     assert all(frozenset((joint.parent, index + 1)) in robot.untested for index, joint in enumerate(robot.joints))
+
+
+def test_poses_are_the_same_each_time_and_within_the_limits() -> None:
+    low, high = upper_body().limits.T
+    poses = upper_body_poses(50)
+    assert ((low <= poses) & (poses <= high)).all()
+    assert upper_body_poses(20) == pytest.approx(poses[:20])
+
+
+@pytest.mark.parametrize("maker", MAKERS, ids=lambda maker: maker.name)
+def test_kinds_come_in_equal_parts(maker: Maker) -> None:
+    counted = Counter(shape.kind for shape in maker.robot().shapes)
+    assert counted.keys() == set(maker.kinds) and len(set(counted.values())) == 1
+    around = Counter(one.kind for one in maker.world(OBJECTS).objects.values())
+    assert around.keys() == set(maker.around) and len(set(around.values())) == 1

@@ -33,7 +33,7 @@ def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.
 
     def evaluate(seed: int) -> list[mobee.Pose]:
         poses = []
-        for index in np.random.default_rng(seed).integers(0, len(q), 300):
+        for index in np.random.default_rng(seed).integers(0, len(q), 100):
             pose = model.evaluate(q[index]) if seed % 2 else model.evaluate(q[index : index + 3], threads=1 + seed % 3)
             assert len(pose.table) >= 0  # now, while the others evaluate and edit
             poses.append(pose)

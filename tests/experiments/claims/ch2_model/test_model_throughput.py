@@ -186,3 +186,13 @@ def test_a_leak_has_a_slope_and_a_first_rise_has_none():
     assert slope_mb_per_minute(seconds, 50.0 + seconds / 60.0) == pytest.approx(1.0)
     assert slope_mb_per_minute(seconds, np.where(seconds < 15.0, 50.0 + seconds, 65.0)) == pytest.approx(0.0, abs=1e-9)
     assert slope_mb_per_minute(seconds[:50], seconds[:50]) is None
+
+
+def test_a_flood_shorter_than_a_bin_is_one_point():
+    assert list(binned([short(number, 10) for number in range(1, 62)], 1.0)) == [(31.0, pytest.approx(1000.0))]
+
+
+def test_of_an_endurance_run_its_course_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    endure(tmp_path, threads=1, duration=0.2, seed=0)
+    assert model_throughput.EXPERIMENT.method.figure(tmp_path).read_bytes().startswith(b"\x89PNG")

@@ -2,9 +2,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from experiments.bench.nes import FUNCTIONS, STRATEGIES
-from experiments.claims.ch3_roadmaps.nes import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, judged
+from experiments.claims.ch3_roadmaps import nes
+from experiments.claims.ch3_roadmaps.nes import AIM, AS_GOOD, BETTER, CLAIMS, DIMENSIONS, evaluations, findings, judged
+from experiments.kit.cells import Cell
+from tests.experiments.finished_cells import finished_trials
+from tests.experiments.options import options_of
 
 TASKS = [(function, d) for function in FUNCTIONS for d in DIMENSIONS]
 
@@ -39,3 +44,22 @@ def test_claims_stay_open_until_every_task_has_as_many_runs():
     del known["xnes", TASKS[-1]]
     assert judged(known) == list(CLAIMS)
     assert judged({key: values[: 6 - (key[0] == "nes")] for key, values in runs().items()}) == list(CLAIMS)
+
+
+def test_a_quick_cell_finds_or_counts_with_all_it_had():
+    quick = nes.EXPERIMENT.method.cells(options_of(nes.EXPERIMENT, "--seed", "3", "--seeds", "1", "--quick"))
+    assert {cell.settings["dimensions"] for cell in quick} == {10} and len(quick) == len(FUNCTIONS) * len(STRATEGIES)
+    ours = next(cell for cell in quick if cell.name == "nes-sphere-10-s3")
+    hard = Cell("snes-cigar-s3", 3, {"strategy": "snes", "function": "cigar 1e6", "dimensions": 10, "most": 500})
+    found = finished_trials(nes.trial, [ours, hard])
+    assert found[ours.name].values["found"] and 500 < found[ours.name].values["evaluations"] < 5000
+    assert not found[hard.name].values["found"] and found[hard.name].values["evaluations"] == 500
+    results = findings(found)
+    assert results["found"]["SNES as published"] == "0 of 1" and results["found"]["CMA-ES"] == "0 of 0"
+    assert evaluations(found)["snes", ("cigar 1e6", 10)].tolist() == [500.0]
+
+
+def test_finished_runs_can_be_drawn():
+    pytest.importorskip("matplotlib")
+    found = finished_trials(nes.trial, [Cell("a", 1, {"strategy": "nes", "function": "sphere", "dimensions": 10, "most": 200})])
+    assert len(nes.plot(found).axes) == len(FUNCTIONS)

@@ -34,6 +34,7 @@ from experiments.claims.ch4_reflex.babbling_trial import (
     judge,
     measure,
     moved_motors,
+    path_length,
     read_commands,
     scenario,
 )
@@ -320,3 +321,7 @@ def test_a_move_goes_from_start_to_target_within_its_speed(start: np.ndarray, ta
     if move.duration > 0.0:
         assert np.abs(np.diff(course, axis=0)).max() / (times[1] - times[0]) <= speed * (1.0 + 1e-6)
     assert (np.diff(course, axis=0) * np.sign(target - start) >= -1e-12).all()
+
+
+def test_the_path_counts_motion_back() -> None:
+    assert path_length(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.5]])) == pytest.approx(2.0)

@@ -77,3 +77,7 @@ def test_an_action_without_tries_after_the_change_is_neither_changed_nor_the_sam
     changed, same = compare(before, after)
     assert np.argwhere(changed).tolist() == [[0, 0]]
     assert np.argwhere(same).tolist() == [[0, 1]]
+
+
+def test_an_error_that_is_halved_at_the_first_check_counts():
+    assert a_run(np.full(CHECKS // 2, 0.9)).relearned == CHECK_PERIOD

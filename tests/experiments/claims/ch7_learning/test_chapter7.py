@@ -94,3 +94,15 @@ def test_few_seeds_leave_every_claim_open(tmp_path, toys, seeds, verdict):
     folder = new_run(tmp_path, "chapter7", {})
     chapter7.run(options("--only", "exploration-coverage", "--seeds", seeds), folder)
     assert json.loads((folder / "exploration-coverage" / "results.json").read_text())["claims"][0]["verdict"] == verdict
+
+
+def test_options_for_all_are_passed_on(tmp_path, toys):
+    chapter7.run(options("--seeds", "2", "--quick", "--only", "exploration-coverage"), new_run(tmp_path, "chapter7", {}))
+    assert toys.calls == [("exploration-coverage", 2, 0, True)]
+
+
+def test_the_option_all_adds_the_experiments_beyond_the_chapter(tmp_path, toys, monkeypatch):
+    monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration",))
+    monkeypatch.setattr(chapter7, "BEYOND", ("exploration-coverage",))
+    assert list(chapter7.run(options(), tmp_path)["parts"]) == ["hypercube-exploration"]
+    assert list(chapter7.run(options("--all"), tmp_path)["parts"]) == ["hypercube-exploration", "exploration-coverage"]

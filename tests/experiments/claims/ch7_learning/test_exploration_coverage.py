@@ -22,6 +22,7 @@ from experiments.claims.ch7_learning.exploration_coverage import (
 )
 from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import HYPERCUBE, RANK3, RANK4, arm_space
+from mobee.errors import InvalidValue
 
 
 def values(end: float, floor: int = 100, repeats_at: int = 50):
@@ -126,3 +127,8 @@ def test_a_curious_agent_on_the_real_lattice_is_close_to_the_shortest_walk():
     assert len(found["new_actions"]) == found["state_actions"] == 432 == found["floor"]
     assert found["new_actions"][-1] == found["transitions"] <= 1.2 * 432
     assert found["failed"] == 0.0 and len(found["new_states"]) == 81
+
+
+def test_a_graph_that_is_not_connected_has_no_walk():
+    with pytest.raises(InvalidValue, match="cannot be reached"):
+        shortest_walk(np.array([[1], [1]]))

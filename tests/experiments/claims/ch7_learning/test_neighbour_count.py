@@ -30,3 +30,9 @@ def test_a_known_model_leads_the_arm_to_its_goal_by_the_shortest_path():
             model.observe(state, action, int(goal))
     found = attempt(model, arm_plant(0), 0, 15, most=12)
     assert found.reached and found.actions == 4
+
+
+def test_an_attempt_that_takes_too_long_is_a_failure():
+    space = arm_space(HYPERCUBE)
+    found = attempt(TransitionModel(space), arm_plant(0), 0, 15, most=2)
+    assert not found.reached and found.actions == 2

@@ -4,9 +4,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch7_learning.plant_sensitivity import Row, normalised
+from experiments.claims.ch7_learning.plant_sensitivity import PUBLISHED, VARIANTS, Row, normalised
 from experiments.claims.ch7_learning.unreachable_states import NEVER
-from experiments.kit.learning.arm import robot
+from experiments.kit.learning.arm import arm_plant, robot
 
 
 def test_normalised_rows_allow_the_same_poses():
@@ -45,3 +45,9 @@ def row(**changed):
 )
 def test_a_finding_is_lost_where_one_of_its_numbers_is_not_as_published(changed, rank4, rank3):
     assert (row(**changed).rank4, row(**changed).rank3) == (rank4, rank3)
+
+
+def test_the_first_variant_is_the_published_plant():
+    ours, published = VARIANTS[PUBLISHED].plant(4), arm_plant(4)
+    target = robot().limits[robot().part("left_arm").slice].mean(axis=1)
+    assert np.array_equal(ours.act("left_arm", target).q, published.act("left_arm", target).q)

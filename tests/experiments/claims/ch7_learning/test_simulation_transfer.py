@@ -39,3 +39,8 @@ def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict)
     offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
     found = Compared({"pybullet": Distance(variation, agree, 300)}, offline, {})
     assert measured({"arms": found}).verdict == verdict
+
+
+def test_without_compared_actions_the_claim_is_open():
+    none = Distance(float("nan"), float("nan"), 0)
+    assert measured({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"

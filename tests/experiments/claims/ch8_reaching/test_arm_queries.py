@@ -53,3 +53,8 @@ def test_a_motion_past_a_ball_is_not_sound_though_its_ends_are():
     belief = believed(Scene(ball[None], np.zeros((1, 3)), np.zeros(4), *nowhere), "no cables")
     assert belief.sound(np.array([start, end])).all()
     assert not belief.sound_motion(start, end)
+
+
+def test_half_of_the_queries_are_hard_and_none_begins_in_its_goal(scene):
+    assert scene.is_hard.sum() == 3
+    assert all(space().state_of(q) != goal for q, goal in zip(scene.starts, scene.goals, strict=True))

@@ -51,3 +51,8 @@ SHORT = np.linspace([-0.3, 0.0, 0.0], [-0.3, 0.05, 0.0], 20)
 def test_one_path_of_each_kind_is_selected() -> None:
     found = selected([STRAIGHT, SHORT, ABOVE, TURNING, FAR])
     assert found == {"From above": 2, "Far": 4, "Around the target": 3}
+
+
+def test_no_path_is_selected_twice_and_short_paths_never() -> None:
+    assert selected([SHORT]) == {}
+    assert selected([SHORT, FAR]) == {"From above": 1}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.kit.reaching.arm import MARKER, arm_belief
+from experiments.kit.reaching.arm import MARKER, arm_belief, reach_plant
 from experiments.kit.reaching.cases import OBSTACLE, SCENES, SPEED, Case, make_cases
 from mobee.reach import ReachTarget
 
@@ -37,3 +37,7 @@ def test_a_target_moves_at_its_speed_and_stops_or_goes_to_and_fro():
     assert np.allclose(case.target_at(3.0), case.to)
     back = replace(case, to_and_fro=True)
     assert np.allclose(back.target_at(3.0), HERE + (0.0, 0.0, SPEED)) and np.allclose(back.seen_at(4.0).position, HERE)
+
+
+def test_the_law_of_a_plant_is_the_one_asked_for():
+    assert reach_plant(0).settings["gains"] != reach_plant(0, "default").settings["gains"]

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART
-from experiments.kit.reaching.targets import AT_CENTRE, between, grid, nearest_pose, targets_at
+from experiments.kit.reaching.targets import AT_CENTRE, between, counts, distances, grid, joints_of, nearest_pose, targets_at
 from mobee import Model
+
+PAGE = Path(__file__).parents[4] / "experiments" / "kit" / "reaching" / "README.md"
 
 
 def test_the_grid_is_three_places_a_direction_and_its_cells_lie_between():
@@ -44,3 +48,10 @@ def test_a_place_too_far_away_is_missed_by_what_the_arm_lacks():
     near = nearest_pose(model, MARKER, np.array([-1.0, 0.2, 0.1]), RIGHT, restarts=4)
     far = nearest_pose(model, MARKER, np.array([-2.0, 0.2, 0.1]), RIGHT, restarts=4)
     assert 0.5 < near.distance < 0.7 and far.distance == pytest.approx(near.distance + 1.0, abs=0.01)
+
+
+def test_what_the_page_says_is_reachable_is():
+    page = PAGE.read_text()
+    for count in (4, 7):
+        centre, surface = counts(distances(between(), joints_of(count)))
+        assert f"| {count} | the 8 between | {centre} | {surface} |" in page

@@ -11,11 +11,13 @@ from experiments.kit.reaching.toy_arm import (
     STARTS,
     UPPER,
     ToyArm,
+    blocked,
     grid,
     hands,
     missing,
     oracle,
     swept,
+    toy_space,
     true_rewards,
 )
 from mobee.reach import reward_of
@@ -59,3 +61,8 @@ def test_who_knows_the_truth_reaches_nearly_all_that_can_be_reached():
     problems = grid()[:9]
     best = sum(true_rewards(target.position).max() for target in problems)
     assert oracle(problems).evaluate(problems, 2).rewards.sum(axis=1).min() > 0.75 * best
+
+
+def test_a_tenth_of_all_actions_is_blocked():
+    exist = (toy_space().goals >= 0).sum()
+    assert np.mean([blocked(target.position).sum() / exist for target in grid()]) == pytest.approx(0.11, abs=0.02)
