@@ -130,6 +130,15 @@ def checkout(folder_or_commit: str, python: str = sys.executable) -> Iterator[Ch
             _git("worktree", "remove", "--force", str(folder))
 
 
+def build_core(checkout: Checkout) -> None:
+    """Build the native core of a checkout of a commit, if that has one; raises AgainstFailed."""
+    script = checkout.folder / "core" / "build.py"
+    if script.exists():
+        done = subprocess.run([checkout.python, str(script)], cwd=checkout.folder, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise AgainstFailed(f"core/build.py in {checkout.folder}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}")
+
+
 def _git(*words: str) -> None:
     try:
         subprocess.run(["git", "-C", str(REPOSITORY), *words], capture_output=True, text=True, check=True)
@@ -142,6 +151,9 @@ def _git(*words: str) -> None:
 def measure(settings: Settings) -> dict[str, Any]:
     """Measure, and return all numbers and the verdict; raises AgainstFailed."""
     with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
+        for given, one in ((settings.old, old), (settings.new, new)):
+            if not Path(given).is_dir():
+                build_core(one)
         return measure_checkouts(old, new, settings.cases, settings.rounds)
 
 

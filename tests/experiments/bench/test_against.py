@@ -10,7 +10,17 @@ from pathlib import Path
 import pytest
 
 from experiments.bench import against
-from experiments.bench.against import NO_SLOWER, REPOSITORY, AgainstFailed, Checkout, checkout, compared, measure_checkouts, report
+from experiments.bench.against import (
+    NO_SLOWER,
+    REPOSITORY,
+    AgainstFailed,
+    Checkout,
+    build_core,
+    checkout,
+    compared,
+    measure_checkouts,
+    report,
+)
 
 
 def one_round(old: float, new: float, poses: int = 10) -> against.Pair:
@@ -77,3 +87,11 @@ def test_a_commit_is_checked_out_temporarily_and_a_folder_is_used_as_it_is(tmp_p
     with checkout("HEAD") as found:
         assert (found.folder / "mobee" / "__init__.py").exists()
     assert not found.folder.exists()
+
+
+def test_a_commit_whose_core_cannot_be_built_is_refused_with_the_reason(tmp_path: Path) -> None:
+    build_core(Checkout(tmp_path))  # a commit without a core
+    (tmp_path / "core").mkdir()
+    (tmp_path / "core" / "build.py").write_text("raise SystemExit('no compiler')\n")
+    with pytest.raises(AgainstFailed, match="core/build.py in .*: no compiler"):
+        build_core(Checkout(tmp_path))
