@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,13 @@ def test_every_requirement_of_a_benchmark_is_judged_by_itself(name: str) -> None
     for one in required:
         found = verdict(result_of(required, missed=one), required)
         assert [each["name"] for each in found["requirements"] if not each["passed"]] == [one.name] and not found["passed"]
+
+
+@pytest.mark.parametrize("name", [name for name, required in REQUIREMENTS.items() if required])
+def test_times_sizes_and_errors_have_an_upper_bound_and_rates_and_shares_a_lower_one(name: str) -> None:
+    for one in REQUIREMENTS[name]:
+        has_upper = re.search(r", (s|ms|us|MB)\b|, s on|NumPy's import|largest|errors|evaluations", one.name) is not None
+        assert ((one.at_most is not None), (one.at_least is not None)) == (has_upper, not has_upper), one.name
 
 
 def test_a_line_each_that_ends_with_the_verdict() -> None:

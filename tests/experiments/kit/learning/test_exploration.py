@@ -27,3 +27,10 @@ def test_a_transition_begins_where_the_last_one_ended(explored):
         seen = np.array(log.seen)
         assert (seen[1:, 0] == seen[:-1, 2]).all()
         assert (np.diff(log.ends) > 0.0).all()
+
+
+def test_arrays_hold_as_many_of_each(explored):
+    arrays = explored[1]["torso"].arrays("torso", 4)
+    assert {name: len(array) for name, array in arrays.items()} == dict.fromkeys(
+        ("seen_torso", "settled_torso", "durations_torso", "ends_torso"), 4
+    )
