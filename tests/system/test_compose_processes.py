@@ -48,4 +48,5 @@ def test_the_composed_system_learns(tmp_path: Path) -> None:
             watcher.wait_until_moved(AGENTS)
             until(lambda: watcher.stat("vision").numbers["located"] > 0, 30.0, "the ball is located")
         until(lambda: any(transitions(tmp_path).values()), 60.0, "a transition is on disk")
+        until(lambda: "ready as" in (tmp_path / "monitor.log").read_text(), 60.0, "the monitor can end in order")
         assert all(process.poll() is None for process in processes.values())
