@@ -94,7 +94,7 @@ def test_the_error_is_told_over_all_and_over_the_stochastic_actions():
 
 def test_the_error_of_a_truth_is_that_of_drawing_it_anew():
     rng, tries, p = np.random.default_rng(0), 40, np.array([0.5, 0.3, 0.2])
-    truth = Truth(np.zeros((1, 2, 3), dtype=int), np.array([[p, np.zeros(3)]]), np.array([[tries, 0]]), {})
+    truth = Truth(np.zeros((1, 2, 3), dtype=int), np.array([[p, np.zeros(3)]]), np.array([[tries, 0]]))
     drawn = np.abs(rng.multinomial(tries, p, size=4000) / tries - p).sum(axis=1).mean()
     expected = sampling_error(truth)
     assert expected[0, 0] == pytest.approx(drawn, rel=0.03) and np.isnan(expected[0, 1])
