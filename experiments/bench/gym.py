@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from experiments.bench import verdicts
 from experiments.bench.calibration import Calibration
 from experiments.bench.peers import import_peer
 from experiments.bench.timing import cores_text, one_core, processor_time
-from experiments.bench.verdicts import Requirement
+from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 
 BATCH = 64
@@ -103,12 +101,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     result["standard"] = {name: float(np.median(rates)) for name, rates in standard.items()}
     for key, peer in (("times_humanoid", HUMANOID), ("times_reacher", REACHER)):
         result[key] = float(np.median(np.array(found[REACH_BATCH]) / found[peer]))
-    return result | verdict(result)
-
-
-def verdict(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return whether the environments are as fast as required."""
-    return verdicts.verdict([one.judge(result) for one in REQUIREMENTS])
+    return result | verdict(result, REQUIREMENTS)
 
 
 def report(result: dict[str, Any]) -> str:
@@ -121,4 +114,4 @@ def report(result: dict[str, Any]) -> str:
     for name, rate in result["steps_per_second"].items():
         lines.append(f"{name:<28}{UNITS[name]:>10}{rate:>10.0f}{result['standard'][name]:>18.0f}")
     lines.append(f"A batch of Reach-v0 beside Reacher-v5, two motors without contacts: {result['times_reacher']:.2f}")
-    return verdicts.report_text(lines, result)
+    return report_text(lines, result)
