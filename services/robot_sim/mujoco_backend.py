@@ -51,8 +51,11 @@ class MujocoBackend:
         self.notes: Sequence[str] = self._scene.notes
         self._obstacles = [name for name, thing in self.world.objects.items() if thing.role == "obstacle"]
         self._untouchable = {*self._robot.links, *self._obstacles}  # the ball is there to be touched
-        self._gains = self._scene.data.efc_KBIP[self._scene.rows, 1]  # 1/s, of a constraint's acceleration to its velocity
+        self._pull = (
+            self._scene.data.efc_KBIP[self._scene.rows, 1] * self._scene.scale
+        )  # 1/s, acceleration of a joint for a motor's velocity
         self._geared = np.zeros(len(self._robot.motors), dtype=np.bool_)
+        self._some_geared = False
         self._deepest: dict[str, float] = {}  # m, by pair, in the last tick
 
     def step(self, dt: float) -> None:
@@ -89,19 +92,20 @@ class MujocoBackend:
 
     def _advance(self, h: float) -> None:
         scene, motors = self._scene, self.motors
-        velocity, q = motors.drive(h), motors.q
-        in_torque = motors.in_torque
-        if (in_torque != self._geared).any():
+        velocity, q, in_torque = motors.drive(h), motors.q, motors.in_torque
+        some_in_torque = bool(in_torque.any())
+        if some_in_torque or self._some_geared:
             self._change_gears(in_torque)
-        target = np.clip(velocity, (self._lower - q) / h, (self._upper - q) / h)
+        reached = np.minimum(np.maximum(q + velocity * h, self._lower), self._upper)
+        target = (reached - q) / h
         data, rows = scene.data, scene.rows
-        if in_torque.any():
+        if some_in_torque:
             free, target = self._apply_torques(in_torque, target, q, h)
             data.efc_frictionloss[rows[free]], data.efc_frictionloss[rows[in_torque & ~free]] = 0.0, STOP
-        data.efc_aref[rows] += self._gains * target * scene.scale
+        data.efc_aref[rows] += self._pull * target
         mujoco.mj_step2(scene.model, data)
         efforts = data.efc_force[rows] * scene.scale
-        if in_torque.any():
+        if some_in_torque:
             passed = motors.torques - FRICTION * data.qvel[scene.dofs] / scene.scale - INERTIA * data.qacc[scene.dofs] / scene.scale
             efforts = np.where(free, passed, np.clip(efforts, -self._torques, self._torques))
         scene.refresh()
@@ -129,12 +133,14 @@ class MujocoBackend:
 
     def _change_gears(self, in_torque: Mask) -> None:
         """Give motors in torque mode the inertia and the friction of the law, the others those of their own."""
+        if (in_torque == self._geared).all():
+            return
         scene = self._scene
         for index, (motor, geared) in enumerate(zip(self._robot.motor_table, in_torque.tolist(), strict=True)):
             scene.set_gear(motor, INERTIA if geared else reflected_inertia(motor), FRICTION if geared else 0.0)
             if not geared:
                 scene.data.qfrc_applied[scene.dofs[index]] = 0.0
-        self._geared = in_torque
+        self._geared, self._some_geared = in_torque, bool(in_torque.any())
         scene.refresh()
 
 

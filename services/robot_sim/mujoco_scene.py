@@ -111,7 +111,11 @@ class MujocoScene:
         """Smallest distance [m] of links from objects, negative when they overlap; `within` if there is none nearer."""
         ours = [geom for link in links for geom in self._solids.get(link, ())]
         theirs = [self.model.geom(_of_object(name)).id for name in objects]
-        return min((mujoco.mj_geomDistance(self.model, self.data, a, b, within, None) for a in ours for b in theirs), default=within)
+        nearest = within
+        for one in ours:
+            for other in theirs:  # beyond the nearest one so far MuJoCo's search ends early
+                nearest = min(nearest, mujoco.mj_geomDistance(self.model, self.data, one, other, nearest, None))
+        return nearest
 
     def _weigh(self, body: Any, link: int, origin: Array) -> None:
         """Give the link its mass; without masses in the robot's file, MuJoCo computes it from the link's solids."""
