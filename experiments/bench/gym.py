@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ def measure(settings: Settings) -> dict[str, Any]:
         for number in range(settings.rounds):
             for part, (name, player) in enumerate(playing.items()):
                 progress.show((number + part / len(playing)) / settings.rounds, name)
-                (_, seconds), speed = speeds.around(lambda player=player: processor_time(player.run))
+                (_, seconds), speed = speeds.around(partial(processor_time, player.run))
                 found[name].append(player.steps / seconds)
                 standard[name].append(player.steps / seconds / speed)
     result: dict[str, Any] = {"core": core, "rounds": settings.rounds, "speed": speeds.median}

@@ -95,8 +95,8 @@ class _Reaching:
             "its joints. Take other joints, or a world with more room."
         )
 
-    def _pushed(self, forces: Sequence[Array]) -> bool:
-        return any(force[self.joints].any() for force in forces)
+    def _pushed(self, forces: Array) -> bool:
+        return bool(forces[:, self.joints].any())
 
     def aim(self, plants: Sequence[OfflinePlant], actions: Array) -> None:
         """Move the attractors of several robots by actions (k, d), within the joints' limits."""

@@ -49,6 +49,12 @@ def learned(agent: Explorable) -> Any:
     return agent.model.debiased(goal=PRIOR, stay=0.0)
 
 
+def row(values: Array, state: int) -> Array:
+    """Return the values of the actions of a state, from those of all states (S, A)."""
+    found: Array = values[state]
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Curious:
     """The published curiosity with an external reward: the information gain plus `weight` times the rewards that were found."""
@@ -58,7 +64,7 @@ class Curious:
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
         """Score the actions of a state."""
-        return agent.plan(agent.model.reward + self.weight * self.plant.known)[1][state]
+        return row(agent.plan(agent.model.reward + self.weight * self.plant.known)[1], state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +79,7 @@ class CountBonus:
         tries = agent.model.tries
         bonus = self.bonus / np.sqrt(np.maximum(tries, 1))
         reward = np.where(tries > 0, self.plant.known + bonus, self.plant.largest + self.bonus)
-        return agent.plan(reward, learned(agent), key="count bonus")[1][state]
+        return row(agent.plan(reward, learned(agent), key="count bonus")[1], state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +96,7 @@ class RMax:
         probabilities = np.where(known[..., None], beliefs.probabilities, 0.0)
         probabilities[..., 0] += ~known  # the first bin: the state stays
         reward = np.where(known, self.plant.known, self.plant.largest)
-        return agent.plan(reward, SampledBeliefs(beliefs.outcomes, probabilities), key="rmax")[1][state]
+        return row(agent.plan(reward, SampledBeliefs(beliefs.outcomes, probabilities), key="rmax")[1], state)
 
 
 class PosteriorSampling:
@@ -113,7 +119,7 @@ class PosteriorSampling:
             outcomes: Ints = np.broadcast_to(np.arange(counts.shape[2]), counts.shape).copy()
             world = SampledBeliefs(outcomes, drawn)
             self._values = value_iteration(world, reward, agent.discount, PLAN_TOLERANCE, relative=True, method="modified")[1]
-        return self._values[state]
+        return row(self._values, state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +133,7 @@ class EpsilonGreedy:
         """Score the actions of a state."""
         if rng.random() < self.share:
             return np.zeros(self.plant.known.shape[1])
-        return agent.plan(self.plant.known, learned(agent), key="greedy")[1][state]
+        return row(agent.plan(self.plant.known, learned(agent), key="greedy")[1], state)
 
 
 def all_counts(agent: Explorable) -> Array:
