@@ -36,8 +36,8 @@ EXTRAS = {
 }
 """Extras of this project: importable package -> its distribution."""
 WANTED = ("live", "sim", "viz")  # of `mobee launch`
-_NOTES = """A line is ok, a note (something is missing that `mobee launch` does not need), or
-wrong, with the command that mends it.
+_NOTES = """A line is ok, a note (`mobee launch` does not need it), or wrong, with the
+command that mends it.
 Exit code: 0 `mobee launch` can start here, 3 something is wrong."""
 
 Verdict = Literal["ok", "note", "wrong"]
