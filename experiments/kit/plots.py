@@ -45,9 +45,14 @@ def ticks_at(axes: Any, places: Sequence[float], labels: Sequence[str] | None = 
 
 def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
     """Draw the means of the runs (N, L) at L places as a line, and their intervals as a band."""
-    means, low, high = _of(list(runs.T))
-    axes.plot(at, means, "o-", color=color, label=label, markersize=4)
-    axes.fill_between(at, low, high, color=color, alpha=0.15, linewidth=0.0)
+    draw_band(axes, at, list(runs.T), "o-", color=color, label=label, markersize=4)
+
+
+def draw_band(axes: Any, at: ArrayLike, groups: Sequence[ArrayLike], line: str, color: str, alpha: float = 0.15, **style: Any) -> None:
+    """Draw the mean of each group of runs as a line, and their intervals as a band; `style`: passed to Matplotlib's plot."""
+    means, low, high = _of(groups)
+    axes.plot(at, means, line, color=color, **style)
+    axes.fill_between(at, low, high, color=color, alpha=alpha, linewidth=0.0)
 
 
 def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:

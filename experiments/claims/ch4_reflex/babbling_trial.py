@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, TextIO
 
@@ -15,7 +12,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from experiments.kit.live.launch import PHYSICS, TABLE, free_endpoint, stop
+from experiments.kit.live.launch import PHYSICS, TABLE, summary_of
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
 from mobee.arrays import Array
 from mobee.errors import MobeeError
@@ -113,7 +110,6 @@ seed = {seed}
 [services.robot_sim]
 backend = "{backend}"
 rate = {rate:g}
-ticks = {ticks}
 record = {record}
 """
 _ONE = """participants = ["port_filter"]
@@ -136,7 +132,6 @@ robot_of = "{robot_of}"
 speed = {speed:g}
 run_dir = {folder}
 """
-PERIOD = 0.05  # s between two checks of the progress
 START_TIMEOUT = 60.0  # s until the first tick
 TICK_TIMEOUT = 30.0  # s without a tick after which a trial has failed
 REACHED = float(np.deg2rad(10.0))  # rad, of every motor of a part: the zone of the limits; less than half a lattice cell
@@ -146,13 +141,13 @@ SUMMARY = "summary.json"  # of the launcher
 Outcome = Literal["completed", "deflected", "returned"]
 
 
-def scenario(mode: str, folder: Path, seed: int, ticks: int, backend: str = PHYSICS[0]) -> str:
+def scenario(mode: str, folder: Path, seed: int, backend: str = PHYSICS[0]) -> str:
     """Return the text of the scenario; recordings go to the folder."""
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
     between = {"off": "", "one": _ONE, "two": _TWO.format(speed=SPEED)}[mode]
-    values = {"title": TITLES[mode], "gains": gains, "seed": seed, "rate": RATE, "ticks": ticks, "record": where, "backend": backend}
+    values = {"title": TITLES[mode], "gains": gains, "seed": seed, "rate": RATE, "record": where, "backend": backend}
     robot = _ROBOT.format(world=_quoted(TABLE), **values)
     return robot + between + _BABBLER.format(at=at, robot_of=robot_of, speed=SPEED, folder=where)
 
@@ -168,49 +163,31 @@ class TrialFailed(MobeeError):
 def run_trial(
     folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str = PHYSICS[0]
 ) -> None:
-    """Run a trial; writes commands, positions and contacts into the folder.
+    """Run a trial; writes commands, positions, contacts and the launcher's summary into the folder.
 
-    `show` is called with the finished share.  Raises TrialFailed.
+    `show` is called with the finished share.  Raises TrialFailed, and LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for left in (COMMANDS, POSITIONS):  # of an interrupted trial
         (folder / left).unlink(missing_ok=True)
     file = folder / f"{mode}.toml"
-    file.write_text(scenario(mode, folder.resolve(), seed, ticks, backend))
+    file.write_text(scenario(mode, folder.resolve(), seed, backend))
     due = ticks * 8 * len(robot.motors)  # bytes of a whole record
-    with _launched(file, folder) as process:
-        written, deadline = 0, time.monotonic() + START_TIMEOUT
-        while process.poll() is None:  # robot_sim ends after its ticks, and the launcher with it
-            time.sleep(PERIOD)
-            size = _size(folder / POSITIONS)
-            if size != written:
-                written, deadline = size, time.monotonic() + TICK_TIMEOUT
-                show(size / due)
-            elif time.monotonic() > deadline:
-                raise TrialFailed(f"{mode}: no tick for {TICK_TIMEOUT:g} s; see {folder / 'news'} and {folder / 'launch'}")
+    written, deadline = 0, time.monotonic() + START_TIMEOUT
+
+    def watch(_: int) -> None:
+        nonlocal written, deadline
+        size = _size(folder / POSITIONS)
+        if size != written:
+            written, deadline = size, time.monotonic() + TICK_TIMEOUT
+            show(size / due)
+        elif time.monotonic() > deadline:
+            raise TrialFailed(f"{mode}: no tick for {TICK_TIMEOUT:g} s; see {folder / 'launch'}")
+
+    summary = summary_of(str(file), ticks=ticks, runs=folder / "launch", watch=watch)
+    (folder / SUMMARY).write_bytes(msgspec.json.encode(summary))
     if _size(folder / POSITIONS) != due:
-        raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'news'} and {folder / 'launch'}")
-
-
-@contextmanager
-def _launched(file: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run `mobee launch` at a free endpoint; stops it on any exception, and raises TrialFailed if it ends with an error."""
-    argv = [sys.executable, "-m", "mobee_system", "launch", str(file), "--headless", "--json"]
-    argv += ["--endpoint", free_endpoint(), "--runs", str(folder / "launch")]
-    with (folder / SUMMARY).open("wb") as summary, (folder / "news").open("wb") as news:
-        # In a process group of its own, so that a terminal's Ctrl-C reaches only this process, which then stops it in order.
-        process = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=summary, stderr=news, process_group=0)
-    try:
-        yield process
-    finally:
-        code = stop(process)
-    if code != 0:
-        raise TrialFailed(f"{file.stem}: the system ended with code {code}: {_last_line(folder / 'news')}")
-
-
-def _last_line(path: Path) -> str:
-    *_, last = ["no message", *path.read_text(errors="replace").strip().splitlines()]
-    return last
+        raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'launch'}")
 
 
 def _size(path: Path) -> int:

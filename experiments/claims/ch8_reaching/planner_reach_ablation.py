@@ -26,16 +26,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, judged
 from experiments.kit.plots import draw_bars, new_figure
 from experiments.kit.reaching.arm import TRANSITIONS
 from experiments.kit.reaching.cases import METHODS, SCENES, attempt, make_cases, trained
 from experiments.kit.reaching.targets import GOOD
+from experiments.kit.rules import texts
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee.arrays import Array
@@ -53,16 +55,6 @@ SITUATIONS = {
     "moving": "to a target that moves",
 }
 MORE = {"reward": "earn more reward", "success": "more often bring the palm within 2 cm of the target"}
-CLAIMS = tuple(
-    Claim(
-        "thesis 5.3, 8.2, 9.3",
-        f"coarse planner and reactive reach together {MORE[MEASURE[law]]} than either alone, {situation} ({law} law)",
-        "no number",
-    )
-    for law in LAWS
-    for situation in SITUATIONS.values()
-)
-
 COLORS = {"planner": "tab:blue", "reach": "tab:orange", "both": "tab:red"}
 LABELS = {"planner": "planner alone", "reach": "reach alone", "both": "both"}
 TITLES = {
@@ -107,7 +99,7 @@ def findings(found: Cells) -> dict[str, Any]:
         error = estimate([100.0 * float(np.median(values[f"{scene}|{method}|missing"])) for values in groups[law]], 1)
         seconds = estimate(means(groups, law, scene, method, "seconds"), 1)
         rows.append({"law": law, "scene": scene, "method": method, **row, "median distance left [cm]": error, "robot time [s]": seconds})
-    return {"claims": [claim.record() for claim in measured(groups)], "cases": rows}
+    return {"claims": judged(CLAIMS, groups), "cases": rows}
 
 
 def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Array:
@@ -117,19 +109,12 @@ def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Ar
     return np.array([(values <= GOOD if measure == "success" else values).mean() for values in each])
 
 
-def measured(groups: Groups) -> list[Claim]:
-    """Return the claims with our numbers."""
-    claims = []
-    for (law, scene), claim in zip(product(LAWS, SCENES), CLAIMS, strict=True):
-        if law not in groups:
-            claims.append(claim.measured("not measured", None))
-            continue
-        each = {method: means(groups, law, scene, method, MEASURE[law]) for method in METHODS}
-        numbers = ", ".join(f"{'both' if method == 'both' else method + ' alone'} {estimate(values)}" for method, values in each.items())
-        claims.append(
-            claim.measured(f"{MEASURE[law]} {numbers}", does_more(each["both"], {method: each[method] for method in METHODS[:2]}))
-        )
-    return claims
+def _together(law: str, scene: str, groups: Groups) -> Measured:
+    if law not in groups:
+        return "not measured", None
+    each = {method: means(groups, law, scene, method, MEASURE[law]) for method in METHODS}
+    named = {"both" if method == "both" else f"{method} alone": values for method, values in each.items()}
+    return f"{MEASURE[law]} {texts(named)}", does_more(each["both"], {method: each[method] for method in METHODS[:2]})
 
 
 def does_more(both: Array, alone: Mapping[str, Array]) -> bool | None:
@@ -138,6 +123,18 @@ def does_more(both: Array, alone: Mapping[str, Array]) -> bool | None:
     if all(low > 0.0 for low, _ in spans):
         return True
     return False if any(high < 0.0 for _, high in spans) else None
+
+
+CLAIMS = tuple(
+    Claim(
+        "thesis 5.3, 8.2, 9.3",
+        f"coarse planner and reactive reach together {MORE[MEASURE[law]]} than either alone, {situation} ({law} law)",
+        "no number",
+        rule=partial(_together, law, scene),
+    )
+    for law in LAWS
+    for scene, situation in SITUATIONS.items()
+)
 
 
 def plot(found: Cells) -> Any:

@@ -17,24 +17,31 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.claims.ch8_reaching.arm_queries import BELIEFS, Scene, answer, believed, make_scene, space, world_of
-from experiments.kit.experiment import Claim, Experiment
-from experiments.kit.learning.arm import arm_plant
+from experiments.kit.control.plant_runs import place
+from experiments.kit.experiment import Experiment, Measured, claim, judged
+from experiments.kit.learning.arm import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_clauses, arm_plant, arm_space, columns, robot, whole
 from experiments.kit.learning.arm_planners import Learned, PlannedOnce, Repaired, Rival, Straight
-from experiments.kit.learning.arm_roadmap import KINDS, NEIGHBOURS, make_roadmap, with_goals
-from experiments.kit.plots import new_figure
-from experiments.kit.statistics import interquartile_mean, interval
+from experiments.kit.learning.arm_roadmap import KINDS, NEIGHBOURS, Belief, make_roadmap, with_goals
+from experiments.kit.plots import draw_band, draw_points, finish, new_figure
+from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
-from mobee import CuriousAgent, Lattice
-from mobee.arrays import Array
+from mobee import CuriousAgent, Lattice, Model, OfflinePlant, World, sphere
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.roadmap.ompl import require_ompl
+
+BELIEFS = ("true", "no cables", "miscalibrated", "both", "gross")
+BALLS, RADIUS = 4, 0.03  # m
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed position of a ball and of a joint angle
+MAX_MOTIONS = 20_000  # among which the queries are found
+QUERY_TIMEOUT = 120.0  # s of plant time per query
 
 LEARNED = (0, 1000, 4000)  # transitions before the first query
 QUERIES = 60
@@ -47,16 +54,6 @@ NUMBERS = {
     "actions": "actions per query",
     "repairs": "repairs per query",
 }
-
-FAILS = Claim(
-    "paper 3.1", "planning first and acting later, as with a PRM, does not work well: plans of a wrong model fail at run time", "no number"
-)
-INSUFFICIENT = Claim(
-    "paper 2.3",
-    "the PRM's simple graph is insufficient, even if it is repaired: where the model is wrong, a learned MDP is needed",
-    "no number",
-)
-CLAIMS = (FAILS, INSUFFICIENT)
 
 COLORS = {
     "OMPL, planned once": "tab:gray",
@@ -114,171 +111,276 @@ def _rivals(settings: dict[str, Any], seed: int, scene: Scene, lattice: Lattice)
         yield "straight", Straight(lattice), 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
-    """The interquartile mean over the seeds and its 95 % interval."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """The true world, the errors of the planners' model, and Q queries, each from rest at `starts` to the cell of a lattice state."""
 
-    mean: float
-    low: float
-    high: float
+    balls: Array  # (B, 3) m
+    shifts: Array  # (B, 3) m, believed minus true positions
+    turns: Array  # (4,) rad, believed minus true joint angles
+    starts: Array  # (Q, 4) rad
+    goals: Ints  # (Q,)
+    is_hard: NDArray[np.bool_]  # (Q,): the straight motion failed when it was tried
 
-    @classmethod
-    def of(cls, values: Array) -> Number:
-        """Summarise one value per seed, (n,)."""
-        return cls(interquartile_mean(values), *interval(values))
 
-    def __str__(self) -> str:
-        digits = 1 if abs(self.mean) >= 2.0 else 2
-        return f"{self.mean:.{digits}f} [{self.low:.{digits}f}, {self.high:.{digits}f}]"
+def space() -> Lattice:
+    """Return the published lattice of rank 3 with 16 neighbours."""
+    return arm_space(RANK3, ARM_NEIGHBOURS)
+
+
+def world_of(balls: Array) -> World:
+    """Return a world with balls at these positions (B, 3) m."""
+    world = World()
+    for number, position in enumerate(balls):
+        world.add(f"ball {number}", sphere(RADIUS), position=position)
+    return world
+
+
+def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
+    """Return the true robot among the true balls, at rest at `start` (4,) rad."""
+    plant = arm_plant(seed, world=world_of(scene.balls))
+    place(plant, whole(start[None])[0])
+    return plant
+
+
+def make_scene(seed: int, queries: int) -> Scene:
+    """Draw balls in the workspace, and queries; in half of them, or as many as are found, a straight motion does not reach the goal."""
+    rng = np.random.default_rng([seed, 75])
+    balls = _balls(rng)
+    shifts = rng.normal(size=balls.shape)
+    shifts *= SHIFT / np.linalg.norm(shifts, axis=1, keepdims=True)
+    turns = TURN * rng.choice([-1.0, 1.0], size=JOINTS)
+    return Scene(balls, shifts, turns, *_queries(seed, rng, balls, queries))
+
+
+def _balls(rng: np.random.Generator) -> Array:
+    """Return positions of the palm in random poses between the lattice's outer samples, where a ball does not touch the robot at home."""
+    low, high = robot().limits[columns()].T
+    alone = Model(robot())
+    found: list[Array] = []
+    while len(found) < BALLS:
+        pose = low + rng.uniform(RANK3[0], RANK3[-1], JOINTS) * (high - low)
+        ball = alone.evaluate(whole(pose)).position("left_palm")
+        if not len(Model(robot(), world_of(ball[None])).evaluate(robot().home).table):
+            found.append(ball)
+    return np.array(found)
+
+
+def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> tuple[Array, Ints, NDArray[np.bool_]]:
+    """Move straight from sample to sample; choose queries among these motions, whose goals were reached at least once."""
+    lattice = space()
+    plant = arm_plant(seed, world=world_of(balls))
+    free = [s for s in range(len(lattice)) if not len(plant.model.evaluate(whole(lattice.samples[s])).table)]
+    tried: list[tuple[Array, int, bool]] = []
+    reached: set[int] = set()
+    here = plant.measure(PART)[:JOINTS]
+    while len(tried) < MAX_MOTIONS:
+        goal = int(rng.choice(free))
+        end = plant.act(PART, lattice.target(goal)).q[:JOINTS]
+        succeeded = lattice.state_of(end) == goal
+        if lattice.state_of(here) != goal:
+            tried.append((here, goal, not succeeded))
+        reached |= {goal} if succeeded else set()
+        here = end
+        if len(tried) % 100 == 0:
+            hard = [query for query in tried if query[2] and query[1] in reached]
+            easy = [query for query in tried if not query[2]]
+            if min(len(hard), len(easy)) >= (count + 1) // 2:
+                break
+    if not hard or not easy:
+        raise InvalidValue(
+            f"scene {seed}: straight motions reached {len(easy)} of {len(tried)} goals; queries of both kinds are needed: use another seed."
+        )
+    half = count // 2
+    chosen = [*_some(rng, hard, count - half), *_some(rng, easy, half)]
+    chosen = [chosen[i] for i in rng.permutation(len(chosen))]
+    starts, goals, failed = zip(*chosen, strict=True)
+    return np.array(starts), np.array(goals, dtype=np.intp), np.array(failed)
+
+
+def _some(rng: np.random.Generator, queries: list[tuple[Array, int, bool]], count: int) -> list[tuple[Array, int, bool]]:
+    return [queries[i] for i in rng.permutation(len(queries))[:count]]
+
+
+def believed(scene: Scene, kind: str) -> Belief:
+    """Return a planner's model of a scene, one of the BELIEFS.
+
+    "true": without errors; "no cables": without the constraints of the shoulder's cables; "miscalibrated": balls wrong by 1 cm and joints
+    by 3 degrees; "both": both errors; "gross": both, with three times the miscalibration.
+    """
+    times = {"miscalibrated": 1.0, "both": 1.0, "gross": 3.0}.get(kind, 0.0)
+    clauses = [] if kind in ("no cables", "both", "gross") else arm_clauses()
+    return Belief(Model(robot(), world_of(scene.balls + times * scene.shifts)), times * scene.turns, clauses)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """The results of Q queries."""
+
+    success: NDArray[np.bool_]  # (Q,)
+    seconds: Array  # (Q,) plant time, QUERY_TIMEOUT for queries that failed
+    actions: Ints  # (Q,)
+    repairs: Ints  # (Q,)
+
+
+def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
+    """Send a rival to every goal, in order; the noise is the same for all rivals."""
+    lattice = space()
+    rows = []
+    for number, goal in enumerate(scene.goals):
+        plant = plant_of(scene, 1000 * seed + number, scene.starts[number])
+        first_time, repairs, actions = plant.time, rival.repairs, 0
+        rival.begin(int(goal))
+        here = plant.measure(PART)[:JOINTS]
+        while lattice.state_of(here) != goal and plant.time - first_time < QUERY_TIMEOUT:
+            aim = rival.aim(here)
+            if aim is None:
+                break
+            target = lattice.target(int(goal))
+            target[:JOINTS] = aim
+            end = plant.act(PART, target).q[:JOINTS]
+            rival.observe(here, end)
+            here, actions = end, actions + 1
+        success, seconds = lattice.state_of(here) == goal, plant.time - first_time
+        success = success and seconds <= QUERY_TIMEOUT
+        rows.append((success, seconds if success else QUERY_TIMEOUT, actions, rival.repairs - repairs))
+    success, seconds, actions, repairs = zip(*rows, strict=True)
+    return Answers(np.array(success), np.array(seconds), np.array(actions), np.array(repairs))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """A rival under a belief ("" for rivals without a model)."""
+    """The results of a rival.
 
-    rival: str
-    belief: str
-    success: Number
-    hard: Number
-    """Success in hard queries."""
-    seconds: Number
-    """Plant time per query; the limit for queries that failed."""
-    actions: Number
-    repairs: Number
+    `numbers`: of each of NUMBERS, the means over the queries, (seeds,); the plant time of queries that failed is the limit.  `cost`: hours
+    of plant time, or thousands of poses checked, before the first query.  `blocks`: plant time per query over blocks of queries, (seeds,)
+    each; a scene may have fewer queries than the settings ask for.
+    """
+
+    numbers: dict[str, Array]
     cost: float
-    """Hours of plant time, or thousands of poses checked, before the first query."""
-    curve: Array
-    """(blocks, 3): mean, low and high of the plant time per query, over blocks of queries."""
+    blocks: list[Array]
+
+    def text(self, name: str) -> str:
+        """Return one of NUMBERS as text."""
+        values = self.numbers[name]
+        return estimate(values, 1 if abs(interquartile_mean(values)) >= 2.0 else 2)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Summary:
-    """All rows, in the order of the cells."""
-
-    rows: tuple[Row, ...]
-
-    def row(self, rival: str, belief: str) -> Row:
-        """Return the row of a rival; raises InvalidValue if it has not run."""
-        for row in self.rows:
-            if (row.rival, row.belief) == (rival, belief):
-                return row
-        raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: continue the run with --resume.")
-
-    def table(self) -> list[dict[str, Any]]:
-        """Return the rows with texts, for the results."""
-        return [
-            {
-                "planner": row.rival,
-                "its model": row.belief or "none",
-                **{label: str(getattr(row, name)) for name, label in NUMBERS.items()},
-                "before the first query": f"{row.cost:.2f} {'thousand poses checked' if row.belief else 'h of robot time'}",
-            }
-            for row in self.rows
-        ]
+Rows = Mapping[tuple[str, str], Row]  # by rival and belief ("" for rivals without a model)
 
 
-def summary_of(found: Cells) -> Summary:
+def rows_of(found: Cells) -> Rows:
     """Summarise the seeds of each rival and belief."""
     values: dict[tuple[str, str], dict[str, list[Array]]] = defaultdict(lambda: defaultdict(list))
     for result in found.values():
         belief = str(result.cell.settings.get("belief", ""))
-        hard = result.values["hard"]
         for key, array in result.values.items():
             rival, _, measure = key.partition("|")
             if measure:
                 values[rival, belief][measure].append(array)
                 if measure == "success":
-                    values[rival, belief]["hard"].append(array[hard])
-    return Summary(tuple(_row(rival, belief, measures) for (rival, belief), measures in sorted(values.items())))
+                    values[rival, belief]["hard"].append(array[result.values["hard"]])
+    return {key: _row(measures) for key, measures in sorted(values.items())}
 
 
-def _row(rival: str, belief: str, measures: dict[str, list[Array]]) -> Row:
-    numbers = {name: Number.of(np.array([values.mean() for values in measures[name]])) for name in NUMBERS}
-    seconds = measures["seconds"]  # of each seed; a scene may have fewer queries than the settings ask for
+def _row(measures: dict[str, list[Array]]) -> Row:
+    numbers = {name: np.array([values.mean() for values in measures[name]]) for name in NUMBERS}
+    seconds = measures["seconds"]
     firsts = range(0, max(map(len, seconds)), BLOCK_SIZE)
-    blocks = [Number.of(np.array([one[first : first + BLOCK_SIZE].mean() for one in seconds if len(one) > first])) for first in firsts]
-    curve = np.array([(b.mean, b.low, b.high) for b in blocks])
-    return Row(rival, belief, **numbers, cost=float(np.mean(measures["cost"])), curve=curve)
+    blocks = [np.array([one[first : first + BLOCK_SIZE].mean() for one in seconds if len(one) > first]) for first in firsts]
+    return Row(numbers, float(np.mean(measures["cost"])), blocks)
+
+
+def row_of(rows: Rows, rival: str, belief: str) -> Row:
+    """Return the row of a rival; raises InvalidValue if it has not run."""
+    if (rival, belief) not in rows:
+        raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: continue the run with --resume.")
+    return rows[rival, belief]
 
 
 def findings(found: Cells) -> dict[str, Any]:
     """Return the claims, and a row per rival and belief."""
-    summary = summary_of(found)
-    return {"claims": [claim.record() for claim in measured(summary)], "rivals": summary.table()}
-
-
-def measured(summary: Summary) -> list[Claim]:
-    """Return the claims with our numbers."""
-    once, learned = summary.row("OMPL, planned once", "both"), summary.row("MDP, 4000 learned", "")
-    remembers = summary.row("OMPL, remembers", "both")
-    learning = 3600.0 * learned.cost / QUERIES
-    first = FAILS.measured(
-        f"success of a PRM without cables, 1 cm and 3 degrees wrong: {once.success}, in hard queries {once.hard};"
-        f" of the MDP after 4000 transitions: {learned.success}, in hard queries {learned.hard}",
-        _falls_short(once, learned),
-    )
-    second = INSUFFICIENT.measured(
-        f"success of a PRM that removes failed edges, and remembers them: {remembers.success}, in hard queries {remembers.hard},"
-        f" {remembers.seconds} s per query; of the MDP: {learned.success}, in hard queries {learned.hard}, {learned.seconds} s per query,"
-        f" after {learned.cost:.1f} h of learning, which is {learning:.0f} s for each of {QUERIES} queries",
-        _falls_short(remembers, learned),
-    )
-    return [first, second]
+    rows = rows_of(found)
+    table = [
+        {"planner": rival, "its model": belief or "none"}
+        | {label: row.text(name) for name, label in NUMBERS.items()}
+        | {"before the first query": f"{row.cost:.2f} {'thousand poses checked' if belief else 'h of robot time'}"}
+        for (rival, belief), row in rows.items()
+    ]
+    return {"claims": judged(CLAIMS, rows), "rivals": table}
 
 
 def _falls_short(roadmap: Row, learned: Row) -> bool | None:
     """Return whether the roadmap does not work well in hard queries, and the MDP does better; False where the roadmap works well."""
-    if roadmap.hard.high < min(MIN_SUCCESS, learned.hard.low):
+    (low, high), (least, _) = interval(roadmap.numbers["hard"]), interval(learned.numbers["hard"])
+    if high < min(MIN_SUCCESS, least):
         return True
-    return False if roadmap.hard.low >= MIN_SUCCESS else None
+    return False if low >= MIN_SUCCESS else None
+
+
+@claim(
+    "paper 3.1", "planning first and acting later, as with a PRM, does not work well: plans of a wrong model fail at run time", "no number"
+)
+def fails(rows: Rows) -> Measured:
+    once, learned = row_of(rows, "OMPL, planned once", "both"), row_of(rows, "MDP, 4000 learned", "")
+    text = (
+        f"success of a PRM without cables, 1 cm and 3 degrees wrong: {once.text('success')}, in hard queries {once.text('hard')};"
+        f" of the MDP after 4000 transitions: {learned.text('success')}, in hard queries {learned.text('hard')}"
+    )
+    return text, _falls_short(once, learned)
+
+
+@claim(
+    "paper 2.3",
+    "the PRM's simple graph is insufficient, even if it is repaired: where the model is wrong, a learned MDP is needed",
+    "no number",
+)
+def insufficient(rows: Rows) -> Measured:
+    remembers, learned = row_of(rows, "OMPL, remembers", "both"), row_of(rows, "MDP, 4000 learned", "")
+    each = (f"{one.text('success')}, in hard queries {one.text('hard')}, {one.text('seconds')} s per query" for one in (remembers, learned))
+    text = "success of a PRM that removes failed edges, and remembers them: " + "; of the MDP: ".join(each)
+    text += f", after {learned.cost:.1f} h of learning, which is {3600.0 * learned.cost / QUERIES:.0f} s for each of {QUERIES} queries"
+    return text, _falls_short(remembers, learned)
+
+
+CLAIMS = (fails, insufficient)
 
 
 def plot(found: Cells) -> Any:
     """Draw success and time of all rivals under each belief, and the time per query over the number of queries."""
-    summary = summary_of(found)
+    rows = rows_of(found)
     drawing = new_figure(15.0, 5.0)
     success, seconds, curves = drawing.subplots(1, 3)
-    _points(success, summary, "hard", "success in hard queries")
-    _points(seconds, summary, "seconds", "robot time per query [s]")
-    _curves(curves, summary)
-    handles, labels = success.get_legend_handles_labels()
-    drawing.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8)
+    _points(success, rows, "hard", "success in hard queries")
+    _points(seconds, rows, "seconds", "robot time per query [s]")
+    for rival, color in COLORS.items():
+        for belief in ("", SHOWN):
+            if (rival, belief) in rows and rival != "straight" and "once" not in rival:
+                blocks = rows[rival, belief].blocks
+                draw_band(curves, BLOCK_SIZE * (np.arange(len(blocks)) + 0.5), blocks, ".-", color, 0.1, linewidth=1.2)
+    finish(curves, xlabel="queries so far", ylabel=f"robot time per query [s], roadmaps' model “{SHOWN}”", ylim=(0.0, None))
+    drawing.legend(*success.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     return drawing
 
 
-def _points(axes: Any, summary: Summary, name: str, label: str) -> None:
-    roadmaps = [rival for rival in COLORS if any(row.rival == rival and row.belief for row in summary.rows)]
+def _points(axes: Any, rows: Rows, name: str, label: str) -> None:
+    roadmaps = [rival for rival in COLORS if any(key[0] == rival and key[1] for key in rows)]
     for rival, color in COLORS.items():
-        rows = [row for row in summary.rows if row.rival == rival]
+        mine = {belief: row for (other, belief), row in rows.items() if other == rival}
         if rival in roadmaps:
             shift = 0.11 * (roadmaps.index(rival) - (len(roadmaps) - 1) / 2)
-            at = np.array([BELIEFS.index(row.belief) for row in rows]) + shift
-            _bars(axes, at, rows, name, color, rival)
-        elif rows:  # without a model: the same under all beliefs
-            number = getattr(rows[0], name)
-            axes.axhline(number.mean, color=color, linewidth=1.0, label=f"{rival} ({rows[0].cost:.1f} h)" if "MDP" in rival else rival)
-            axes.axhspan(number.low, number.high, color=color, alpha=0.12, linewidth=0.0)
+            at = np.array([BELIEFS.index(belief) for belief in mine]) + shift
+            style: dict[str, Any] = {"fmt": "o", "color": color, "markersize": 4, "capsize": 2, "linewidth": 1.0, "label": rival}
+            draw_points(axes, at, [row.numbers[name] for row in mine.values()], **style)
+        elif mine:  # without a model: the same under all beliefs
+            values, cost = mine[""].numbers[name], mine[""].cost
+            text = f"{rival} ({cost:.1f} h)" if "MDP" in rival else rival
+            axes.axhline(interquartile_mean(values), color=color, linewidth=1.0, label=text)
+            axes.axhspan(*interval(values), color=color, alpha=0.12, linewidth=0.0)
     axes.set_xticks(range(len(BELIEFS)), BELIEFS, fontsize=8)
     axes.set(xlabel="the roadmaps' model of the robot", ylabel=label, ylim=(0.0, None))
     axes.grid(alpha=0.2, axis="y")
-
-
-def _bars(axes: Any, at: Any, rows: list[Row], name: str, color: str, label: str) -> None:
-    numbers = [getattr(row, name) for row in rows]
-    means = np.array([number.mean for number in numbers])
-    spread = np.array([[number.mean - number.low for number in numbers], [number.high - number.mean for number in numbers]])
-    axes.errorbar(at, means, np.maximum(spread, 0.0), fmt="o", color=color, markersize=4, capsize=2, linewidth=1.0, label=label)
-
-
-def _curves(axes: Any, summary: Summary) -> None:
-    for rival, color in COLORS.items():
-        for row in summary.rows:
-            if row.rival == rival and row.belief in ("", SHOWN) and rival != "straight" and "once" not in rival:
-                at = BLOCK_SIZE * (np.arange(len(row.curve)) + 0.5)
-                axes.plot(at, row.curve[:, 0], ".-", color=color, linewidth=1.2)
-                axes.fill_between(at, row.curve[:, 1], row.curve[:, 2], color=color, alpha=0.1, linewidth=0.0)
-    axes.set(xlabel="queries so far", ylabel=f"robot time per query [s], roadmaps' model “{SHOWN}”", ylim=(0.0, None))
-    axes.grid(alpha=0.2)
 
 
 EXPERIMENT = Experiment(

@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp as example
-from experiments.kit.experiment import Claim, Experiment
-from experiments.kit.plots import new_figure
+from experiments.kit.experiment import Experiment, Measured, claim, judged
+from experiments.kit.plots import draw_band, finish, new_figure, ticks_at
 from experiments.kit.roadmap_task import RIGHT, build
-from experiments.kit.rules import rises
-from experiments.kit.statistics import estimate, interquartile_mean, interval
+from experiments.kit.rules import rises, texts
+from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import MobeeError, Model, Roadmap, World, cylinder
 from mobee.arrays import Array, Ints
@@ -48,21 +48,6 @@ DRAWS = 300  # attempts to draw one query
 SPEED = 0.35  # rad/s, of the fastest motor on an edge
 MODES = ("edge", "around")
 MIN_SUCCESS = 0.9  # share of queries that reach the goal, from which replanning "works well"
-
-COMES_PAST = Claim(
-    "thesis 4.3.3",
-    "replanning after bumps works well in practice: the hand gets around a cup that the roadmap does not contain",
-    "works well",
-)
-GROWS = Claim(
-    "thesis 4.4",
-    "an obstacle invalidates many edges of a dense roadmap: the number of bumps until success grows with density",
-    "a very long time",
-)
-FEWER = Claim(
-    "aim of this reproduction", "removing all edges around a bump, not only one, needs fewer bumps in the densest roadmap", "fewer"
-)
-CLAIMS = (COMES_PAST, GROWS, FEWER)
 
 COLORS = {"edge": "tab:red", "around": "tab:blue"}
 NAMES = {"edge": "removes one edge per bump", "around": "removes all edges around a bump"}
@@ -215,7 +200,7 @@ def findings(found: Cells) -> dict[str, Any]:
         for spacing, runs in groups.items()
         for mode in MODES
     ]
-    return {"roadmaps": rows, "executed": _of_executed(groups), "claims": [claim.record() for claim in measured(groups)]}
+    return {"roadmaps": rows, "executed": _of_executed(groups), "claims": judged(CLAIMS, groups, len(groups) > 1)}
 
 
 def numbers(runs: list[dict[str, Any]], mode: str, name: str) -> Array:
@@ -237,30 +222,39 @@ def _of_executed(groups: Groups) -> dict[str, Any]:
     }
 
 
-def measured(groups: Groups) -> list[Claim]:
-    """Return the claims with our numbers; open if only one density was run."""
-    if len(groups) < 2:
-        return list(CLAIMS)
-    first, *_, last = groups.values()
-    seeds = range(min(map(len, groups.values())))
-    everything = [float(np.mean([numbers(runs, "edge", "arrived")[seed] for runs in groups.values()])) for seed in seeds]
-    bumps = ", ".join(f"{runs[0]['vertices']}: {estimate(numbers(runs, 'edge', 'bumps'), 1)}" for runs in groups.values())
-    few, many, around = (numbers(runs, mode, "bumps") for runs, mode in ((first, "edge"), (last, "edge"), (last, "around")))
-    return [
-        COMES_PAST.measured(f"{estimate(everything)} of all queries reach their goal", float(np.mean(everything)) >= MIN_SUCCESS),
-        GROWS.measured(f"bumps per query, by number of vertices: {bumps}", _above(interval(many), interval(few))),
-        FEWER.measured(
-            f"{estimate(around, 1)} instead of {estimate(many, 1)} bumps with {last[0]['vertices']} vertices",
-            rises(many - around),
-        ),
-    ]
+@claim(
+    "thesis 4.3.3",
+    "replanning after bumps works well in practice: the hand gets around a cup that the roadmap does not contain",
+    "works well",
+)
+def comes_past(groups: Groups) -> Measured:
+    seeds = min(map(len, groups.values()))
+    everything = np.mean([numbers(runs, "edge", "arrived")[:seeds] for runs in groups.values()], axis=0)
+    return f"{estimate(everything)} of all queries reach their goal", float(np.mean(everything)) >= MIN_SUCCESS
 
 
-def _above(one: tuple[float, float], other: tuple[float, float]) -> bool | None:
-    """Return whether an interval lies above another one; None where they overlap."""
-    if one[0] > other[1]:
-        return True
-    return False if one[1] < other[0] else None
+@claim(
+    "thesis 4.4",
+    "an obstacle invalidates many edges of a dense roadmap: the number of bumps until success grows with density",
+    "a very long time",
+)
+def grows(groups: Groups) -> Measured:
+    """Judge whether the interval of the densest roadmap lies above that of the sparsest; open where they overlap."""
+    bumps = {runs[0]["vertices"]: numbers(runs, "edge", "bumps") for runs in groups.values()}
+    (low, high), *_, (least, most) = map(interval, bumps.values())
+    text = f"bumps per query, by number of vertices: {texts(bumps, 1, '{}: {}')}"
+    return text, True if least > high else False if most < low else None
+
+
+@claim("aim of this reproduction", "removing all edges around a bump, not only one, needs fewer bumps in the densest roadmap", "fewer")
+def fewer(groups: Groups) -> Measured:
+    *_, last = groups.values()
+    many, around = (numbers(last, mode, "bumps") for mode in MODES)
+    text = f"{estimate(around, 1)} instead of {estimate(many, 1)} bumps with {last[0]['vertices']} vertices"
+    return text, rises(many - around)
+
+
+CLAIMS = (comes_past, grows, fewer)
 
 
 def plot(found: Cells) -> Any:
@@ -273,17 +267,12 @@ def plot(found: Cells) -> Any:
     first.set(ylabel="edges that the cup blocks", yscale="log")
     for axes, (name, label) in zip(others, LABELS.items(), strict=True):
         for mode in MODES:
-            rows = [numbers(runs, mode, name) for runs in groups.values()]
-            axes.plot(vertices, [interquartile_mean(row) for row in rows], ".-", color=COLORS[mode], label=NAMES[mode])
-            low, high = np.array([interval(row) for row in rows]).T
-            axes.fill_between(vertices, low, high, color=COLORS[mode], alpha=0.15, linewidth=0.0)
+            draw_band(axes, vertices, [numbers(runs, mode, name) for runs in groups.values()], ".-", COLORS[mode], label=NAMES[mode])
         axes.set(ylabel=label, ylim=(0.0, None))
         axes.legend(fontsize=8)
     for axes in (first, *others):
-        axes.set(xlabel="vertices of the roadmap", xscale="log")
-        axes.set_xticks(vertices, labels=[str(count) for count in vertices])
-        axes.minorticks_off()
-        axes.grid(alpha=0.2)
+        finish(axes, xlabel="vertices of the roadmap", xscale="log")
+        ticks_at(axes, vertices)
     return drawing
 
 

@@ -35,11 +35,9 @@ from scipy.stats import binomtest
 from experiments.claims.ch8_reaching.live_reach.problems import (
     AIM,
     FRESH,
-    GAINS,
     GRID,
     OBSTACLE_MOVES,
     RATE,
-    ROBOT,
     SUCCESS_DISTANCE,
     TARGET_MOVES,
     TRANSITIONS,
@@ -55,7 +53,7 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, Judged, measure, nearest_reach, read_block, write_block
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Claim, Experiment, Steps
-from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, summary_of, write_job
+from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, launch, write_job
 from experiments.kit.live.recordings import POSITIONS
 from experiments.kit.plots import new_figure
 from mobee.errors import InvalidValue
@@ -101,32 +99,8 @@ TITLES = {GRID: "those of the 27 targets that can be reached", FRESH: "new rando
 
 WITH_OBSTACLE = Path(__file__).with_name("obstacle.xml")
 MAX_TRY = 120.0  # s of robot time for a try, on average over a block
-PATIENCE = 60.0  # s for a tick, in which a plan may be made
 
-_SCENARIO = """# Written by the experiment `live-reach`.
-title = "Reaching with {backend}: {kind}"
-
-[shared]
-robot = "{robot}"
-world = "{world}"
-gains = "{gains}"
-seed = {seed}
-mode = "lock"
-patience = {patience}
-
-[services.robot_sim]
-backend = "{backend}"
-rate = {rate}
-record = "{folder}"
-
-[services.model]
-[services.controller]
-
-[services.performer]
-module = "experiments.kit.live.performer"
-perform = "experiments.claims.ch8_reaching.live_reach.contestants:perform"
-run_dir = "{folder}"
-"""
+PERFORM = "experiments.claims.ch8_reaching.live_reach.contestants:perform"
 
 
 @dataclass(frozen=True)
@@ -233,13 +207,9 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str 
     `seed`: of the simulated robot.  Raises LaunchFailed.
     """
     write_job(folder, job)
-    world = WITH_OBSTACLE if job.kind == "moving" else TABLE
-    names = {"kind": job.kind, "robot": ROBOT, "world": world, "gains": GAINS, "backend": backend, "folder": folder.resolve()}
-    text = _SCENARIO.format(seed=seed, patience=PATIENCE, rate=rate, **names)
-    scenario = folder / "scenario.toml"
-    scenario.write_text(text)
-    tries = max(1, len(job.problems) + job.tries)
-    summary = summary_of(str(scenario), ticks=round(MAX_TRY * rate * tries), runs=folder / "launches")
+    world, seconds = WITH_OBSTACLE if job.kind == "moving" else TABLE, MAX_TRY * max(1, len(job.problems) + job.tries)
+    names = {"title": f"Reaching with {backend}: {job.kind}", "world": str(world), "backend": backend}
+    summary = launch(folder, PERFORM, seed=seed, rate=rate, speed=1.0, seconds=seconds, **names)
     return bool(summary["lockstep"]["repeatable"])
 
 

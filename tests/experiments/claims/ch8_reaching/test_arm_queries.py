@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.arm_queries import QUERY_TIMEOUT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
+from experiments.claims.ch8_reaching.prm_vs_mdp import QUERY_TIMEOUT, SHIFT, TURN, Scene, answer, believed, make_scene, space, world_of
 from experiments.kit.learning.arm import whole
 from experiments.kit.learning.arm_planners import Straight
 from mobee import Model, load_robot

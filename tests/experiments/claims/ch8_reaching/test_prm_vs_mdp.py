@@ -4,8 +4,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK_SIZE, EXPERIMENT, measured, summary_of
+from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK_SIZE, CLAIMS, EXPERIMENT, row_of, rows_of
 from experiments.kit.cells import Cell, load_cells, write_cell
+from experiments.kit.experiment import judged
+from experiments.kit.statistics import interquartile_mean
 from mobee.errors import InvalidValue
 
 HARD = np.tile([True, False], BLOCK_SIZE)
@@ -35,19 +37,19 @@ def folder(tmp_path):
 
 
 def test_a_row_summarises_all_seeds_of_a_rival_under_a_belief(folder):
-    summary = summary_of(load_cells(folder))
-    once = summary.row("OMPL, planned once", "both")
-    assert (once.success.mean, once.hard.mean, once.seconds.mean, once.cost) == (0.5, 0.5, 60.0, 7.0)
-    learned = summary.row("MDP, 4000 learned", "")
-    assert learned.seconds.low == 18.0 and learned.seconds.high == 20.0 and learned.curve.shape == (2, 3)
+    rows = rows_of(load_cells(folder))
+    once = row_of(rows, "OMPL, planned once", "both")
+    assert [once.numbers[name].mean() for name in ("success", "hard", "seconds")] == [0.5, 0.5, 60.0] and once.cost == 7.0
+    learned = row_of(rows, "MDP, 4000 learned", "")
+    assert learned.numbers["seconds"].tolist() == [18.0, 19.0, 20.0] and len(learned.blocks) == 2
     with pytest.raises(InvalidValue, match="resume"):
-        summary.row("straight", "")
+        row_of(rows, "straight", "")
 
 
 def test_a_rival_that_fails_confirms_and_one_that_works_refutes(folder):
-    first, second = measured(summary_of(load_cells(folder)))
-    assert (first.verdict, second.verdict) == ("confirmed", "refuted")
-    assert "0.50" in first.ours and "7.0 h" in second.ours
+    first, second = judged(CLAIMS, rows_of(load_cells(folder)))
+    assert (first["verdict"], second["verdict"]) == ("confirmed", "refuted")
+    assert "0.50" in first["ours"] and "7.0 h" in second["ours"]
 
 
 @pytest.mark.parametrize(("once", "mdp", "verdict"), [(0.9, 1.0, "confirmed"), (0.96, 1.0, "refuted"), (0.9, 0.8, "open")])
@@ -58,8 +60,8 @@ def test_a_roadmap_must_be_below_95_percent_and_below_the_mdp(tmp_path, once, md
         write_cell(tmp_path, Cell(f"roadmaps-both-s{seed}", seed, {"belief": "both"}), {"hard": all_hard, **both}, 1.0)
         learned = {"hard": all_hard, **rival("MDP, 4000 learned", mdp, 18.0)}
         write_cell(tmp_path, Cell(f"mdp-s{seed}", seed, {"learned": 4000}), learned, 1.0)
-    claims = measured(summary_of(load_cells(tmp_path)))
-    assert [claim.verdict for claim in claims] == [verdict, verdict]
+    claims = judged(CLAIMS, rows_of(load_cells(tmp_path)))
+    assert [claim["verdict"] for claim in claims] == [verdict, verdict]
 
 
 def test_the_figure_of_an_unfinished_run_is_drawn(folder):
