@@ -23,6 +23,7 @@ import numpy as np
 import mobee
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, RIGHT
 from experiments.kit.reaching.arm import MARKER, PART, TRANSITIONS
+from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.arrays import Array
@@ -67,17 +68,8 @@ def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRAN
         curious = CuriousAgent(space, plant, seed=seed, store=store)
         curious.run(transitions)
     with ReachStore(file, PART) as reaches:
-        agent = ReachAgent(
-            space,
-            plant,
-            curious.model.debiased(),
-            marker=MARKER,
-            predictor="gp",
-            strategy="ucb",
-            failures="alike",
-            seed=seed,
-            store=reaches,
-        )
+        beliefs = curious.model.debiased()
+        agent = LEARNERS["gp-ucb-alike"].agent(space, plant, beliefs, marker=MARKER, seed=seed, store=reaches)
         agent.learn(targets_at(grid(), "surface"), tries)
 
 

@@ -27,18 +27,17 @@ import numpy as np
 
 from experiments.kit.cells import Cell, CellResult, load_cells
 from experiments.kit.command_line import positive_number
-from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.experiment import Claim, Experiment, Measured, Steps, claim, judged
 from experiments.kit.plots import new_figure
 from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations
 from experiments.kit.reaching.targets import between, grid, targets_at
 from experiments.kit.reaching.truth import TRIES, Truth, measure, oracle, truth_of
-from experiments.kit.rules import decides
-from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio, ratio_interval
+from experiments.kit.rules import decides, within
+from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, ratio_interval
 from experiments.kit.sweep import grouped, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.reaches import SCALE
 
 ORACLE, TRUTH = "oracle", "truth"
@@ -51,21 +50,6 @@ GRID, BETWEEN = "grid", "between"
 AIMS = {(GRID, 200): 0.80, (GRID, 400): 0.90, (GRID, 1600): 0.97, (BETWEEN, 800): 0.80}  # set and problem-tries -> fraction of the oracle
 MIN_RATIO = 2.0  # of the recommended predictor's score to the published one's
 _SETS = {GRID: "on the 27 targets", BETWEEN: "on 8 targets never tried"}
-AIMED = {
-    (name, checkpoint): Claim(
-        "aim of this reproduction",
-        f"after {checkpoint} problem-tries the recommended predictor reaches at least {least:.2f} of the oracle's score {_SETS[name]}",
-        f"at least {least:.2f}",
-    )
-    for (name, checkpoint), least in AIMS.items()
-}
-ABOVE = Claim(
-    "thesis 8.5",
-    "a more powerful function approximator improves the system greatly: at least twice the published predictor's score after 400 tries",
-    "no numbers",
-)
-CLAIMS = (*AIMED.values(), ABOVE)
-
 TITLES = {GRID: "the 27 targets", BETWEEN: "8 targets never tried"}
 
 Found = Mapping[str, CellResult]
@@ -127,18 +111,7 @@ def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
         best = oracle(truth, space, plant, beliefs, MARKER, settings["scale"], cell.seed)
         each = (of_evaluations(name, [best.evaluate(found, 2 * REPETITIONS)]) for name, found in sets.items())
         return {key: value for one in each for key, value in one.items()}
-    learner = LEARNERS[settings["what"]]
-    agent = ReachAgent(
-        space,
-        plant,
-        beliefs,
-        marker=MARKER,
-        predictor=learner.predictor,
-        strategy=learner.strategy,
-        failures=learner.failures,
-        scale=settings["scale"],
-        seed=cell.seed,
-    )
+    agent = LEARNERS[settings["what"]].agent(space, plant, beliefs, marker=MARKER, scale=settings["scale"], seed=cell.seed)
     return learn(agent, sets[GRID], settings["checkpoints"], REPETITIONS, sets)
 
 
@@ -192,30 +165,53 @@ def findings(found: Found) -> dict[str, Any]:
         "oracle's score": best,
         "fraction of the oracle's score after so many tries": rows,
         "computing seconds": dict(sorted(seconds.items())),
-        "claims": [claim.record() for claim in measured(curves, at)],
+        "claims": judged(CLAIMS, (curves, at)),
     }
 
 
-def measured(curves: Fractions, at: list[int]) -> list[Claim]:
-    """Return the claims with our numbers; open where the learner or the evaluation was not run."""
-    claims = []
-    for (name, checkpoint), claim in AIMED.items():
-        ours, published = (_column(curves, at, learner, name, checkpoint) for learner in (RECOMMENDED, PUBLISHED))
-        if ours is None:
-            claims.append(claim)
-            continue
-        beside = "" if published is None else f"; the published predictor {estimate(published)}"
-        claims.append(claim.measured(f"{RECOMMENDED} {estimate(ours)}{beside}", decides(interval(ours), least=AIMS[name, checkpoint])))
-    ours, published = (_column(curves, at, learner, GRID, 400) for learner in (RECOMMENDED, PUBLISHED))
+Evaluated = tuple[Fractions, list[int]]  # and after how many problem-tries
+
+
+def _columns(found: Evaluated, name: str, checkpoint: int) -> list[Array | None]:
+    """Return the fractions of the recommended and of the published predictor; None where that was not run."""
+    curves, at = found
+    known = (curves[one, name] if (one, name) in curves and checkpoint in at else None for one in (RECOMMENDED, PUBLISHED))
+    return [None if curve is None else curve[:, at.index(checkpoint)] for curve in known]
+
+
+def _reaches(name: str, checkpoint: int, found: Evaluated) -> Measured | None:
+    ours, published = _columns(found, name, checkpoint)
+    if ours is None:
+        return None
+    beside = "" if published is None else f"; the published predictor {estimate(published)}"
+    return within(ours, least=AIMS[name, checkpoint], text=f"{RECOMMENDED} {{}}{beside}")
+
+
+aimed = [
+    Claim(
+        "aim of this reproduction",
+        f"after {checkpoint} problem-tries the recommended predictor reaches at least {least:.2f} of the oracle's score {_SETS[name]}",
+        f"at least {least:.2f}",
+        rule=partial(_reaches, name, checkpoint),
+    )
+    for (name, checkpoint), least in AIMS.items()
+]
+
+
+@claim(
+    "thesis 8.5",
+    "a more powerful function approximator improves the system greatly: at least twice the published predictor's score after 400 tries",
+    "no numbers",
+)
+def improves(found: Evaluated) -> Measured | None:
+    ours, published = _columns(found, GRID, 400)
     if ours is None or published is None:
-        return [*claims, ABOVE]
-    low, high = ratio_interval(ours, published)
-    text = f"{ratio(ours, published):.2f} x [{low:.2f}, {high:.2f}] ({RECOMMENDED} {estimate(ours)}, published {estimate(published)})"
-    return [*claims, ABOVE.measured(text, decides((low, high), least=MIN_RATIO))]
+        return None
+    text = f"{ratio_estimate(ours, published).replace(' ', ' x ', 1)} ({RECOMMENDED} {estimate(ours)}, published {estimate(published)})"
+    return text, decides(ratio_interval(ours, published), least=MIN_RATIO)
 
 
-def _column(curves: Fractions, at: list[int], learner: str, name: str, checkpoint: int) -> Array | None:
-    return curves[learner, name][:, at.index(checkpoint)] if (learner, name) in curves and checkpoint in at else None
+CLAIMS = (*aimed, improves)
 
 
 def plot(found: Found) -> Any:

@@ -24,25 +24,50 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import permutations
 from typing import Any, Protocol
 
 import numpy as np
 
-from experiments.claims.ch8_reaching.hidden_errors import WRONG, Scene, make_scene
 from experiments.kit.cells import CellResult
-from experiments.kit.experiment import Claim, Experiment
-from experiments.kit.plots import draw_curve, new_figure
-from experiments.kit.reaching.arm import PART, learned_transitions, reach_agent, space
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, judged
+from experiments.kit.learning.arm import RIGHT
+from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
+from experiments.kit.reaching.arm import (
+    PART,
+    Errors,
+    JudgedPlant,
+    arm_belief,
+    arm_plant,
+    body,
+    learned_transitions,
+    reach_agent,
+    space,
+    straight_paths,
+)
+from experiments.kit.reaching.belief import PeerBelief
 from experiments.kit.reaching.planner_peer import ENDS, MEMORIES, Memory, PeerTry, PlannerPeer
-from experiments.kit.reaching.targets import GOOD
-from experiments.kit.rules import all_hold, decides
+from experiments.kit.reaching.targets import GOOD, grid, touchable, touchable_targets
+from experiments.kit.rules import all_hold, decides, within
 from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
+from mobee import World, sphere
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.learning.reaching.tries import Problems
 from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl
+
+WRONG = ("nothing", "planners", "everyone")
+"""Whose model is wrong: nobody's; the planners' alone; also MoBeE's, which has the same wrong encoders and target positions."""
+SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed target positions and joint angles
+UNSEEN = "unseen"  # name of the hidden ball
+RADIUS = 0.05  # m, of the hidden ball
+TARGET_CLEARANCE = 0.12  # m, least distance of the ball's centre from the centre of any target of the thesis
+MIN_BLOCKED, MAX_BLOCKED = 0.08, 0.3  # share of the straight paths between two states that the ball blocks
+DRAWS = 400  # positions of the ball that are tried
 
 TRIES = (5, 25, 50, 100, 200, 400, 800)  # after which the contestants are evaluated
 REPETITIONS = 2  # of all targets in an evaluation
@@ -54,32 +79,6 @@ HIDDEN = WRONG[1:]
 MARGIN, MIN_LEAD = 0.05, 0.2  # of success: a share at most this much lower counts as equal; a lead of this much is the aim
 EQUAL_BY, LEAD_BY = 200, 800  # tries
 PERFECT = 0.9  # share of tries that succeed with a perfect model, if planning is enough
-_AIM = "aim of this reproduction"
-_PEERS = "the replanning peers without memory and with memory of blocked motions"
-_CLAIMED = {
-    "planners": "where only the planners' model is wrong",
-    "everyone": "where MoBeE's model is as wrong as the planners'",
-}
-EQUAL = {
-    wrong: Claim(
-        _AIM,
-        f"{where}, the reach learner succeeds as often as {_PEERS} (at most {100.0 * MARGIN:.0f} points of success below)",
-        f"by {EQUAL_BY} tries",
-    )
-    for wrong, where in _CLAIMED.items()
-}
-LEADS = {
-    wrong: Claim(
-        _AIM, f"{where}, the reach learner's success is at least {100.0 * MIN_LEAD:.0f} points above {_PEERS}", f"by {LEAD_BY} tries"
-    )
-    for wrong, where in _CLAIMED.items()
-}
-ENOUGH = Claim(
-    "thesis 9.3", f"where no model is wrong, planning is enough: the planner peer succeeds in at least {PERFECT:.0%} of its tries", "-"
-)
-CLAIMS = (*(claims[wrong] for wrong in HIDDEN for claims in (EQUAL, LEADS)), ENOUGH)
-
-
 COLORS = {"learner": "tab:red", "none": "0.5", "blocked": "tab:blue", "missed": "tab:cyan"}
 LABELS = {
     "learner": "reach learner",
@@ -119,6 +118,81 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     if isinstance(player, Planner):
         found |= {"planning": player.planning, "remembered": player.peer.remembered}
     return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Targets as MoBeE sees them, the ball's position (3,) m, and the errors of joints `turns` (4,) rad and targets `shift` (3,) m."""
+
+    targets: list[ReachTarget]
+    ball: Array
+    turns: Array
+    shift: Array
+    wrong: str
+
+    def plant(self, seed: int, ball: bool = True) -> JudgedPlant:
+        """Return the true arm, with or without the ball."""
+        turns = np.zeros(len(body().motors))
+        turns[[body().motor_index(name) for name in RIGHT]] = self.turns
+        errors = Errors(turns, self.shift) if self.wrong == "everyone" else None
+        return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
+
+    def belief(self) -> PeerBelief:
+        """Return the planners' model of the arm and the workspace."""
+        if self.wrong == "nothing":
+            return arm_belief(_world(self.ball))
+        return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
+
+    def seen(self, target: ReachTarget) -> ReachTarget:
+        """Return a target at the position that the planners believe."""
+        return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
+
+
+def make_scene(seed: int, wrong: str) -> Scene:
+    """Draw a ball that blocks motions, and errors of the sizes above; they are the same for every `wrong`.
+
+    Targets of `touchable_targets` that cannot be touched because of the ball are left out.
+    """
+    return replace(_drawn(seed), wrong=wrong)
+
+
+@cache
+def _drawn(seed: int) -> Scene:
+    rng = np.random.default_rng([seed, 86])
+    ball = _ball(rng, grid())
+    shift = rng.normal(size=3)
+    knowing = arm_belief(_world(ball))
+    targets = [target for target in touchable_targets() if touchable(knowing, target)]
+    return Scene(targets, ball, TURN * rng.choice([-1.0, 1.0], size=len(RIGHT)), SHIFT * shift / np.linalg.norm(shift), WRONG[0])
+
+
+def _world(ball: Array) -> World:
+    world = World()
+    world.add(UNSEEN, sphere(RADIUS), position=ball)
+    return world
+
+
+def _ball(rng: np.random.Generator, targets: Array) -> Array:
+    """Return a position of the palm, away from the targets and from the robot at home, at which a ball blocks some motions."""
+    low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
+    pairs = list(permutations(range(len(space())), 2))
+    chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
+    paths = straight_paths(chosen).reshape(-1, len(RIGHT))
+    alone = arm_belief()
+    before = 1.0 - alone.sound(paths).reshape(len(chosen), -1).all(axis=1).mean()
+    for _ in range(DRAWS):
+        q = rng.uniform(low, high)
+        place = alone.model.evaluate(alone.whole(q)).position(alone.marker)
+        if np.linalg.norm(targets - place, axis=1).min() < TARGET_CLEARANCE:
+            continue
+        belief = arm_belief(_world(place))
+        if len(belief.model.evaluate(body().home).table):
+            continue
+        blocked = 1.0 - belief.sound(paths).reshape(len(chosen), -1).all(axis=1).mean()
+        if MIN_BLOCKED <= blocked - before <= MAX_BLOCKED:
+            found: Array = place
+            return found
+    raise InvalidValue(f"no position for the ball was found in {DRAWS} draws: use another seed.")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,7 +316,7 @@ def findings(done: Cells) -> dict[str, Any]:
                 crossings.append(
                     {"models": TITLES[wrong], "planner": LABELS[memory], "learner no worse after so many tries, by seed": text}
                 )
-    return {"claims": [claim.record() for claim in measured(done)], "success": rows, "crossover": crossings}
+    return {"claims": judged(CLAIMS, done), "success": rows, "crossover": crossings}
 
 
 def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
@@ -257,15 +331,6 @@ def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
     if contestant != "learner":
         row["planning per try [ms]"] = estimate([1000.0 * float(np.median(one.values["planning"])) for one in found], 1)
     return row
-
-
-def measured(done: Cells) -> list[Claim]:
-    """Return the claims with our numbers."""
-    found = []
-    for wrong in HIDDEN:
-        found.append(_against(done, EQUAL[wrong], wrong, EQUAL_BY, -MARGIN))
-        found.append(_against(done, LEADS[wrong], wrong, LEAD_BY, MIN_LEAD))
-    return [*found, _perfect(done)]
 
 
 def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
@@ -287,27 +352,52 @@ def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
     return np.where(for_good.any(axis=1), np.array(tries)[for_good.argmax(axis=1)], np.inf)
 
 
-def _against(done: Cells, claim: Claim, wrong: str, by: int, least: float) -> Claim:
-    """Measure the learner's success after `by` tries, and its lead over the peers; the verdict leaves out the peer "missed"."""
-    tries, learner = success(done, "learner", wrong)
-    if by not in tries:
-        return claim.measured("not measured", None)
-    at = tries.index(by)
-    theirs = {memory: success(done, memory, wrong)[1][:, at] for memory in MEMORIES}
-    leads = {memory: learner[:, at] - values for memory, values in theirs.items()}
-    text = f"success: {LABELS['learner']} {estimate(learner[:, at])}; " + "; ".join(
-        f"{LABELS[memory]} {estimate(theirs[memory])}, learner's lead {estimate(leads[memory])}" for memory in MEMORIES
-    )
-    return claim.measured(text, verdict({memory: leads[memory] for memory in ("none", "blocked")}, least))
+def _leads(wrong: str, by: int, least: float) -> Rule:
+    """Return the rule that the learner's lead over the peers is at least `least` after `by` tries; it leaves out the peer "missed"."""
+
+    def of_cells(done: Cells) -> Measured:
+        tries, learner = success(done, "learner", wrong)
+        if by not in tries:
+            return "not measured", None
+        at = tries.index(by)
+        theirs = {memory: success(done, memory, wrong)[1][:, at] for memory in MEMORIES}
+        leads = {memory: learner[:, at] - values for memory, values in theirs.items()}
+        each = [f"{LABELS[memory]} {estimate(theirs[memory])}, learner's lead {estimate(leads[memory])}" for memory in MEMORIES]
+        text = "; ".join([f"success: {LABELS['learner']} {estimate(learner[:, at])}", *each])
+        return text, verdict({memory: leads[memory] for memory in ("none", "blocked")}, least)
+
+    return of_cells
 
 
-def _perfect(done: Cells) -> Claim:
+def _enough(done: Cells) -> Measured:
     tries, learner = success(done, "learner", WRONG[0])
     values = success(done, "none", WRONG[0])[1]
     if not len(learner) or not len(values):
-        return ENOUGH.measured("not measured", None)
-    text = f"success: planner {estimate(values[:, -1])}, learner after {tries[-1]} tries {estimate(learner[:, -1])}"
-    return ENOUGH.measured(text, decides(interval(values[:, -1]), least=PERFECT))
+        return "not measured", None
+    text = f"success: planner {{}}, learner after {tries[-1]} tries {estimate(learner[:, -1])}"
+    return within(values[:, -1], least=PERFECT, text=text)
+
+
+_PEERS = "the replanning peers without memory and with memory of blocked motions"
+CLAIMS = (
+    *(
+        Claim("aim of this reproduction", f"where {where}, the reach learner{text}", f"by {by} tries", rule=_leads(wrong, by, least))
+        for wrong, where in (
+            ("planners", "only the planners' model is wrong"),
+            ("everyone", "MoBeE's model is as wrong as the planners'"),
+        )
+        for text, by, least in (
+            (f" succeeds as often as {_PEERS} (at most {100.0 * MARGIN:.0f} points of success below)", EQUAL_BY, -MARGIN),
+            (f"'s success is at least {100.0 * MIN_LEAD:.0f} points above {_PEERS}", LEAD_BY, MIN_LEAD),
+        )
+    ),
+    Claim(
+        "thesis 9.3",
+        f"where no model is wrong, planning is enough: the planner peer succeeds in at least {PERFECT:.0%} of its tries",
+        "-",
+        rule=_enough,
+    ),
+)
 
 
 def _of(done: Cells, contestant: str, wrong: str) -> list[CellResult]:
@@ -327,10 +417,8 @@ def plot(done: Cells) -> Any:
                 draw_curve(axes, tries, values, color, LABELS[contestant])
         _mark_crossover(axes, done, wrong)
         axes.axvline(EQUAL_BY, color="0.8", linewidth=0.8, zorder=0)
-        axes.set(title=TITLES[wrong], xlabel="tries", xscale="log", ylim=(0.0, 1.02))
-        axes.set_xticks(TRIES, [str(n) for n in TRIES])
-        axes.minorticks_off()
-        axes.grid(alpha=0.2)
+        finish(axes, title=TITLES[wrong], xlabel="tries", xscale="log", ylim=(0.0, 1.02))
+        ticks_at(axes, TRIES)
     drawing.axes[0].set_ylabel("share of tries with the palm within 2 cm")
     drawing.axes[1].legend(fontsize=8, loc="lower right")  # this panel has all four contestants
     return drawing

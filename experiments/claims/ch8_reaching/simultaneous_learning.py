@@ -25,10 +25,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment
+from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
 from experiments.kit.learning.exploration import begin_anywhere
 from experiments.kit.learning.truth import Truth, l1, truth_of, walk
-from experiments.kit.plots import draw_curve, new_figure
+from experiments.kit.plots import draw_curve, finish, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid, targets_at
@@ -59,28 +59,6 @@ VARIANTS = (CONTACT, *FIRST, *BLAMES)
 
 SCORE_SHARE = 0.9  # of the final score of "model first": the score whose number of actions is compared
 MARGIN = 0.05  # of that score: a score at most this much lower counts as equal
-
-_SOURCE = "thesis 9.4.1"
-SOONER = {
-    variant: Claim(
-        _SOURCE,
-        f"learning transitions and reaches at the same time needs no more actions to {SCORE_SHARE:.0%} of the final score of {start} first",
-        "no number",
-    )
-    for variant, start in (("first-3000", "3000 curious transitions"), ("first-1000", "1000 curious transitions"))
-}
-LEVEL = Claim(
-    _SOURCE,
-    "with the same total of actions, learning at the same time ends with no lower score than the better of the two that learn transitions "
-    f"first (at most {MARGIN:.0%} below)",
-    "no number",
-)
-CLEAN = Claim(
-    _SOURCE, "attributing failures by contact gives a smaller error of the transition model than attributing all to the model", "no number"
-)
-BETTER_REACHES = Claim(_SOURCE, "attributing failures by contact gives a higher score than attributing all to the target", "no number")
-CLAIMS = (*SOONER.values(), LEVEL, CLEAN, BETTER_REACHES)
-
 
 COLORS = {"contact": "tab:red", "first-3000": "tab:blue", "first-1000": "tab:cyan", "model": "tab:orange", "target": "0.4"}
 LABELS = {
@@ -133,10 +111,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 def _agent(variant: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeModel, int]:
     """Return the learner, its transition model, and the number of actions spent on that before the first target."""
-    chosen, space, arm = LEARNERS[learner], reach_space(), reach_plant(seed)
-    agent = partial(
-        ReachAgent, space, marker=MARKER, predictor=chosen.predictor, strategy=chosen.strategy, failures=chosen.failures, seed=seed
-    )
+    space, arm = reach_space(), reach_plant(seed)
+    agent = partial(LEARNERS[learner].agent, space, marker=MARKER, seed=seed)
     if variant in FIRST:
         beliefs = learned_beliefs(arm, seed, FIRST[variant])
         return agent(plant=arm, beliefs=beliefs), beliefs, FIRST[variant]
@@ -193,7 +169,7 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = runs_of(found)
     results: dict[str, Any] = {"variants": [_row(variant, group) for variant, group in runs.items()]}
     if set(runs) == set(VARIANTS):
-        results["claims"] = [claim.record() for claim in measured(runs)]
+        results["claims"] = judged(CLAIMS, runs, all(np.isfinite(group.scores[:, -1]).all() for group in runs.values()))
     return results
 
 
@@ -215,28 +191,6 @@ def runs_of(found: Cells) -> dict[str, Runs]:
             np.array([values["failed"][-1] for values in group]),
         )
     return runs
-
-
-def measured(runs: Mapping[str, Runs]) -> list[Claim]:
-    """Return the claims with our numbers; open where the run is too short for an evaluation of every variant."""
-    contact = runs[CONTACT]
-    ends = {variant: group.scores[:, -1] for variant, group in runs.items()}
-    if not all(np.isfinite(scores).all() for scores in ends.values()):
-        return list(CLAIMS)
-    found = []
-    for variant, claim in SOONER.items():
-        least = SCORE_SHARE * float(ends[variant].mean())
-        ours, theirs = (actions_to(least, one.actions, one.scores) for one in (contact, runs[variant]))
-        text = f"actions to a score of {least:.1f}: {_actions_text(ours)}; {LABELS[variant]}: {_actions_text(theirs)}"
-        found.append(claim.measured(text, no_more(ours, theirs)))
-    text = "score: " + "; ".join(f"{LABELS[variant]} {estimate(ends[variant])}" for variant in (CONTACT, *FIRST))
-    found.append(LEVEL.measured(text, level(ends[CONTACT], [ends[variant] for variant in FIRST])))
-    errors = {variant: runs[variant].errors[:, -1] for variant in (CONTACT, "model", "target")}
-    text = "L1: " + "; ".join(f"{LABELS[variant]} {estimate(errors[variant], 3)}{_of_observed(runs[variant])}" for variant in errors)
-    found.append(CLEAN.measured(text, rises(errors["model"] - errors[CONTACT])))
-    text = "score: " + "; ".join(f"{LABELS[variant]} {estimate(ends[variant])}" for variant in (CONTACT, "target", "model"))
-    found.append(BETTER_REACHES.measured(text, rises(ends[CONTACT] - ends["target"])))
-    return found
 
 
 def _actions_text(needed: Array) -> str:
@@ -274,6 +228,64 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
     """Return whether our scores (N,) are at most MARGIN below each of theirs; False if they are farther below one of them."""
     return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
+
+
+ByVariant = Mapping[str, Runs]
+_SOURCE = "thesis 9.4.1"
+
+
+def _sooner(variant: str, runs: ByVariant) -> Measured:
+    least = SCORE_SHARE * float(runs[variant].scores[:, -1].mean())
+    ours, theirs = (actions_to(least, one.actions, one.scores) for one in (runs[CONTACT], runs[variant]))
+    text = f"actions to a score of {least:.1f}: {_actions_text(ours)}; {LABELS[variant]}: {_actions_text(theirs)}"
+    return text, no_more(ours, theirs)
+
+
+sooner = [
+    Claim(
+        _SOURCE,
+        f"learning transitions and reaches at the same time needs no more actions to {SCORE_SHARE:.0%} of the final score of "
+        f"{start} curious transitions first",
+        "no number",
+        rule=partial(_sooner, variant),
+    )
+    for variant, start in FIRST.items()
+]
+
+
+def _scores(runs: ByVariant, *variants: str) -> tuple[str, list[Array]]:
+    """Return the scores of some variants at the end, as text and by seed."""
+    ends = [runs[variant].scores[:, -1] for variant in variants]
+    return "score: " + "; ".join(f"{LABELS[variant]} {estimate(end)}" for variant, end in zip(variants, ends, strict=True)), ends
+
+
+@claim(
+    _SOURCE,
+    "with the same total of actions, learning at the same time ends with no lower score than the better of the two that learn transitions "
+    f"first (at most {MARGIN:.0%} below)",
+    "no number",
+)
+def no_lower(runs: ByVariant) -> Measured:
+    text, (ours, *theirs) = _scores(runs, CONTACT, *FIRST)
+    return text, level(ours, theirs)
+
+
+@claim(
+    _SOURCE, "attributing failures by contact gives a smaller error of the transition model than attributing all to the model", "no number"
+)
+def clean(runs: ByVariant) -> Measured:
+    errors = {variant: runs[variant].errors[:, -1] for variant in (CONTACT, "model", "target")}
+    text = "L1: " + "; ".join(f"{LABELS[variant]} {estimate(errors[variant], 3)}{_of_observed(runs[variant])}" for variant in errors)
+    return text, rises(errors["model"] - errors[CONTACT])
+
+
+@claim(_SOURCE, "attributing failures by contact gives a higher score than attributing all to the target", "no number")
+def better_reaches(runs: ByVariant) -> Measured:
+    text, (ours, theirs, _) = _scores(runs, CONTACT, "target", "model")
+    return text, rises(ours - theirs)
+
+
+CLAIMS = (*sooner, no_lower, clean, better_reaches)
 
 
 def _errors(values: Mapping[str, Any], checkpoints: int, truth: Truth | None) -> Array:
@@ -321,11 +333,9 @@ def plot(found: Cells) -> Any:
     for variant, group in runs_of(found).items():
         _curve(scores, group.actions, group.scores, variant)
         _curve(errors, group.actions, group.errors, variant)
-    scores.set(xlabel="actions, with those before the first target", ylabel="score: sum of rewards of 27 targets", ylim=(0.0, None))
-    errors.set(xlabel="actions, with those before the first target", ylabel="mean L1 error of the transition model", yscale="log")
-    errors.legend(fontsize=8)
-    for axes in (scores, errors):
-        axes.grid(alpha=0.2)
+    xlabel = "actions, with those before the first target"
+    finish(scores, xlabel=xlabel, ylabel="score: sum of rewards of 27 targets", ylim=(0.0, None))
+    finish(errors, legend=8, xlabel=xlabel, ylabel="mean L1 error of the transition model", yscale="log")
     return drawing
 
 

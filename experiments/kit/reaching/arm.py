@@ -21,6 +21,7 @@ from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_s
 from experiments.kit.learning.arm import robot as published_robot
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.reaching.belief import PeerBelief
+from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.arrays import Array
@@ -69,9 +70,6 @@ def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIO
     agent = CuriousAgent(space, plant, seed=seed)
     explore(agent, transitions)
     return agent.model.debiased()
-
-
-PREDICTOR, STRATEGY = "gp", "ucb"
 
 
 @cache
@@ -131,18 +129,8 @@ def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANS
 
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
     """Return the learner: default predictor, updated transition model (thesis 9.4.1), failures remembered by place."""
-    return ReachAgent(
-        space(law),
-        plant,
-        marker=MARKER,
-        predictor=PREDICTOR,
-        strategy=STRATEGY,
-        failures="local",
-        model=model,
-        hands=hands(law),
-        jacobians=jacobians(law),
-        seed=seed,
-    )
+    where = {"hands": hands(law), "jacobians": jacobians(law)}
+    return LEARNERS["gp-ucb"].agent(space(law), plant, marker=MARKER, model=model, seed=seed, **where)
 
 
 def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:

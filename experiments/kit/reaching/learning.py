@@ -31,6 +31,10 @@ class Learner:
     failures: str = "local"
     cost: float = 1.0
 
+    def agent(self, *given: Any, **settings: Any) -> ReachAgent:
+        """Return an agent of this kind with other arguments of ReachAgent."""
+        return ReachAgent(*given, predictor=self.predictor, strategy=self.strategy, failures=self.failures, **settings)
+
 
 LEARNERS = {
     "published": Learner("weighted", "intrinsic", "spread"),

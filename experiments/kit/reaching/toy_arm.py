@@ -162,21 +162,15 @@ class Truth:
         return {"name": "truth"}
 
 
+def toy_agent(arm: ToyArm, seed: int, predictor: Any, strategy: str, failures: str) -> ReachAgent:
+    """Return an agent on a toy arm."""
+    where = {"hands": arm.hands, "jacobians": arm.jacobians}
+    return ReachAgent(arm.space, arm, arm, marker=MARKER, predictor=predictor, strategy=strategy, failures=failures, seed=seed, **where)
+
+
 def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
     """Return an agent on its own toy arm that knows all mean rewards and blocked actions, and learns nothing."""
-    arm = ToyArm(seed)
-    agent = ReachAgent(
-        arm.space,
-        arm,
-        arm,
-        marker=MARKER,
-        predictor=Truth(),
-        strategy="greedy",
-        failures="local",
-        seed=seed,
-        hands=arm.hands,
-        jacobians=arm.jacobians,
-    )
+    agent = toy_agent(ToyArm(seed), seed, Truth(), "greedy", "local")
     for target in targets:
         for state, action in np.argwhere(blocked(target.position)).tolist():
             for _ in range(SURE_FAILURES):
@@ -264,19 +258,8 @@ ROWS = (
 
 def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
     """Return rewards as fractions of the oracle's at the checkpoints, and on targets never tried (NaN before UNSEEN_AFTER)."""
-    arm, problems, unseen = ToyArm(seed), grid(), np.nan
-    agent = ReachAgent(
-        arm.space,
-        arm,
-        arm,
-        marker=MARKER,
-        predictor=predictor,
-        strategy=strategy,
-        failures=failures,
-        seed=seed,
-        hands=arm.hands,
-        jacobians=arm.jacobians,
-    )
+    problems, unseen = grid(), np.nan
+    agent = toy_agent(ToyArm(seed), seed, predictor, strategy, failures)
     found = []
     for tries in checkpoints:
         agent.learn(problems, tries - agent.tries)

@@ -16,6 +16,7 @@ from msgspec import Struct, structs
 from experiments.kit.live.launch import TABLE
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.belief import PeerBelief, approach
+from experiments.kit.reaching.learning import LEARNERS
 from experiments.kit.reaching.targets import grid
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, World, load_robot, load_world
 from mobee.arrays import Array
@@ -30,7 +31,7 @@ from mobee.store import TransitionStore
 ROBOT, GAINS, RATE = "icub", "default", 50  # Hz
 JOINTS, WRIST = 4, 7  # joints of the lattice; of a reach, and of the planner
 LEVELS, NEIGHBOURS = (0.25, 0.5, 0.75), 16
-PREDICTOR, STRATEGY, FAILURES = "gp", "ucb", "alike"
+LEARNER = "gp-ucb-alike"
 SUCCESS_DISTANCE = 0.02  # m from the target's surface
 MIN_DEPTH = 2e-3  # m, of a solid contact
 REACHES = 3  # per try, each from another state
@@ -208,14 +209,5 @@ def train(file: Path, seed: int, transitions: int, tries: int) -> None:
 def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
     """Return the learner that continues a record, or begins one."""
     known = load_learned(file, PART, plant.robot)
-    return ReachAgent(
-        known.space,
-        plant,
-        known.model.debiased(),
-        marker=MARKER,
-        predictor=PREDICTOR,
-        strategy=STRATEGY,
-        failures=FAILURES,
-        seed=seed,
-        store=ReachStore(file, PART),
-    )
+    store = ReachStore(file, PART)
+    return LEARNERS[LEARNER].agent(known.space, plant, known.model.debiased(), marker=MARKER, seed=seed, store=store)

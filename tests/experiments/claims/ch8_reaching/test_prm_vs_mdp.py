@@ -7,7 +7,6 @@ import pytest
 from experiments.claims.ch8_reaching.prm_vs_mdp import BLOCK_SIZE, CLAIMS, EXPERIMENT, row_of, rows_of
 from experiments.kit.cells import Cell, load_cells, write_cell
 from experiments.kit.experiment import judged
-from experiments.kit.statistics import interquartile_mean
 from mobee.errors import InvalidValue
 
 HARD = np.tile([True, False], BLOCK_SIZE)

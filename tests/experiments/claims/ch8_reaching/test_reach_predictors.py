@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, CHECKPOINTS, GRID, ORACLE, PUBLISHED, RECOMMENDED, fractions, measured
+from experiments.claims.ch8_reaching.reach_predictors import BETWEEN, CHECKPOINTS, CLAIMS, GRID, ORACLE, PUBLISHED, RECOMMENDED, fractions
 from experiments.kit.cells import Cell
+from experiments.kit.experiment import judged
 
 SEEDS, TARGETS = 6, {GRID: 27, BETWEEN: 8}
 
@@ -25,7 +26,7 @@ def found(recommended: float, published: float):
 
 
 def verdicts(cells) -> list[str]:
-    return [claim.verdict for claim in measured(fractions(cells), list(CHECKPOINTS))]
+    return [claim["verdict"] for claim in judged(CLAIMS, (fractions(cells), list(CHECKPOINTS)))]
 
 
 def test_scores_are_divided_by_the_oracles():

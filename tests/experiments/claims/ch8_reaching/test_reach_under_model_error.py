@@ -4,7 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.reach_under_model_error import CLAIMS, MARGIN, MIN_LEAD, crossover, measured, verdict
+from experiments.claims.ch8_reaching.reach_under_model_error import CLAIMS, MARGIN, MIN_LEAD, crossover, verdict
+from experiments.kit.experiment import judged
 from tests.experiments.finished_cells import Cell, finished
 
 TRIES = [100, 200, 800]
@@ -55,16 +56,16 @@ def test_a_lead_whose_interval_contains_the_bound_is_open():
 
 
 def test_each_claim_is_about_its_own_number_of_tries():
-    found = measured(sweep([0.2, 0.5, 0.8], peers()))
-    assert [claim.verdict for claim in found] == ["confirmed"] * 4 + ["refuted"]
-    found = measured(sweep([0.9, 0.3, 0.6], peers()))
-    assert [claim.verdict for claim in found[:4]] == ["refuted"] * 4
-    assert "0.60" in found[1].ours and "lead 0.10" in found[1].ours
+    found = judged(CLAIMS, sweep([0.2, 0.5, 0.8], peers()))
+    assert [claim["verdict"] for claim in found] == ["confirmed"] * 4 + ["refuted"]
+    found = judged(CLAIMS, sweep([0.9, 0.3, 0.6], peers()))
+    assert [claim["verdict"] for claim in found[:4]] == ["refuted"] * 4
+    assert "0.60" in found[1]["ours"] and "lead 0.10" in found[1]["ours"]
 
 
 def test_claims_without_cells_are_open():
-    found = measured({})
-    assert [claim.verdict for claim in found] == ["open"] * len(CLAIMS)
+    found = judged(CLAIMS, {})
+    assert [claim["verdict"] for claim in found] == ["open"] * len(CLAIMS)
 
 
 def test_the_crossover_is_the_number_of_tries_from_which_the_learner_stays_no_lower():

@@ -16,10 +16,10 @@ from experiments.claims.ch8_reaching.simultaneous_learning import (
     actions_to,
     findings,
     level,
-    measured,
     no_more,
     plot,
 )
+from experiments.kit.experiment import judged
 from experiments.kit.reaching.arm import reach_space
 from mobee import TransitionModel
 from mobee.plant import Outcome
@@ -55,7 +55,7 @@ def runs(**changes):
 
 
 def verdicts(found):
-    return [claim.verdict for claim in measured(found)]
+    return [claim["verdict"] for claim in judged(CLAIMS, found)]
 
 
 def test_the_number_of_actions_to_a_score_is_interpolated_between_checkpoints():
