@@ -15,17 +15,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from experiments.bench.nes import FUNCTIONS, MAX_EVALUATIONS, STRATEGIES, search
 from experiments.bench.peers import load_cma
-from experiments.kit.experiment import Claim, Experiment
-from experiments.kit.plots import draw_curve, new_figure
-from experiments.kit.rules import decides
-from experiments.kit.statistics import estimate, interval, ratio, ratio_interval
-from experiments.kit.sweep import Cells, Condition, Sweep
+from experiments.kit.experiment import Claim, Experiment, Measured, Rule, judged
+from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
+from experiments.kit.rules import within
+from experiments.kit.statistics import estimate, ratio, ratio_estimate, ratio_interval
+from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee.arrays import Array
 
 DIMENSIONS = (10, 20, 41)
@@ -33,19 +34,6 @@ QUICK_MAX_EVALUATIONS = 20_000  # evaluations
 COSTS = {"nes": 1.0, "cma": 6.0, "xnes": 4.0, "snes": 8.0}  # beside each other
 FEWER, COMPARABLE, REQUIRED = 0.95, 1.5, 1.05  # evaluations over those of CMA-ES
 NAMES = {"nes": "the library's default", "cma": "CMA-ES", "xnes": "xNES as published", "snes": "SNES as published"}
-
-_THESIS = "thesis 3.1"
-BETTER = {
-    name: Claim(_THESIS, f"NES outperforms CMA on some tasks: {NAMES[name]}", "no number, some tasks") for name in ("xnes", "snes", "nes")
-}
-AS_GOOD = {
-    name: Claim(_THESIS, f"NES is in many ways comparable to CMA (at most {COMPARABLE} x the evaluations): {NAMES[name]}", "no number")
-    for name in ("xnes", "snes", "nes")
-}
-AIM = Claim(
-    "aim of this reproduction", "the default NES needs at most 1.05 x CMA-ES's evaluations, median of the tasks", f"at most {REQUIRED}"
-)
-CLAIMS = (*BETTER.values(), *AS_GOOD.values(), AIM)
 
 Task = tuple[str, int]  # function and dimensions
 Runs = Mapping[tuple[str, Task], Array]  # evaluations (seeds,) of every strategy and task
@@ -73,26 +61,28 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     return {"evaluations": min(evaluations, most), "found": evaluations <= most, "us": us}
 
 
-def evaluations(found: Cells) -> dict[tuple[str, Task], Array]:
+def evaluations(found: Cells) -> Runs:
     """Return the evaluations of every strategy and task, (seeds,), in the order of the seeds."""
-    runs: dict[tuple[str, Task], list[float]] = {}
-    for result in sorted(found.values(), key=lambda result: result.cell.seed):
-        settings = result.cell.settings
-        task = settings["function"], settings["dimensions"]
-        runs.setdefault((settings["strategy"], task), []).append(float(result.values["evaluations"]))
-    return {key: np.array(values) for key, values in runs.items()}
+    by_condition = runs_by(found, lambda result: float(result.values["evaluations"]), "strategy", "function", "dimensions")
+    return {(key[0], (key[1], key[2])): np.array(values) for key, values in by_condition.items()}
+
+
+def are_complete(runs: Runs) -> bool:
+    """Return whether every strategy has run on every task with equally many seeds."""
+    everything = list(product(STRATEGIES, product(FUNCTIONS, DIMENSIONS)))
+    return all(key in runs for key in everything) and len({len(runs[key]) for key in everything}) == 1
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each task, and the measured claims."""
+    """Return a row for each task, and the claims."""
     runs = evaluations(found)
     return {
         "evaluations": {
-            f"{function}, {d}": {NAMES[s]: estimate(runs[s, (function, d)], 0) for s in STRATEGIES if (s, (function, d)) in runs}
-            for function, d in tasks(runs)
+            f"{task[0]}, {task[1]}": {NAMES[name]: estimate(runs[name, task], 0) for name in STRATEGIES if (name, task) in runs}
+            for task in tasks(runs)
         },
         "found": {NAMES[name]: _share(found, name) for name in STRATEGIES},
-        "claims": [claim.record() for claim in judged(runs)],
+        "claims": judged(CLAIMS, runs, are_complete(runs)),
     }
 
 
@@ -101,39 +91,55 @@ def tasks(runs: Runs) -> list[Task]:
     return [(function, d) for function in FUNCTIONS for d in DIMENSIONS if any(task == (function, d) for _, task in runs)]
 
 
-def judged(runs: Runs) -> list[Claim]:
-    """Return the measured claims; open unless every strategy has run on every task with equally many seeds."""
-    everything = [(name, (function, d)) for name in STRATEGIES for function in FUNCTIONS for d in DIMENSIONS]
-    if any(key not in runs for key in everything) or len({len(runs[key]) for key in everything}) > 1:
-        return list(CLAIMS)
-    medians = {name: _medians(runs, name) for name in BETTER}
-    median_texts = {name: f"{estimate(values)} x CMA-ES's evaluations, median of the tasks" for name, values in medians.items()}
-    return [
-        *(_better(runs, name, claim) for name, claim in BETTER.items()),
-        *(c.measured(median_texts[name], decides(interval(medians[name]), most=COMPARABLE)) for name, c in AS_GOOD.items()),
-        AIM.measured(median_texts["nes"], decides(interval(medians["nes"]), most=REQUIRED)),
-    ]
+def _better(name: str) -> Rule:
+    """Return the rule that the interval of one task lies below the bound; it fails if all lie above it."""
+
+    def of_runs(runs: Runs) -> Measured:
+        pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
+        spans = {task: ratio_interval(*pair) for task, pair in pairs.items()}
+        fewer = [task for task, span in spans.items() if span[1] <= FEWER]
+        best = min(pairs, key=lambda task: ratio(*pairs[task]))
+        text = (
+            f"fewer than {FEWER} x CMA-ES's evaluations on {len(fewer)} of {len(pairs)} tasks; at best"
+            f" {ratio_estimate(*pairs[best]).replace(' ', ' x ', 1)} ({best[0]}, {best[1]} dimensions)"
+        )
+        return text, True if fewer else False if all(span[0] > FEWER for span in spans.values()) else None
+
+    return of_runs
 
 
-def _medians(runs: Runs, name: str) -> Array:
-    """Return the evaluations over those of CMA-ES from the same start, median over the tasks, (seeds,)."""
-    ratios = [runs[name, task] / runs["cma", task] for task in tasks(runs)]
-    medians: Array = np.median(ratios, axis=0)
-    return medians
+def _at_most(name: str, most: float) -> Rule:
+    """Return the rule for the evaluations over those of CMA-ES from the same start, median over the tasks."""
+
+    def of_runs(runs: Runs) -> Measured:
+        medians = np.median([runs[name, task] / runs["cma", task] for task in tasks(runs)], axis=0)
+        return within(medians, most=most, text="{} x CMA-ES's evaluations, median of the tasks")
+
+    return of_runs
 
 
-def _better(runs: Runs, name: str, claim: Claim) -> Claim:
-    """Return the measured claim; it holds if the interval of one task lies below the bound, and fails if all lie above it."""
-    pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
-    spans = {task: ratio_interval(*pair) for task, pair in pairs.items()}
-    fewer = [task for task, span in spans.items() if span[1] <= FEWER]
-    best = min(pairs, key=lambda task: ratio(*pairs[task]))
-    low, high = spans[best]
-    text = (
-        f"fewer than {FEWER} x CMA-ES's evaluations on {len(fewer)} of {len(pairs)} tasks; at best"
-        f" {ratio(*pairs[best]):.2f} x [{low:.2f}, {high:.2f}] ({best[0]}, {best[1]} dimensions)"
-    )
-    return claim.measured(text, True if fewer else False if all(span[0] > FEWER for span in spans.values()) else None)
+_OURS = ("xnes", "snes", "nes")
+CLAIMS = (
+    *(
+        Claim("thesis 3.1", f"NES outperforms CMA on some tasks: {NAMES[name]}", "no number, some tasks", rule=_better(name))
+        for name in _OURS
+    ),
+    *(
+        Claim(
+            "thesis 3.1",
+            f"NES is in many ways comparable to CMA (at most {COMPARABLE} x the evaluations): {NAMES[name]}",
+            "no number",
+            rule=_at_most(name, COMPARABLE),
+        )
+        for name in _OURS
+    ),
+    Claim(
+        "aim of this reproduction",
+        "the default NES needs at most 1.05 x CMA-ES's evaluations, median of the tasks",
+        f"at most {REQUIRED}",
+        rule=_at_most("nes", REQUIRED),
+    ),
+)
 
 
 def _share(found: Cells, strategy: str) -> str:
@@ -153,10 +159,8 @@ def plot(found: Cells) -> Any:
                 seeds = min(len(runs[name, (function, d)]) for d in at)
                 values = np.array([runs[name, (function, d)][:seeds] for d in at]).T
                 draw_curve(axes, at, values, f"C{number}", NAMES[name])
-        axes.set(title=function, xlabel="dimensions", xscale="log", yscale="log")
-        axes.set_xticks([10, 20, 41], ["10", "20", "41"])
-        axes.minorticks_off()
-        axes.grid(alpha=0.2)
+        finish(axes, title=function, xlabel="dimensions", xscale="log", yscale="log")
+        ticks_at(axes, DIMENSIONS)
     drawing.axes[0].set_ylabel("evaluations until f < 1e-8")
     drawing.axes[0].legend(fontsize=7)
     return drawing

@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -24,11 +24,11 @@ import numpy as np
 from experiments.bench import ik
 from experiments.bench.ik import MAX_EVALUATIONS, MOTORS, Solve, library, rival, scene, targets, timed
 from experiments.bench.peers import load_cma
-from experiments.kit.experiment import Claim, Experiment
-from experiments.kit.plots import new_figure
+from experiments.kit.experiment import Claim, Experiment, Measured, judged
+from experiments.kit.plots import finish, new_figure, ticks_at
 from experiments.kit.rules import decides
-from experiments.kit.statistics import estimate, ratio, ratio_interval
-from experiments.kit.sweep import Cells, Condition, Sweep
+from experiments.kit.statistics import estimate, ratio_estimate, ratio_interval
+from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import Model
 from mobee.arrays import Array
 
@@ -43,15 +43,6 @@ RIVALS = {
 }
 THEIRS = {"cma": "CMA-ES", "annealing": "simulated annealing", "particles": "a particle filter"}  # of thesis 3.1.1
 OURS = {NES: "NES (the library's)", XNES: "NES (xNES as published)"}
-OUTPERFORMS = {
-    (ours, theirs): Claim(
-        "thesis 3.1.1", f"{OURS[ours]} outperforms {THEIRS[theirs]} at inverse kinematics with 41 motors: fewer evaluations", "no number"
-    )
-    for ours in OURS
-    for theirs in THEIRS
-}
-CLAIMS = tuple(OUTPERFORMS.values())
-
 MIN_SHOWN, TICKS = 100, (100, 300, 1000, 3000, 10_000, MAX_EVALUATIONS)  # evaluations, of the figure
 
 
@@ -93,35 +84,42 @@ class Solver:
         return f"{estimate(self.reached)} reached, {estimate(self.evaluations, 0)} evaluations, {estimate(self.ms, 0)} ms"
 
 
-def solvers(found: Cells) -> dict[tuple[str, int], Solver]:
+Solvers = Mapping[tuple[str, int], Solver]  # by solver and number of motors
+
+
+def solvers(found: Cells) -> Solvers:
     """Return the results by solver and number of motors, in the order of the seeds."""
-    runs: dict[tuple[str, int], list[list[float]]] = {}
-    for result in sorted(found.values(), key=lambda result: result.cell.seed):
-        values, settings = result.values, result.cell.settings
-        means = [float(values[key].mean()) for key in ("reached", "evaluations", "ms")]
-        runs.setdefault((settings["solver"], settings["motors"]), []).append(means)
-    return {key: Solver(*np.array(means).T) for key, means in runs.items()}
+    groups = grouped_by(found, "solver", "motors")
+    columns = ("reached", "evaluations", "ms")
+    return {key: Solver(*(np.array([float(run[name].mean()) for run in runs]) for name in columns)) for key, runs in groups.items()}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each solver and number of motors, and the measured claims."""
+    """Return a row for each solver and number of motors, and the claims."""
     known = solvers(found)
     rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}
-    return {"solvers": rows, "claims": [claim.record() for claim in judged(known)]}
+    return {"solvers": rows, "claims": judged(CLAIMS, known)}
 
 
-def judged(known: Mapping[tuple[str, int], Solver]) -> list[Claim]:
-    """Return the measured claims; open where one of the two solvers has not run."""
-    return [
-        _judged(claim, known[ours, WHOLE], known[theirs, WHOLE]) if {(ours, WHOLE), (theirs, WHOLE)} <= known.keys() else claim
-        for (ours, theirs), claim in OUTPERFORMS.items()
-    ]
+def _outperforms(name: str, rival: str, known: Solvers) -> Measured | None:
+    if not {(name, WHOLE), (rival, WHOLE)} <= known.keys():
+        return None
+    ours, theirs = known[name, WHOLE], known[rival, WHOLE]
+    pair = theirs.evaluations, ours.evaluations
+    text = f"the rival needs {ratio_estimate(*pair).replace(' ', ' x ', 1)}: NES {ours}; rival {theirs}"
+    return text, decides(ratio_interval(*pair), least=1.0)
 
 
-def _judged(claim: Claim, ours: Solver, theirs: Solver) -> Claim:
-    low, high = ratio_interval(theirs.evaluations, ours.evaluations)
-    text = f"the rival needs {ratio(theirs.evaluations, ours.evaluations):.2f} x [{low:.2f}, {high:.2f}]: NES {ours}; rival {theirs}"
-    return claim.measured(text, decides((low, high), least=1.0))
+CLAIMS = tuple(
+    Claim(
+        "thesis 3.1.1",
+        f"{OURS[ours]} outperforms {THEIRS[theirs]} at inverse kinematics with 41 motors: fewer evaluations",
+        "no number",
+        rule=partial(_outperforms, ours, theirs),
+    )
+    for ours in OURS
+    for theirs in THEIRS
+)
 
 
 def plot(found: Cells) -> Any:
@@ -136,10 +134,9 @@ def plot(found: Cells) -> Any:
                 needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
                 shares = np.arange(len(needed) + 1) / len(reached)
                 axes.stairs(shares, [MIN_SHOWN, *needed, MAX_EVALUATIONS], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
-        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(MIN_SHOWN, MAX_EVALUATIONS), ylim=(0.0, 1.02))
-        axes.set_xticks(TICKS, [f"{tick}" for tick in TICKS])
-        axes.minorticks_off()
-        axes.grid(alpha=0.2)
+        limits = {"xlim": (MIN_SHOWN, MAX_EVALUATIONS), "ylim": (0.0, 1.02)}
+        finish(axes, title=f"{motors} motors", xlabel="evaluations", xscale="log", **limits)
+        ticks_at(axes, TICKS, [f"{tick}" for tick in TICKS])
     drawing.axes[0].set_ylabel("targets reached")
     drawing.legend(*drawing.axes[1].get_legend_handles_labels(), loc="outside right upper", fontsize=7)
     return drawing

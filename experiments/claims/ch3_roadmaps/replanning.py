@@ -43,10 +43,10 @@ from experiments.claims.ch3_roadmaps.replanning_live import (
     robot,
 )
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, add_backend, launch, read_done, write_job
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import finish, new_figure
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.motion import Motion
@@ -64,11 +64,6 @@ STEPS = 40
 
 SOON = 200.0  # ms
 FEW = 10  # crossings with a bump: of fewer no verdict is made
-CLAIMS = (
-    Claim("thesis 4.3.2, fig. 4.7", "when the ball becomes solid the hand finds the path around it, to the other side", "immediately"),
-    Claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms"),
-    Claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0"),
-)
 DEEP = 2e-3  # m
 
 
@@ -106,14 +101,14 @@ def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: st
     return launch(folder, PERFORM, title="Replanning", seed=seed, rate=RATE, speed=SPEED, seconds=seconds, lockstep=lockstep, **names)
 
 
-def _crossings(folder: Path) -> list[Measured]:
+def _crossings(folder: Path) -> list[Measures]:
     found = [one for path in sorted(folder.glob(f"launch-*/{MEASURED}")) for one in read_measured(path.parent)]
     if not found:
         raise InvalidValue(f"{folder} has no finished launch: the run was stopped before the first was over.")
     return found
 
 
-class Measured(Struct, frozen=True):
+class Measures(Struct, frozen=True):
     """Measures of a crossing."""
 
     bumped: bool  # the arm touched the ball on the short path
@@ -126,7 +121,7 @@ class Measured(Struct, frozen=True):
     thinking: float  # ms of processor time, from the end of the failed motion to the request
 
 
-def measure(folder: Path) -> list[Measured]:
+def measure(folder: Path) -> list[Measures]:
     """Measure the crossings of a launch, and write the measures into its folder."""
     q = read_positions(folder, robot())
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
@@ -139,9 +134,9 @@ def measure(folder: Path) -> list[Measured]:
     return found
 
 
-def read_measured(folder: Path) -> list[Measured]:
+def read_measured(folder: Path) -> list[Measures]:
     """Read the measures written by `measure`."""
-    return msgspec.json.decode((folder / MEASURED).read_bytes(), type=list[Measured])
+    return msgspec.json.decode((folder / MEASURED).read_bytes(), type=list[Measures])
 
 
 def keep_poses(folder: Path) -> None:
@@ -156,17 +151,17 @@ def _bump(crossing: Crossing) -> int:
     return next((motion.bump for motion in crossing.motions if motion.bump >= 0), -1)
 
 
-def _measured(crossing: Crossing, q: Array, deepest: float) -> Measured:
+def _measured(crossing: Crossing, q: Array, deepest: float) -> Measures:
     motions = crossing.motions
     failed = next((number for number, motion in enumerate(motions[:-1]) if motion.bump >= 0), None)
     common: dict[str, Any] = {"on": [motion.vertex for motion in motions], "arrived": motions[-1].vertex == LEFT and motions[-1].bump < 0}
     common |= {"seconds": (motions[-1].ended - motions[0].asked) / RATE, "deepest": deepest}
     if failed is None:
-        return Measured(False, -1.0, -1.0, **common, thinking=0.0)
+        return Measures(False, -1.0, -1.0, **common, thinking=0.0)
     bump, new = motions[failed].bump, motions[failed + 1]
     turn = _turned(q, bump, motions[failed].vertex, new.ended)
     command = 1e3 * (new.commanded - bump) / RATE
-    return Measured(True, command, 1e3 * turn / RATE, **common, thinking=1e3 * new.thinking)
+    return Measures(True, command, 1e3 * turn / RATE, **common, thinking=1e3 * new.thinking)
 
 
 def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
@@ -176,7 +171,7 @@ def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
     return int(np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1).argmin())
 
 
-def findings(crossings: Sequence[Measured]) -> dict[str, Any]:
+def findings(crossings: Sequence[Measures]) -> dict[str, Any]:
     """Return the numbers and the measured claims."""
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
@@ -185,33 +180,43 @@ def findings(crossings: Sequence[Measured]) -> dict[str, Any]:
             values = np.array([getattr(one, name) for one in bumped])
             row |= {f"{name}_ms_median": float(np.median(values)), f"{name}_ms_most": float(values.max())}
         row |= {"at_once_around": sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)}
-    return {"live": row, "claims": [claim.record() for claim in _claims(crossings, bumped)]}
+    return {"live": row, "claims": judged(CLAIMS, crossings, bool(bumped))}
 
 
-def _claims(crossings: Sequence[Measured], bumped: Sequence[Measured]) -> list[Claim]:
-    if not bumped:
-        return list(CLAIMS)
-    enough = len(bumped) >= FEW
-    command, turn = (np.array([getattr(one, name) for one in bumped]) for name in ("command", "turn"))
-    arrived = sum(one.arrived for one in bumped)
-    straight = sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)
+Crossings = Sequence[Measures]
+
+
+def _if_enough(crossings: Crossings, holds: bool) -> bool | None:
+    return holds if sum(one.bumped for one in crossings) >= FEW else None
+
+
+@claim("thesis 4.3.2, fig. 4.7", "when the ball becomes solid the hand finds the path around it, to the other side", "immediately")
+def around(crossings: Crossings) -> Measured:
+    bumped = [one for one in crossings if one.bumped]
+    arrived, straight = sum(one.arrived for one in bumped), sum(one.on[1:] == [ABOVE, LEFT] for one in bumped)
     seconds = float(np.median([one.seconds for one in bumped]))
+    text = f"{arrived} of {len(bumped)} arrive, {straight} of them directly; {seconds:.1f} s in all"
+    return text, _if_enough(crossings, arrived == len(bumped))
+
+
+@claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms")
+def soon(crossings: Crossings) -> Measured:
+    command, turn = (np.array([getattr(one, name) for one in crossings if one.bumped]) for name in ("command", "turn"))
+    text = (
+        f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints stop approaching the old goal"
+        f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms"
+    )
+    return text, _if_enough(crossings, bool(command.max() <= SOON))
+
+
+@claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0")
+def harmless(crossings: Crossings) -> Measured:
     deepest, clear = 1e3 * max(one.deepest for one in crossings), sum(one.deepest == 0.0 for one in crossings)
-    return [
-        CLAIMS[0].measured(
-            f"{arrived} of {len(bumped)} arrive, {straight} of them directly; {seconds:.1f} s in all",
-            arrived == len(bumped) if enough else None,
-        ),
-        CLAIMS[1].measured(
-            f"command in force after {np.median(command):.0f} ms, at most {command.max():.0f} ms; the joints stop approaching the old goal"
-            f" after {np.median(turn):.0f} ms, at most {turn.max():.0f} ms",
-            bool(command.max() <= SOON) if enough else None,
-        ),
-        CLAIMS[2].measured(
-            f"{deepest:.1f} mm; no contact in {clear} of {len(crossings)} crossings: the ball may become solid around the hand",
-            bool(deepest <= 1e3 * DEEP) if enough else None,
-        ),
-    ]
+    text = f"{deepest:.1f} mm; no contact in {clear} of {len(crossings)} crossings: the ball may become solid around the hand"
+    return text, _if_enough(crossings, bool(deepest <= 1e3 * DEEP))
+
+
+CLAIMS = (around, soon, harmless)
 
 
 def figure(folder: Path) -> Path:
@@ -253,7 +258,7 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
     return Motion(tuple(poses), np.asarray(times), tuple(objects))
 
 
-def plot_times(crossings: Sequence[Measured]) -> Any:
+def plot_times(crossings: Sequence[Measures]) -> Any:
     """Draw the distribution of the times from the bump to the new path."""
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()
@@ -261,9 +266,8 @@ def plot_times(crossings: Sequence[Measured]) -> Any:
         values = np.sort([getattr(one, name) for one in crossings if one.bumped])
         axes.step(values, np.arange(1, len(values) + 1) / max(len(values), 1), where="post", label=label)
     axes.axvline(SOON, color="0.5", linestyle="--", linewidth=0.8)
-    axes.set(xlabel="ms from the bump, on robot_sim's clock", ylabel="share of crossings", xlim=(0.0, None), ylim=(0.0, 1.02))
-    axes.grid(alpha=0.2)
-    axes.legend(fontsize=8)
+    xlabel = "ms from the bump, on robot_sim's clock"
+    finish(axes, legend=8, xlabel=xlabel, ylabel="share of crossings", xlim=(0.0, None), ylim=(0.0, 1.02))
     return drawing
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ import numpy as np
 from experiments.kit.cells import load_cells
 from experiments.kit.control.plant_runs import place
 from experiments.kit.control.safety import is_listed
-from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import TABLE, launch
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_touches
 from experiments.kit.plots import new_figure
@@ -171,12 +172,6 @@ def perform(service: Service, folder: Path) -> None:
 QUICK = 30  # edges
 STORE, MAX_SECONDS = "map.sqlite", 8 * 3600.0  # of the live run; s of robot time
 PERFORM = "experiments.claims.ch3_roadmaps.roadmap_from_scratch:perform"
-CLAIMS = (
-    Claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes"),
-    Claim("thesis 4.3.1", "small, randomly generated graphs often contain unreachable vertices", "often"),
-    Claim("thesis 4.3.1", "rollback works robustly: an edge that is tried again from rest has the same outcome", "-"),
-    Claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0"),
-)
 MIN_AGREEMENT = 0.95  # share of edges
 STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not tried": ("0.75", 0.6)}
 
@@ -248,7 +243,18 @@ def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, A
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
     if live is not None:
         rows["live"] = _row({**live, "minutes": [60.0 * live["hours"]]})
-    return {"maps": rows, "claims": [claim.record() for claim in _claims([result.values for result in results], live)]}
+    every = [result.values for result in results]
+    done = [values for values in every if values["finished"]]
+    return {"maps": rows, "claims": judged(CLAIMS, Explored(every, done, live), bool(done))}
+
+
+@dataclass(frozen=True)
+class Explored:
+    """All maps, the finished ones, and the one that was explored live."""
+
+    maps: list[dict[str, Any]]
+    done: list[dict[str, Any]]
+    live: Mapping[str, Any] | None
 
 
 def _row(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -266,28 +272,37 @@ def _row(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _claims(maps: list[dict[str, Any]], live: Mapping[str, Any] | None) -> list[Claim]:
-    done = [values for values in maps if values["finished"]]
-    if not done:
-        return list(CLAIMS)
-    minutes = [float(values["minutes"][-1]) for values in done]
-    agree = [float(np.mean(values["agree"])) for values in done]
-    with_gaps = sum(unreached(values) > 0 for values in done)
-    deepest = max(1e3 * float(values["deepest"]) for values in maps)
-    share = estimate([float(values["feasible"].sum() / (values["tried"] > 0).sum()) for values in done])
-    explored = f"{estimate(minutes, 0)} minutes; {share} of the edges tried are feasible"
-    lived, holds = "not run live", None
-    if live is not None:
-        lived = f"live {1e3 * live['deepest']:.1f} mm in {live['hours']:.1f} h and {live['touches']} touches"
-        explored += f"; live {60.0 * live['hours']:.0f} minutes"
-        holds = live["deepest"] <= MAX_DEPTH if live["finished"] else None
-    agrees = bool(np.mean(agree) >= MIN_AGREEMENT)
-    return [
-        CLAIMS[0].measured(explored, len(done) == len(maps)),
-        CLAIMS[1].measured(f"{with_gaps} of {len(done)} maps of seven joints", 2 * with_gaps > len(done)),
-        CLAIMS[2].measured(f"{estimate(agree, 3)} of the edges", agrees),
-        CLAIMS[3].measured(f"{lived}; offline, by the model, {deepest:.1f} mm", holds),
-    ]
+@claim("thesis 4.3.1, fig. 4.6", "explored at 10 % speed until the feasible sub-graph is known", "about 90 minutes")
+def known(found: Explored) -> Measured:
+    minutes = [float(values["minutes"][-1]) for values in found.done]
+    share = estimate([float(values["feasible"].sum() / (values["tried"] > 0).sum()) for values in found.done])
+    text = f"{estimate(minutes, 0)} minutes; {share} of the edges tried are feasible"
+    return text + (f"; live {60.0 * found.live['hours']:.0f} minutes" if found.live else ""), len(found.done) == len(found.maps)
+
+
+@claim("thesis 4.3.1", "small, randomly generated graphs often contain unreachable vertices", "often")
+def gaps(found: Explored) -> Measured:
+    with_gaps = sum(unreached(values) > 0 for values in found.done)
+    return f"{with_gaps} of {len(found.done)} maps of seven joints", 2 * with_gaps > len(found.done)
+
+
+@claim("thesis 4.3.1", "rollback works robustly: an edge that is tried again from rest has the same outcome", "-")
+def repeatable(found: Explored) -> Measured:
+    agree = [float(np.mean(values["agree"])) for values in found.done]
+    return f"{estimate(agree, 3)} of the edges", bool(np.mean(agree) >= MIN_AGREEMENT)
+
+
+@claim("aim of this reproduction", "no listed solid contact of PyBullet deeper than 2 mm while the map is explored live", "0")
+def harmless(found: Explored) -> Measured:
+    deepest, live = max(1e3 * float(values["deepest"]) for values in found.maps), found.live
+    offline = f"offline, by the model, {deepest:.1f} mm"
+    if live is None:
+        return f"not run live; {offline}", None
+    text = f"live {1e3 * live['deepest']:.1f} mm in {live['hours']:.1f} h and {live['touches']} touches; {offline}"
+    return text, live["deepest"] <= MAX_DEPTH if live["finished"] else None
+
+
+CLAIMS = (known, gaps, repeatable, harmless)
 
 
 def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:

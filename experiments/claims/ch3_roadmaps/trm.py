@@ -18,6 +18,7 @@ import importlib
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ import mobee
 from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell, CellResult, load_cells
-from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.roadmap_task import Example, Method, build
 from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, run_cells, sweep_arguments
@@ -147,16 +148,7 @@ COVERED, LARGEST, SECONDS = 0.95, 120.0, 2.0  # share of the reachable task spac
 PREGRASP, MANY = "pregrasp", (4000, 6000)
 COLUMNS = ("vertices", "processor_s", "evaluations_a_vertex", "coverage", "largest_hole", "valid", "kept", "free", "connected")
 
-MAPS = Claim(
-    "thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only"
-)
-VALID = Claim("thesis 3.3", "the task's constraints are built into the map: poses that meet all of them, by python-fcl", "all")
-GRAPH = Claim("thesis 3.3", "a traversable graph: share of the poses in its largest connected part, smallest over all tasks", "all")
-SIZE = Claim("thesis 4.3.3, fig. 4.8", "number of poses of the pre-grasp map", "approximately 5,000")
-SOON = Claim("aim of this reproduction", "every other map by evolution within 2 minutes of processor time", f"at most {LARGEST:.0f} s")
-CLAIMS = (MAPS, VALID, GRAPH, SIZE, SOON)
-
-Key = tuple[str, str]  # task and method
+Runs = Mapping[tuple[str, str], Mapping[str, Array]]  # the COLUMNS of the maps of a task and a method, (seeds,) each
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -231,14 +223,14 @@ def findings(found: Cells) -> dict[str, Any]:
     table: dict[str, dict[str, dict[str, str]]] = {}
     for (task, method), columns in runs.items():
         table.setdefault(task, {})[NAMES[method]] = {name: estimate(values, _digits(name)) for name, values in columns.items()}
-    return {"maps": table, "claims": [claim.record() for claim in judged(runs)]}
+    return {"maps": table, "claims": judged(CLAIMS, runs, are_complete(runs))}
 
 
-def maps(found: Cells) -> dict[Key, dict[str, Array]]:
+def maps(found: Cells) -> Runs:
     """Return the numbers of every map, (seeds,) each, in the order of examples and seeds; coverage NaN if the reach is unknown."""
     reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
     built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
-    runs: dict[Key, dict[str, Array]] = {}
+    runs: dict[tuple[str, str], dict[str, Array]] = {}
     for task in EXAMPLES:
         mine = [one for one in built if one.cell.settings["task"] == task]
         for method in NAMES:
@@ -248,25 +240,55 @@ def maps(found: Cells) -> dict[Key, dict[str, Array]]:
     return runs
 
 
-def judged(runs: Mapping[Key, Mapping[str, Array]]) -> list[Claim]:
-    """Return the measured claims; open unless every task was mapped by both methods."""
-    if any((task, method) not in runs for task in EXAMPLES for method in NAMES):
-        return list(CLAIMS)
-    figures = [task for task in EXAMPLES if task != PREGRASP]
-    covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in figures} for method in NAMES}
-    holds = all(share >= COVERED for share in covered[NES].values())
-    vertices = np.concatenate([runs[PREGRASP, method]["vertices"] for method in NAMES])
-    slowest = max(figures, key=lambda task: float(runs[task, NES]["processor_s"].max()))
-    most = float(runs[slowest, NES]["processor_s"].max())
+def are_complete(runs: Runs) -> bool:
+    """Return whether every task was mapped by both methods."""
+    return set(product(EXAMPLES, NAMES)) <= set(runs)
+
+
+@claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
+def maps_of_all(runs: Runs) -> Measured:
+    """The thesis' own method decides."""
+    covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in _figures()} for method in NAMES}
+    return _least(covered), all(share >= COVERED for share in covered[NES].values())
+
+
+@claim("thesis 3.3", "the task's constraints are built into the map: poses that meet all of them, by python-fcl", "all")
+def meet_constraints(runs: Runs) -> Measured:
     sound = sum(float((one["valid"] * one["vertices"]).sum()) for one in runs.values())
     poses = sum(float(one["vertices"].sum()) for one in runs.values())
-    return [  # the thesis' own method decides the claim on maps
-        MAPS.measured("; ".join(f"{NAMES[method]}: {_least(shares)}" for method, shares in covered.items()), holds),
-        VALID.measured(f"{sound:.0f} of {poses:.0f} poses", round(sound) == round(poses)),
-        GRAPH.measured("; ".join(f"{NAMES[method]}: {_least(_connected(runs, method))}" for method in NAMES), _whole(runs)),
-        SIZE.measured(f"{vertices.min():.0f} to {vertices.max():.0f}", bool(MANY[0] <= vertices.min() and vertices.max() <= MANY[1])),
-        SOON.measured(f"at most {most:.0f} s ({slowest})", most <= LARGEST),
-    ]
+    return f"{sound:.0f} of {poses:.0f} poses", round(sound) == round(poses)
+
+
+@claim("thesis 3.3", "a traversable graph: share of the poses in its largest connected part, smallest over all tasks", "all")
+def traversable(runs: Runs) -> Measured:
+    connected = {method: {task: float(runs[task, method]["connected"].min()) for task in EXAMPLES} for method in NAMES}
+    return _least(connected), all(share == 1.0 for shares in connected.values() for share in shares.values())
+
+
+@claim("thesis 4.3.3, fig. 4.8", "number of poses of the pre-grasp map", "approximately 5,000")
+def size(runs: Runs) -> Measured:
+    vertices = np.concatenate([runs[PREGRASP, method]["vertices"] for method in NAMES])
+    return f"{vertices.min():.0f} to {vertices.max():.0f}", bool(MANY[0] <= vertices.min() and vertices.max() <= MANY[1])
+
+
+@claim("aim of this reproduction", "every other map by evolution within 2 minutes of processor time", f"at most {LARGEST:.0f} s")
+def soon(runs: Runs) -> Measured:
+    seconds = {task: float(runs[task, NES]["processor_s"].max()) for task in _figures()}
+    slowest = max(seconds, key=lambda task: seconds[task])
+    return f"at most {seconds[slowest]:.0f} s ({slowest})", seconds[slowest] <= LARGEST
+
+
+CLAIMS = (maps_of_all, meet_constraints, traversable, size, soon)
+
+
+def _figures() -> list[str]:
+    return [task for task in EXAMPLES if task != PREGRASP]
+
+
+def _least(shares: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the smallest share of each method, by task, as text."""
+    worst = {method: min(each.items(), key=lambda item: item[1]) for method, each in shares.items()}
+    return "; ".join(f"{NAMES[method]}: at least {100.0 * share:.1f} % ({task})" for method, (task, share) in worst.items())
 
 
 def _points(reach: Array | None, maps: Sequence[CellResult], own: CellResult) -> Array | None:
@@ -280,19 +302,6 @@ def _row(values: Mapping[str, Any], points: Array | None) -> dict[str, float]:
     known = None if points is None else coverage(points, values["y"], values["spacing"])
     row["coverage"], row["largest_hole"] = (np.nan, np.nan) if known is None else (known.share, known.largest_hole)
     return row
-
-
-def _connected(runs: Mapping[Key, Mapping[str, Array]], method: str) -> dict[str, float]:
-    return {task: float(runs[task, method]["connected"].min()) for task in EXAMPLES}
-
-
-def _whole(runs: Mapping[Key, Mapping[str, Array]]) -> bool:
-    return all(share == 1.0 for method in NAMES for share in _connected(runs, method).values())
-
-
-def _least(shares: Mapping[str, float]) -> str:
-    worst = min(shares, key=lambda task: shares[task])
-    return f"at least {100.0 * shares[worst]:.1f} % ({worst})"
 
 
 def _digits(column: str) -> int:

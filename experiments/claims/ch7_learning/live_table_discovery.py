@@ -22,16 +22,10 @@ import numpy as np
 
 from experiments.kit.cells import Cell
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Claim, Experiment, Steps
-from experiments.kit.learning.live import TASKS, learn_live, learn_offline
-from experiments.kit.learning.outcome_distance import Compared, compared, draw_distances
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
+from experiments.kit.learning.live import TASKS, Compared, compared, draw_distances, learn_live, learn_offline
 from experiments.kit.sweep import run_cells, sweep_arguments
 
-ALIKE = Claim(
-    "aim of this reproduction; thesis 7.4",
-    "transition models learned live at the table, in lockstep, are statistically those learned offline",
-    "rank test against offline seeds, p above .05",
-)
 TASK, ROBOT = "published", "kinematic"
 TRANSITIONS, FEW = 2000, 20  # per part
 MIN_TRIES = 2  # of a state-action that is compared
@@ -74,7 +68,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         },
         "state-actions compared": one.compared,
         "p": round(p_value(found), 4),
-        "claims": [measured(found).record()],
+        "claims": judged((equal,), found),
     }
 
 
@@ -84,15 +78,19 @@ def p_value(found: Compared) -> float:
     return (1 + farther) / (1 + len(found.offline))
 
 
-def measured(found: Compared) -> Claim:
-    """Return the claim with our numbers; open with fewer offline seeds than the test needs."""
+@claim(
+    "aim of this reproduction; thesis 7.4",
+    "transition models learned live at the table, in lockstep, are statistically those learned offline",
+    "rank test against offline seeds, p above .05",
+)
+def equal(found: Compared) -> Measured:
+    """Open with fewer offline seeds than the test needs."""
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     text = (
         f"total variation {one.variation:.4f} over {one.compared} state-actions, of offline runs {min(offline):.4f} to {max(offline):.4f}: "
         f"p = {p_value(found):.2f}"
     )
-    decidable = len(found.offline) >= SEEDS and one.compared > 0
-    return ALIKE.measured(text, p_value(found) > 0.05 if decidable else None)
+    return text, p_value(found) > 0.05 if len(found.offline) >= SEEDS and one.compared > 0 else None
 
 
 def figure(folder: Path) -> Path:
@@ -112,5 +110,5 @@ EXPERIMENT = Experiment(
     source="aim of this reproduction; thesis 7.4",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),
-    claims=(ALIKE,),
+    claims=(equal,),
 )

@@ -27,17 +27,12 @@ from scipy.special import stdtrit
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Claim, Experiment, Steps
-from experiments.kit.learning.live import ROBOTS, learn_live, learn_offline
-from experiments.kit.learning.outcome_distance import Compared, Distance, compared, draw_distances
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
+from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, draw_distances, learn_live, learn_offline
+from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
 
-ALIKE = Claim(
-    "aim of this reproduction",
-    "the transition model learned offline with identified motors is that learned on PyBullet's robot: distance from offline runs",
-    "as near as another offline seed",
-)
 MARGIN = 0.02  # of equivalence: the test must be able to detect a larger difference
 EQUAL_DISTANCE = 0.01  # distance below which models count as equal, independent of the spread
 LIVE_SEED = 100  # added to the seed: the live agents are not those of an offline seed
@@ -75,7 +70,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
-    return {"claims": [measured(tasks).record()], "distances": table}
+    return {"claims": judged((equal,), tasks), "distances": table}
 
 
 def figure(folder: Path) -> Path:
@@ -105,8 +100,12 @@ def _plain(one: Distance) -> dict[str, Any]:
     }
 
 
-def measured(tasks: Mapping[str, Compared]) -> Claim:
-    """Return the claim with our numbers, from all tasks."""
+@claim(
+    "aim of this reproduction",
+    "the transition model learned offline with identified motors is that learned on PyBullet's robot: distance from offline runs",
+    "as near as another offline seed",
+)
+def equal(tasks: Mapping[str, Compared]) -> Measured:
     texts, verdicts = [], []
     for task, found in tasks.items():
         one = found.live["pybullet"]
@@ -118,7 +117,7 @@ def measured(tasks: Mapping[str, Compared]) -> Claim:
             f" share with the same most frequent outcome {one.agree:.3f} (another: at least {1.0 - prediction_bound(differ):.3f}),"
             f" {one.compared} state-actions; differences from {detectable:.3f} on are detectable (margin {MARGIN})"
         )
-    return ALIKE.measured("; ".join(texts), False if False in verdicts else None if None in verdicts else True)
+    return "; ".join(texts), all_hold(verdicts)
 
 
 def _as_near(value: float, offline: Sequence[float]) -> bool | None:
@@ -151,5 +150,5 @@ EXPERIMENT = Experiment(
     source="aim of this reproduction; paper 4.1",
     notes=__doc__,
     method=Steps(add_arguments, run, figure),
-    claims=(ALIKE,),
+    claims=(equal,),
 )

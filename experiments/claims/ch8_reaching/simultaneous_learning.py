@@ -169,8 +169,13 @@ def findings(found: Cells) -> dict[str, Any]:
     runs = runs_of(found)
     results: dict[str, Any] = {"variants": [_row(variant, group) for variant, group in runs.items()]}
     if set(runs) == set(VARIANTS):
-        results["claims"] = judged(CLAIMS, runs, all(np.isfinite(group.scores[:, -1]).all() for group in runs.values()))
+        results["claims"] = judged(CLAIMS, runs, are_complete(runs))
     return results
+
+
+def are_complete(runs: Mapping[str, Runs]) -> bool:
+    """Return whether every run is long enough for an evaluation at its end."""
+    return all(np.isfinite(group.scores[:, -1]).all() for group in runs.values())
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:

@@ -23,7 +23,7 @@ The time to the first motion is measured with ticks of 2 ms, from the tick of th
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -52,7 +52,7 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 )
 from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, Judged, measure, nearest_reach, read_block, write_block
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Claim, Experiment, Steps
+from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, launch, write_job
 from experiments.kit.live.recordings import POSITIONS
 from experiments.kit.plots import new_figure
@@ -69,31 +69,6 @@ NAMES = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
 MIN_SUCCESS = {GRID: 0.95, FRESH: 0.9}
 MAX_FIRST_MOTION = 5e-3  # s
 MIN_TRIES = 20  # from which there is a verdict
-CLAIMS = (
-    Claim(
-        "aim of this reproduction",
-        "on the live robot the learned reacher brings the palm within 2 cm of the surface of those of the thesis' 27 targets that can be "
-        "reached, from random poses: share of tries",
-        "at least 0.95",
-    ),
-    Claim(
-        "aim of this reproduction",
-        "on the live robot the learned reacher brings the palm within 2 cm of the surface of new random targets: share of tries",
-        "at least 0.90",
-    ),
-    Claim(
-        "aim of this reproduction",
-        "on the live robot the learned reacher causes no contact of solids deeper than 2 mm while it reaches for targets at rest",
-        "0",
-    ),
-    Claim(
-        "aim of this reproduction",
-        "on the live robot a reach begins to move within 5 ms of the request, on robot_sim's clock",
-        "at most 5 ms",
-    ),
-    Claim("aim of this reproduction", "on the live robot the learned reacher is no worse than inverse kinematics and RRT-Connect", "-"),
-)
-
 COLORS = {"learner": "tab:red", "peer": "tab:blue"}
 TITLES = {GRID: "those of the 27 targets that can be reached", FRESH: "new random targets"}
 
@@ -146,7 +121,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     targets = grid_targets()
     left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= SUCCESS_DISTANCE)
     return {
-        "claims": [claim.record() for claim in measured(blocks, known, left)],
+        "claims": judged(CLAIMS, Runs(blocks, known, left)),
         "tries": table(blocks, known),
         "missed": misses(blocks, known, _why),
         "targets that can be reached": sorted(known),
@@ -238,44 +213,81 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
     return False if binomtest(made, len(tries)).proportion_ci(method="wilson").high < least else None
 
 
-def measured(blocks: Sequence[Block], touchable: frozenset[int], left: frozenset[int]) -> list[Claim]:
-    """Return the claims with our numbers.
+@dataclass(frozen=True)
+class Runs:
+    """All blocks; those of the 27 targets that can be reached; and those of them from which MoBeE's fields do not keep the palm."""
 
-    `touchable`: those of the 27 targets that can be reached; `left`: those of them from which MoBeE's fields do not keep the palm.
-    """
-    grid, fresh = tries_of(blocks, "learner", GRID, touchable), tries_of(blocks, "learner", FRESH)
-    deep = [touch for block in blocks if block.kind in ("refine", "learner") for touch in block.deep]
-    hours = sum(block.seconds for block in blocks if block.kind in ("refine", "learner")) / 3600.0
-    first = [1e3 * tried.first / block.rate for block in blocks if block.kind == "first motion" for tried in block.tries if tried.first > 0]
-    ticks = sorted({1e3 / block.rate for block in blocks if block.kind == "first motion"})
-    rivals = {contestant: tries_of(blocks, contestant, GRID, touchable) + tries_of(blocks, contestant, FRESH) for contestant in CONTESTANTS}
-    worst = f"deepest {1e3 * max(touch.depth for touch in deep):.1f} mm ({max(deep, key=lambda t: t.depth).pair}), " if deep else ""
+    blocks: Sequence[Block]
+    touchable: frozenset[int]
+    left: frozenset[int]
+
+    def tries(self, contestant: str, kind: str) -> list[Judged]:
+        """Return the tries of a contestant on targets that can be reached."""
+        return tries_of(self.blocks, contestant, kind, self.touchable if kind == GRID else None)
+
+    def learning(self) -> list[Block]:
+        """Return the blocks in which the learner reached for targets at rest."""
+        return [block for block in self.blocks if block.kind in ("refine", "learner")]
+
+
+_LIVE = "on the live robot the learned reacher"
+_SURFACE = f"{_LIVE} brings the palm within 2 cm of the surface of"
+
+
+@claim(
+    "aim of this reproduction",
+    f"{_SURFACE} those of the thesis' 27 targets that can be reached, from random poses: share of tries",
+    "at least 0.95",
+)
+def reaches_grid(runs: Runs) -> Measured:
+    grid = runs.tries("learner", GRID)
     apart = (
-        f"for the {len(left)} from which the robot's own fields do not keep the palm {share(tries_of(blocks, 'learner', GRID, left))}; "
-        f"for all 27 {share(tries_of(blocks, 'learner', GRID))}"
+        f"for the {len(runs.left)} from which the robot's own fields do not keep the palm "
+        f"{share(tries_of(runs.blocks, 'learner', GRID, runs.left))}; for all 27 {share(tries_of(runs.blocks, 'learner', GRID))}"
     )
-    return [
-        CLAIMS[0].measured(f"{share(grid)} for {len(touchable)} targets; {apart}", enough(grid, MIN_SUCCESS[GRID])),
-        CLAIMS[1].measured(share(fresh), enough(fresh, MIN_SUCCESS[FRESH])),
-        CLAIMS[2].measured(
-            f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if len(grid) + len(fresh) >= MIN_TRIES else None
-        ),
-        CLAIMS[3].measured(
-            f"at most {max(first):g} ms to the first command that moves ({len(first)} reaches, ticks of {ticks[0]:g} ms)"
-            if first
-            else "none",
-            max(first) <= 1e3 * MAX_FIRST_MOTION if first else None,
-        ),
-        CLAIMS[4].measured("; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items()), _no_worse(rivals)),
-    ]
+    return f"{share(grid)} for {len(runs.touchable)} targets; {apart}", enough(grid, MIN_SUCCESS[GRID])
 
 
-def _no_worse(rivals: Mapping[str, Sequence[Judged]]) -> bool | None:
-    """Return whether the learner succeeds at least as often in the tries, which are the same for both."""
-    learner, peer = (np.array([tried.success for tried in rivals[contestant]]) for contestant in CONTESTANTS)
+@claim("aim of this reproduction", f"{_SURFACE} new random targets: share of tries", "at least 0.90")
+def reaches_new(runs: Runs) -> Measured:
+    fresh = runs.tries("learner", FRESH)
+    return share(fresh), enough(fresh, MIN_SUCCESS[FRESH])
+
+
+@claim("aim of this reproduction", f"{_LIVE} causes no contact of solids deeper than 2 mm while it reaches for targets at rest", "0")
+def harmless(runs: Runs) -> Measured:
+    deep = [touch for block in runs.learning() for touch in block.deep]
+    hours = sum(block.seconds for block in runs.learning()) / 3600.0
+    worst = f"deepest {1e3 * max(touch.depth for touch in deep):.1f} mm ({max(deep, key=lambda t: t.depth).pair}), " if deep else ""
+    judgeable = len(runs.tries("learner", GRID)) + len(runs.tries("learner", FRESH)) >= MIN_TRIES
+    return f"{len(deep)}, {worst}in {hours:.1f} h of robot time", not deep if judgeable else None
+
+
+@claim(
+    "aim of this reproduction", "on the live robot a reach begins to move within 5 ms of the request, on robot_sim's clock", "at most 5 ms"
+)
+def quick(runs: Runs) -> Measured:
+    timed = [block for block in runs.blocks if block.kind == "first motion"]
+    first = [1e3 * tried.first / block.rate for block in timed for tried in block.tries if tried.first > 0]
+    if not first:
+        return "none", None
+    tick = min(1e3 / block.rate for block in timed)
+    text = f"at most {max(first):g} ms to the first command that moves ({len(first)} reaches, ticks of {tick:g} ms)"
+    return text, max(first) <= 1e3 * MAX_FIRST_MOTION
+
+
+@claim("aim of this reproduction", f"{_LIVE} is no worse than inverse kinematics and RRT-Connect", "-")
+def no_worse(runs: Runs) -> Measured:
+    """Compare the successes in the tries, which are the same for both."""
+    rivals = {name: runs.tries(name, GRID) + runs.tries(name, FRESH) for name in CONTESTANTS}
+    learner, peer = (np.array([tried.success for tried in made]) for made in rivals.values())
+    text = "; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items())
     if len(learner) < MIN_TRIES or len(learner) != len(peer):
-        return None
-    return bool(learner.mean() >= peer.mean()) or None
+        return text, None
+    return text, bool(learner.mean() >= peer.mean()) or None
+
+
+CLAIMS = (reaches_grid, reaches_new, harmless, quick, no_worse)
 
 
 def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:

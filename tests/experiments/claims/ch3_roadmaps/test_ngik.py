@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch3_roadmaps import ngik
-from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, OUTPERFORMS, RIVALS, WHOLE, Solver, judged
+from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, RIVALS, WHOLE, Solver
+from experiments.kit.experiment import judged
 from tests.experiments.finished_cells import finished_trials
 from tests.experiments.options import options_of
 
@@ -18,15 +19,15 @@ def solver(evaluations: float, reached: float = 1.0) -> Solver:
 
 def test_fewer_evaluations_outperform():
     known = {(NES, WHOLE): solver(2500.0), ("cma", WHOLE): solver(4000.0), ("annealing", WHOLE): solver(2000.0)}
-    found = {claim.text: claim for claim in judged(known)}
-    cma, annealing, particles = (found[OUTPERFORMS[NES, rival].text] for rival in ("cma", "annealing", "particles"))
-    assert (cma.verdict, annealing.verdict, particles.verdict) == ("confirmed", "refuted", "open")
-    assert cma.ours.startswith("the rival needs 1.60 x")
-    assert not particles.ours
+    found = judged(CLAIMS, known)
+    cma, annealing, particles = found[:3]
+    assert (cma["verdict"], annealing["verdict"], particles["verdict"]) == ("confirmed", "refuted", "open")
+    assert cma["ours"].startswith("the rival needs 1.60 x")
+    assert not particles["ours"]
 
 
 def test_without_41_motors_all_is_open():
-    assert judged({(name, FEW): solver(1000.0) for name in (NES, *RIVALS)}) == list(CLAIMS)
+    assert judged(CLAIMS, {(name, FEW): solver(1000.0) for name in (NES, *RIVALS)}) == [claim.record() for claim in CLAIMS]
 
 
 def test_a_quick_sweep_holds_every_solver_and_a_cell_solves_its_own_targets():

@@ -4,10 +4,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch7_learning.simulation_transfer import measured, prediction_bound
+from experiments.claims.ch7_learning.simulation_transfer import equal, prediction_bound
 from experiments.kit.cells import Cell
-from experiments.kit.learning.live import learn_offline
-from experiments.kit.learning.outcome_distance import Compared, Distance
+from experiments.kit.experiment import judged
+from experiments.kit.learning.live import Compared, Distance, learn_offline
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -30,17 +30,17 @@ def test_one_more_value_is_below_the_bound_with_95_percent():
 
 def test_offline_seeds_that_differ_widely_leave_the_claim_open():
     wide = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.05, 0.1))
-    assert measured({"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})}).verdict == "open"
-    assert measured({"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})}).verdict == "refuted"
+    assert judged([equal], {"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})})[0]["verdict"] == "open"
+    assert judged([equal], {"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})})[0]["verdict"] == "refuted"
+
+
+def test_without_compared_actions_the_claim_is_open():
+    none = Distance(float("nan"), float("nan"), 0)
+    assert judged([equal], {"arms": Compared({"pybullet": none}, (none, none), {})})[0]["verdict"] == "open"
 
 
 @pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
 def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
     offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
     found = Compared({"pybullet": Distance(variation, agree, 300)}, offline, {})
-    assert measured({"arms": found}).verdict == verdict
-
-
-def test_without_compared_actions_the_claim_is_open():
-    none = Distance(float("nan"), float("nan"), 0)
-    assert measured({"arms": Compared({"pybullet": none}, (none, none), {})}).verdict == "open"
+    assert judged([equal], {"arms": found})[0]["verdict"] == verdict

@@ -6,8 +6,7 @@ import pytest
 
 from experiments.kit.cells import Cell, write_cell
 from experiments.kit.learning import live as live_learning
-from experiments.kit.learning.live import RATE, ROBOTS, TASKS, agents, learn_live, offline_plant
-from experiments.kit.learning.outcome_distance import compared
+from experiments.kit.learning.live import RATE, ROBOTS, TASKS, agents, compared, learn_live, offline_plant
 from mobee.store import STORE, Transition, TransitionStore
 from services.launcher.scenario import read_scenario
 

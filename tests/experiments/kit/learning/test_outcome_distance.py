@@ -4,8 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.kit.learning.live import JOINTS
-from experiments.kit.learning.outcome_distance import counts_of, distance, variations
+from experiments.kit.learning.live import JOINTS, counts_of, distance, variations
 from mobee import Lattice, load_robot
 
 

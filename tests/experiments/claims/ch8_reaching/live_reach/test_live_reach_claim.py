@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
-from experiments.claims.ch8_reaching.live_reach.claim import NAMES, enough, measured, misses, plot, share, table
+from experiments.claims.ch8_reaching.live_reach.claim import CLAIMS, NAMES, Runs, enough, misses, plot, share, table
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, GRID
 from experiments.claims.ch8_reaching.live_reach.tries import Block, Judged
+from experiments.kit.experiment import judged
 from experiments.kit.live.recordings import Touch
 
 KNOWN, LEFT = frozenset(range(20)), frozenset(range(1, 20))
 
 
-def judged(kind: str, number: int, off: float, first: int = -1) -> Judged:
+def measured(blocks):
+    return judged(CLAIMS, Runs(blocks, KNOWN, LEFT))
+
+
+def a_try(kind: str, number: int, off: float, first: int = -1) -> Judged:
     return Judged(kind, number, [-0.2, 0.2, 0.1], off, off <= 0.02, 5.0, 3, 1, 0.01, [], 0.0, "", first, first + 10)
 
 
@@ -21,39 +26,37 @@ def block(who: str, tries: list[Judged], deep: list[Touch] | None = None, rate: 
 
 def both(missed: int) -> list[Block]:
     """A learner that misses `missed` of the 20 targets that can be reached and 5 times as many of 50 new ones; the peer misses all."""
-    tries = [judged(GRID, number, 0.05 if number < missed or number >= 20 else 0.0) for number in range(27)]
-    tries += [judged(FRESH, number, 0.05 if number < 5 * missed else 0.0) for number in range(50)]
-    return [block("learner", tries), block("peer", [judged(one.kind, one.number, 0.1) for one in tries])]
+    tries = [a_try(GRID, number, 0.05 if number < missed or number >= 20 else 0.0) for number in range(27)]
+    tries += [a_try(FRESH, number, 0.05 if number < 5 * missed else 0.0) for number in range(50)]
+    return [block("learner", tries), block("peer", [a_try(one.kind, one.number, 0.1) for one in tries])]
 
 
 def verdicts(blocks: list[Block]) -> list[str]:
-    return [claim.verdict for claim in measured(blocks, KNOWN, LEFT)]
+    return [claim["verdict"] for claim in measured(blocks)]
 
 
 def test_success_is_judged_for_the_targets_that_can_be_reached() -> None:
     assert verdicts(both(1)) == ["confirmed", "confirmed", "confirmed", "open", "confirmed"]
     assert verdicts(both(8))[:2] == ["refuted", "refuted"]
-    assert all(
-        text in measured(both(1), KNOWN, LEFT)[0].ours for text in ("19 of 20", "for the 19 from", "19 of 19", "for all 27 19 of 27")
-    )
+    assert all(text in measured(both(1))[0]["ours"] for text in ("19 of 20", "for the 19 from", "19 of 19", "for all 27 19 of 27"))
 
 
 def test_a_share_that_is_too_small_perhaps_by_chance_is_open() -> None:
-    tries = [judged(FRESH, number, 0.05 if number < 3 else 0.0) for number in range(20)]
+    tries = [a_try(FRESH, number, 0.05 if number < 3 else 0.0) for number in range(20)]
     assert enough(tries, 0.9) is None and enough(tries, 0.8) is True and enough([], 0.9) is None
     assert share(tries).startswith("17 of 20, 0.85 [")
 
 
 def test_a_deep_contact_of_the_learner_refutes_and_one_of_the_peer_does_not() -> None:
     touch = Touch("r_hand table", 1, 2, 0.004)
-    assert measured([*both(1), block("refine", [], [touch])], KNOWN, LEFT)[2].verdict == "refuted"
-    assert measured([*both(1), block("peer", [], [touch])], KNOWN, LEFT)[2].verdict == "confirmed"
+    assert measured([*both(1), block("refine", [], [touch])])[2]["verdict"] == "refuted"
+    assert measured([*both(1), block("peer", [], [touch])])[2]["verdict"] == "confirmed"
 
 
 def test_the_slowest_reach_decides_the_time_to_the_first_motion() -> None:
-    quick, slow = (block("first motion", [judged(FRESH, 0, 0.0, 2), judged(FRESH, 1, 0.0, ticks)], rate=500.0) for ticks in (2, 3))
-    assert measured([*both(1), quick], KNOWN, LEFT)[3].verdict == "confirmed"
-    assert measured([*both(1), slow], KNOWN, LEFT)[3].verdict == "refuted"
+    quick, slow = (block("first motion", [a_try(FRESH, 0, 0.0, 2), a_try(FRESH, 1, 0.0, ticks)], rate=500.0) for ticks in (2, 3))
+    assert measured([*both(1), quick])[3]["verdict"] == "confirmed"
+    assert measured([*both(1), slow])[3]["verdict"] == "refuted"
 
 
 def test_blocks_give_tables_and_a_figure(tmp_path) -> None:
