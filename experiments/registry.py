@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from typing import cast
 
 from experiments.kit.experiment import Experiment
@@ -119,4 +120,4 @@ def load_experiment(name: str) -> Experiment:
     if name not in EXPERIMENTS:
         raise UnknownName("experiment", name, EXPERIMENTS)
     module = importlib.import_module(EXPERIMENTS[name])
-    return cast(Experiment, module.EXPERIMENT)
+    return replace(cast(Experiment, module.EXPERIMENT), name=name, notes=module.__doc__ or "")

@@ -107,13 +107,13 @@ class Steps:
 class Experiment:
     """An experiment as `mobee experiment` lists and runs it; the module of a claim holds one as EXPERIMENT.
 
-    `claim`: one line.  `notes`: the module's docstring, which states claim, source, published numbers and run time.
-    `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".
+    `claim`: one line.  `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".  `name` and
+    `notes`, the docstring of the module, which states claim, source, published numbers and run time, are set by `experiments.registry`.
     """
 
-    name: str
     claim: str
     source: str
-    notes: str
     method: Method
     claims: tuple[Claim, ...] = ()
+    name: str = ""
+    notes: str = ""

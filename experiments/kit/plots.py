@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,13 @@ def new_figure(width: float, height: float) -> Any:
     except ImportError:
         raise MatplotlibMissing('figures need Matplotlib, which is not installed: pip install "mobee[figures]"') from None
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def saved(drawing: Any, folder: Path, dpi: int = 150) -> Path:
+    """Save a Figure as figure.png in the folder of a run; returns its path."""
+    path = folder / "figure.png"
+    drawing.savefig(path, dpi=dpi)
+    return path
 
 
 def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 from experiments.kit.cells import Cell, CellResult, Work, cell_path, load_cells, write_cell
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.engines import Done, in_processes, on_ray
+from experiments.kit.plots import saved
 from mobee.errors import InvalidValue, MobeeError
 
 Engine = Callable[[Work, Sequence[Cell], int | None], Iterator[Done]]
@@ -106,9 +107,7 @@ class Sweep:
         found = load_cells(folder)
         if not found:
             raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
-        path = folder / "figure.png"
-        self.plot(found).savefig(path, dpi=150)
-        return path
+        return saved(self.plot(found), folder)
 
 
 def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from experiments.claims.ch2_model.model_throughput_endurance import ENDURANCE, E
 from experiments.claims.ch2_model.model_throughput_threads import MovingModel, Oscillator, fast_thread_switching, random_boxes
 from experiments.kit.command_line import Progress, positive_number, positive_whole
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from experiments.kit.records import Records, read_records
 from mobee import Model, World, load_robot
 from mobee.errors import InvalidValue
@@ -242,9 +242,7 @@ def figure(folder: Path) -> Path:
     endured, records = read_records(folder / ENDURANCE, ENDURANCE_COLUMNS), read_flood(folder / RECORDS)
     if not endured and not records:
         raise InvalidValue(f"{folder} has no records: the run was stopped before the first.")
-    path = folder / "figure.png"
-    (plot_endurance(endured) if endured else plot(records)).savefig(path, dpi=150)
-    return path
+    return saved((plot_endurance(endured) if endured else plot(records)), folder)
 
 
 def plot(records: Sequence[Record]) -> Any:
@@ -277,9 +275,7 @@ def _columns(points: Sequence[tuple[float, float]]) -> tuple[list[float], list[f
 
 
 EXPERIMENT = Experiment(
-    name="model-throughput",
     claim="the model evaluates hundreds of poses per second while its world is edited without a pause",
     source="thesis 2.4, Algorithm 1 and figure 2.4",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

@@ -167,10 +167,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="nes",
     claim="natural evolution strategies are comparable to CMA-ES, and outperform it on some tasks",
     source="thesis 3.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=load_cma),
     claims=CLAIMS,
 )

@@ -143,10 +143,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="ngik",
     claim="NES outperforms the other optimisers at solving inverse kinematics for the iCub's 41 motors",
     source="thesis 3.1.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=load_cma),
     claims=CLAIMS,
 )

@@ -272,10 +272,8 @@ def plot_times(crossings: Sequence[Measures]) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="replanning",
     claim="when a ball on the path becomes solid, the hand takes the path around it at once",
     source="thesis 4.3.2, fig. 4.7",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=CLAIMS,
 )

@@ -31,7 +31,7 @@ from experiments.kit.control.safety import is_listed
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import TABLE, launch
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_touches
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from experiments.kit.run_folder import read, write
 from experiments.kit.statistics import estimate
 from experiments.kit.sweep import Cells, Condition, Sweep
@@ -373,16 +373,12 @@ def figure(folder: Path) -> Path:
     found = load_cells(folder)
     if not found:
         raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
-    path = folder / "figure.png"
-    plot(found, read_live(folder / "live")).savefig(path, dpi=110)
-    return path
+    return saved(plot(found, read_live(folder / "live")), folder, 110)
 
 
 EXPERIMENT = Experiment(
-    name="roadmap-from-scratch",
     claim="the robot explores an unverified map until its feasible part is known, without harmful contacts",
     source="thesis 4.3.1, fig. 4.6",
-    notes=__doc__,
     method=Steps(SWEEP.add_arguments, run, figure),
     claims=CLAIMS,
 )

@@ -326,10 +326,8 @@ def figure(folder: Path) -> Path:
 
 
 EXPERIMENT = Experiment(
-    name="trm",
     claim="maps for all tasks of thesis figures 3.1 to 3.11 and 4.8: their poses valid, their task spaces covered",
     source="thesis 3.3, 3.4, 4.3",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=CLAIMS,
 )

@@ -40,7 +40,7 @@ from experiments.kit.command_line import Progress, positive_number
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.live.launch import add_backend
 from experiments.kit.live.recordings import POSITIONS, Touch
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from mobee import load_robot
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
@@ -268,9 +268,7 @@ def figure(folder: Path) -> Path:
     trials = {mode: found for mode in MODES if (found := read_trials(folder, mode))}
     if not trials:
         raise InvalidValue(f"{folder} has no finished trial: the run was stopped before the first was over.")
-    path = folder / "figure.png"
-    plot({mode: summarise(found) for mode, found in trials.items()}).savefig(path, dpi=150)
-    return path
+    return saved(plot({mode: summarise(found) for mode, found in trials.items()}), folder)
 
 
 def plot(rows: Rows) -> Any:
@@ -335,9 +333,7 @@ def _bars(bars: Callable[..., Any], rows: Rows, heights: list[list[int]]) -> Non
 
 
 EXPERIMENT = Experiment(
-    name="babbling",
     claim="random position moves cause no collisions under MoBeE, and 2.0 deflects them less than 1.0",
     source="thesis 4.1.1",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

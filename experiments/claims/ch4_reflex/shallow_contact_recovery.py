@@ -405,9 +405,7 @@ def _curves(axes: Any, trials: Sequence[Trial], variants: Sequence[str], value: 
 
 
 EXPERIMENT = Experiment(
-    name="shallow-contact-recovery",
     claim="the flatter the hand approaches a contact, the more often rewinding fails; MoBeE 2.0 slides and settles at every angle",
     source="thesis 4.4",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
 )

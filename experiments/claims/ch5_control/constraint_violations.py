@@ -200,9 +200,7 @@ def _repeat(state: Search) -> tuple[Array, Array]:
 
 
 EXPERIMENT = Experiment(
-    name="constraint-violations",
     claim="no command carries an arm more than 2 degrees beyond its cable rows and forearm clauses",
     source="thesis 5.2.5, eqs. 5.14-5.17",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
 )

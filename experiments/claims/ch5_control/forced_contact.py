@@ -279,9 +279,7 @@ def _plot_distances(axes: Any, name: str, runs: dict[str, dict[str, Any]]) -> No
 
 
 EXPERIMENT = Experiment(
-    name="forced-contact",
     claim="no force of a client drives the robot into table, body or limits, and a hand drawn through singular poses does not oscillate",
     source="thesis 5.1 and 5.2.2-5.2.4",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
 )

@@ -29,7 +29,7 @@ from experiments.kit.control.plant_runs import PUSHES, icub, icub_at_table, rand
 from experiments.kit.control.safety import deepest, oscillation
 from experiments.kit.control.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from experiments.kit.records import Records, Row, read_records
 from mobee import Controller, Gains
 from mobee.arrays import Array
@@ -336,9 +336,7 @@ def figure(folder: Path) -> Path:
     tried = read_tried(folder / RECORDS)
     if not tried:
         raise InvalidValue(f"{folder} has no gains in it: the run was stopped before the first were judged.")
-    path = folder / "figure.png"
-    plot(tried).savefig(path, dpi=130)
-    return path
+    return saved(plot(tried), folder, 130)
 
 
 def plot(tried: Sequence[Tried]) -> Any:
@@ -370,9 +368,7 @@ def plot(tried: Sequence[Tried]) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="gain-tuning",
     claim="a seeded search finds no gains that are clearly better than the default gains",
     source="thesis 5.2; this project's criteria",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

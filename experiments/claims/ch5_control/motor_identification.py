@@ -40,7 +40,7 @@ from experiments.claims.ch5_control.motor_identification_recording import (
 )
 from experiments.kit.command_line import Progress, positive_whole, whole_from_two
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from experiments.kit.run_folder import write
 from mobee import Controller, Gains, Model, MotorParameters, OfflinePlant, World, load_robot
 from mobee.arrays import Array
@@ -285,9 +285,7 @@ def figure(folder: Path) -> Path:
     for axis, (name, factor, label, published) in zip(below.subplots(1, len(COLUMNS), sharey=True), COLUMNS, strict=True):
         _draw_numbers(axis, rows, name, factor, label, published)
     drawing.suptitle("The PyBullet robot's motors, identified from encoder readings alone")
-    path = folder / "figure.png"
-    drawing.savefig(path, dpi=100)
-    return path
+    return saved(drawing, folder, 100)
 
 
 def _draw_response(axes: Any, robot: Robot, motor: str, file: Path, parameters: MotorParameters) -> None:
@@ -333,9 +331,7 @@ def _parameters(rows: Sequence[dict[str, str]]) -> MotorParameters:
 
 
 EXPERIMENT = Experiment(
-    name="motor-identification",
     claim="the motor model, fitted to encoder readings alone, explains the PyBullet robot to within the encoders' noise",
     source="thesis 2.2: the robot does not do exactly what it is told",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

@@ -189,9 +189,7 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="push-disturbance",
     claim="MoBeE yields to a push and returns, but external energy can drive it into contact",
     source="thesis 5.2, footnote 4",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
 )

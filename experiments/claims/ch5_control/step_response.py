@@ -212,9 +212,7 @@ def _single_steps(axes: Any, sets: Sequence[str]) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="step-response",
     claim="single motors and whole postures settle in seconds without overshoot, at all control periods of 1 to 20 ms",
     source="thesis 5.2, eq. 5.7",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=1, add_options=add_options),
 )

@@ -350,10 +350,8 @@ def _smooth(rate: Array) -> Array:
 
 
 EXPERIMENT = Experiment(
-    name="changed-outcomes",
     claim="actions whose outcome suddenly changes are tried until the model is correct again; sooner with forgetting",
     source="thesis 7.2.6",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

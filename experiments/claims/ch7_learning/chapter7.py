@@ -121,9 +121,7 @@ def options_of_part(name: str, arguments: argparse.Namespace) -> argparse.Namesp
 
 
 EXPERIMENT = Experiment(
-    name="chapter7",
     claim="all experiments in model learning can be repeated by one command",
     source="thesis chapter 7, paper section 3",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

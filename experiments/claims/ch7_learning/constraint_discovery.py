@@ -321,11 +321,9 @@ def _bars(axes: Any, runs: list[Run], given: Sequence[Any]) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="constraint-discovery",
     claim="three of 81 states are hard to enter, because actions into them fail; agents that plan farther ahead or expect success "
     "try more there",
     source="thesis 7.2.2-7.2.5",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

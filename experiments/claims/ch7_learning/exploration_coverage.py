@@ -312,10 +312,8 @@ def _detours(axes: Any, group: Mapping[tuple[str, ...], Runs]) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="exploration-coverage",
     claim="the curious agent tries every action in about half the transitions of the least-tried agent",
     source="paper 3.1 and fig. 4, thesis 7.2.1 and fig. 7.5",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

@@ -179,10 +179,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="exploration-uniformity",
     claim="curious exploration is more uniform than random and least-tried, except for spikes at actions that run into constraints",
     source="paper 3.1, fig. 5",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

@@ -184,10 +184,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="hypercube-exploration",
     claim="on 16 states where every action succeeds, each is tried 5 times after about 320 actions, and tries and values become uniform",
     source="thesis 7.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

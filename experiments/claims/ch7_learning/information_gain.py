@@ -242,10 +242,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="information-gain",
     claim="'Kail' divergence distinguishes failing from reliable actions in fewer tries than plain KL, in state spaces of any size",
     source="thesis 6.4.2, 6.4.3",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

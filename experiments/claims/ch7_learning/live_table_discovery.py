@@ -24,6 +24,7 @@ from experiments.kit.cells import Cell
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.learning.live import TASKS, Compared, compared, draw_distances, learn_live, learn_offline
+from experiments.kit.plots import saved
 from experiments.kit.sweep import run_cells, sweep_arguments
 
 TASK, ROBOT = "published", "kinematic"
@@ -95,9 +96,7 @@ def equal(found: Compared) -> Measured:
 
 def figure(folder: Path) -> Path:
     """Draw the distances of the live run and every offline run from the others, and how often actions reach their goals."""
-    path = folder / "figure.png"
-    draw_distances({TASK: compared(folder, TASK, MIN_TRIES)}, MIN_TRIES).savefig(path, dpi=130)
-    return path
+    return saved(draw_distances({TASK: compared(folder, TASK, MIN_TRIES)}, MIN_TRIES), folder, 130)
 
 
 def _transitions(arguments: argparse.Namespace) -> int:
@@ -105,10 +104,8 @@ def _transitions(arguments: argparse.Namespace) -> int:
 
 
 EXPERIMENT = Experiment(
-    name="live-table-discovery",
     claim="three live agents at the table, in lockstep, learn what the same agents learn on the offline plant",
     source="aim of this reproduction; thesis 7.4",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=(equal,),
 )

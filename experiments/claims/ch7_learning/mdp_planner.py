@@ -338,10 +338,8 @@ def _label(axes: Any, places: Array) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="mdp-planner",
     claim="the learned MDP planner needs no static workspace; trained with a moving obstacle, it plans around where that tends to be",
     source="paper 3.1, 3.2.1, fig. 7; thesis 7.4.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

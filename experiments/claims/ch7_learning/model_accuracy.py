@@ -252,10 +252,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="model-accuracy",
     claim="curiosity learns stochastic actions best, and without imagined outcomes the model's error is a tenth",
     source="aims of this reproduction, to thesis 7.2.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

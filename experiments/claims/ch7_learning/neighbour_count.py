@@ -236,10 +236,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="neighbour-count",
     claim="16 neighbours per state are more than necessary: with fewer the robot learns sooner and plans as well",
     source="paper 4.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

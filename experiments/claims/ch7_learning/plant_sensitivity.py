@@ -364,10 +364,8 @@ def _color(is_as_published: bool) -> str:
 
 
 EXPERIMENT = Experiment(
-    name="plant-sensitivity",
     claim="which states of the shoulder are hard to reach depends on cable forces and the settle threshold, not on delay, lag and backlash",
     source="thesis 7.2.5, 7.3",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=2),
     claims=CLAIMS,
 )

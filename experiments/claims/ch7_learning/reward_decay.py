@@ -123,10 +123,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="reward-decay",
     claim="the curious agent's reward decays uniformly over the state-actions, because the agent goes wherever it is high",
     source="paper 3.1, fig. 6",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

@@ -29,6 +29,7 @@ from experiments.kit.cells import Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, draw_distances, learn_live, learn_offline
+from experiments.kit.plots import saved
 from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
@@ -77,9 +78,7 @@ def figure(folder: Path) -> Path:
     """Draw distances from the offline seeds, and how often actions reach their goals."""
     least = int(read(folder / LEAST_FILE)["least"])
     names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
-    path = folder / "figure.png"
-    draw_distances({task: compared(folder, task, least) for task in names}, least).savefig(path, dpi=130)
-    return path
+    return saved(draw_distances({task: compared(folder, task, least) for task in names}, least), folder, 130)
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
@@ -145,10 +144,8 @@ def _transitions(arguments: argparse.Namespace) -> int:
 
 
 EXPERIMENT = Experiment(
-    name="simulation-transfer",
     claim="the transition model learned on the offline plant, with identified motors, is that of PyBullet's robot",
     source="aim of this reproduction; paper 4.1",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=(equal,),
 )

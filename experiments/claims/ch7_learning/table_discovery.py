@@ -398,10 +398,8 @@ def _detector(axes: Any, runs: Runs) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="table-discovery",
     claim="three independent agents of torso and arms become interested in the table: they lean forward and touch it more and more often",
     source="paper 3.2 and 4.4, thesis 7.4",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=6, add_options=add_options),
     claims=CLAIMS,
 )

@@ -393,11 +393,9 @@ def _actions(axes: Any, name: str, values: Array) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="unreachable-states",
     claim="some of 256 states are never reached, others hardly ever, because the cables deflect the arm, "
     "and more so when the lattice is stretched",
     source="thesis 7.3",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

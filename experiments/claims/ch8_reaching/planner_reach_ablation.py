@@ -155,10 +155,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="planner-reach-ablation",
     claim="a coarse planner together with a reactive reach achieves more than either alone",
     source="thesis 5.3, 8.2, 9.3",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

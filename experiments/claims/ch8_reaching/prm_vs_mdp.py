@@ -384,10 +384,8 @@ def _points(axes: Any, rows: Rows, name: str, label: str) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="prm-vs-mdp",
     claim="planning first in a roadmap and acting later does not work well on a noisy robot; a learned MDP is needed",
     source="paper 2.3, 3.1; thesis 4.2",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=require_ompl),
     claims=CLAIMS,
 )

@@ -464,11 +464,9 @@ def _scene(state: int) -> list[Solid]:
 
 
 EXPERIMENT = Experiment(
-    name="reach-exploration",
     claim="of the three published exploration strategies, intrinsic motivation yields the best scores, and the only runs that agree on "
     "where to reach from",
     source="thesis 8.4, figs. 8.2-8.8",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, seeds=20, add_options=add_options),
     claims=CLAIMS,
 )

@@ -28,7 +28,7 @@ import numpy as np
 from experiments.kit.cells import Cell, CellResult, load_cells
 from experiments.kit.command_line import positive_number
 from experiments.kit.experiment import Claim, Experiment, Measured, Steps, claim, judged
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations
 from experiments.kit.reaching.targets import between, grid, targets_at
@@ -246,16 +246,12 @@ def _curve(axes: Any, at: list[int], curve: Array, learner: str, color: str, sty
 
 def figure(folder: Path) -> Path:
     """Draw the finished cells."""
-    path = folder / "figure.png"
-    plot(load_cells(folder)).savefig(path, dpi=150)
-    return path
+    return saved(plot(load_cells(folder)), folder)
 
 
 EXPERIMENT = Experiment(
-    name="reach-predictors",
     claim="after a few hundred tries, predictors that generalise over poses and targets score nearly as high as an oracle",
     source="aims of this reproduction, to thesis 8.5 and 9.4.4",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=CLAIMS,
 )

@@ -438,10 +438,8 @@ def _mark_crossover(axes: Any, done: Cells, wrong: str) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="reach-under-model-error",
     claim="where the models are wrong, a reach learner overtakes a planner that replans after every change",
     source="thesis 5.3, 9.3; aim of this reproduction",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=require_ompl),
     claims=CLAIMS,
 )

@@ -344,10 +344,8 @@ def _draw_arms(axes: Any, arms: Runs) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="reach-vs-planners",
     claim="the learned reacher is no worse than a planner with a perfect model, also under encoder noise and for moving targets",
     source="thesis 1.5, 9.3",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, require=require_ompl),
     claims=CLAIMS,
 )

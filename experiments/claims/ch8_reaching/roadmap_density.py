@@ -277,10 +277,8 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    name="roadmap-density",
     claim="bumps adapt a roadmap to objects that were put on the table later; the denser the roadmap, the more bumps are needed",
     source="thesis 4.3.3, 4.4",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot),
     claims=CLAIMS,
 )

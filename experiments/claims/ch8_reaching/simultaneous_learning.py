@@ -352,10 +352,8 @@ def _curve(axes: Any, actions: Ints, values: Array, variant: str) -> None:
 
 
 EXPERIMENT = Experiment(
-    name="simultaneous-learning",
     claim="transitions and reaches can be learned at the same time, if contact decides to which of them a failure belongs",
     source="thesis 9.4.1",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, add_options=add_options),
     claims=CLAIMS,
 )

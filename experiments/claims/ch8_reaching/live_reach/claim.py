@@ -55,7 +55,7 @@ from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, launch, write_job
 from experiments.kit.live.recordings import POSITIONS
-from experiments.kit.plots import new_figure
+from experiments.kit.plots import new_figure, saved
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl
@@ -368,16 +368,12 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
 
 def figure(folder: Path) -> Path:
     """Draw the finished blocks."""
-    path = folder / "figure.png"
-    plot(_blocks(folder), _touchable()).savefig(path, dpi=150)
-    return path
+    return saved(plot(_blocks(folder), _touchable()), folder)
 
 
 EXPERIMENT = Experiment(
-    name="live-reach",
     claim="on the live robot the learned reacher brings the palm to the targets that can be reached, without other contacts",
     source="aim of this reproduction; thesis 8, 9.3",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
     claims=CLAIMS,
 )

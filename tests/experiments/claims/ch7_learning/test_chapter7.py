@@ -47,7 +47,7 @@ def toys(monkeypatch):
     monkeypatch.setattr(chapter7, "CHAPTER7", ("hypercube-exploration", "exploration-coverage"))
     monkeypatch.setattr(chapter7, "BEYOND", ())
     for name in ("hypercube-exploration", "exploration-coverage"):
-        toy = SimpleNamespace(EXPERIMENT=Experiment(name, "it works", "thesis 7", "", Steps(sweep_arguments, run(name), figure)))
+        toy = SimpleNamespace(EXPERIMENT=Experiment("it works", "thesis 7", Steps(sweep_arguments, run(name), figure)))
         monkeypatch.setitem(EXPERIMENTS, name, f"toy_{name}")
         monkeypatch.setitem(sys.modules, f"toy_{name}", toy)
     return SimpleNamespace(calls=calls, broken=broken)
