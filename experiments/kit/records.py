@@ -53,6 +53,11 @@ def _whole(file: TextIO) -> int:
     return length
 
 
+def rounded(**values: Any) -> dict[str, Any]:
+    """Return the values of a cell; numbers are rounded to six places."""
+    return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """Base class of records that are dataclasses with fields of type str, int, float and bool."""

@@ -14,8 +14,9 @@ Depths are measured at the true joint positions.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from experiments.kit.control.plant_runs import COLORS, GAINS, PERIOD, PUSHES, ic
 from experiments.kit.control.safety import clause_violations, deepest, limit_violations, oscillation
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Row
+from experiments.kit.records import rounded
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.arrays import Array
@@ -46,6 +47,7 @@ DRAWN_SECONDS, DRAWN_REST = 60.0, 3.0  # s, the run; its end, in which oscillati
 # m/s, s, m: a hand slower than this during the window, farther than this from its end position, has stopped early.
 SLOW, WINDOW, NEAR = 2e-4, 0.5, 0.01
 
+Record = dict[str, Any]
 PANELS = (
     ("field_mm", "deepest field [mm]"),
     ("solid_mm", "deepest solid [mm]"),
@@ -77,33 +79,6 @@ GOALS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Pressed(Row):
-    """A level of force and the worst measures during it; angles are negative inside."""
-
-    gains: str
-    wall: str
-    force: float
-    solid_mm: float
-    field_mm: float
-    clause_deg: float
-    limit_deg: float
-    restless_mm: float
-    beside_mm: float  # solid pairs that are not listed
-    pair: str  # of solids, the deepest
-
-
-@dataclass(frozen=True, slots=True)
-class Drawn(Row):
-    """Measures of a hand that is drawn to its targets."""
-
-    gains: str
-    target: str
-    oscillation_mm: float  # at rest
-    dead_s: float  # the longest time without motion before the end
-    from_target_mm: float  # at rest
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add gains, walls and targets."""
     walls, targets = list(PUSHES), list(GOALS)
@@ -128,13 +103,17 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Press into a wall: "pressed", a record for each level; or draw the hand to a target: "drawn", and its path."""
     if "wall" in settings:
-        return {"pressed": [one.record() for one in press(settings["gains"], settings["wall"], settings["levels"], seed)]}
+        return {"pressed": press(settings["gains"], settings["wall"], settings["levels"], seed)}
     drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
-    return {"drawn": drawn.record(), "times": times, "distances": distances}
+    return {"drawn": drawn, "times": times, "distances": distances}
 
 
-def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Pressed]:
-    """Push from home with one level of force after the other."""
+def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Record]:
+    """Push from home with one level of force after the other; returns the worst measures during each.
+
+    `solid_mm`, `beside_mm`: depths of solid pairs that are listed and that are not; `pair`: the deepest.  `clause_deg`, `limit_deg`:
+    negative inside.
+    """
     plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
     robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
     free = limit_violations(robot, robot.home[None])[0] < -INSIDE
@@ -143,19 +122,19 @@ def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Pre
         PUSHES[wall](plant.controller, force)
         run = run_plant(plant, LEVEL_SECONDS)
         depths, rest = deepest(icub_at_table(), run.q[::step]), run.last(LEVEL_REST)
-        pressed = Pressed(
-            gains,
-            wall,
-            force,
-            1e3 * depths.solid,
-            1e3 * depths.field,
-            _worst(clause_violations(robot, run.q)),
-            _worst(limit_violations(robot, run.q)[:, free]),
-            1e3 * max(oscillation(icub_at_table(), rest, marker) for marker in PALMS),
-            1e3 * depths.beside,
-            depths.pair,
+        record = rounded(
+            gains=gains,
+            wall=wall,
+            force=force,
+            solid_mm=1e3 * depths.solid,
+            field_mm=1e3 * depths.field,
+            clause_deg=_worst(clause_violations(robot, run.q)),
+            limit_deg=_worst(limit_violations(robot, run.q)[:, free]),
+            restless_mm=1e3 * max(oscillation(icub_at_table(), rest, marker) for marker in PALMS),
+            beside_mm=1e3 * depths.beside,
+            pair=depths.pair,
         )
-        found.append(pressed)
+        found.append(record)
     return found
 
 
@@ -163,8 +142,11 @@ def _worst(angles: Array) -> float:
     return float(np.rad2deg(angles.max()))
 
 
-def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
-    """Draw the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m."""
+def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
+    """Draw the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m.
+
+    The measures: oscillation and distance from the target at rest, and `dead_s`, the longest time without motion before the end.
+    """
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
     start = robot.home.copy()
@@ -188,7 +170,8 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Drawn, Array, Array]:
     hand = icub().evaluate(run.q).position(MARKER)
     dead = max(dead_time(hand[i * ticks : (i + 1) * ticks], plant.dt) for i in range(len(targets)))
     distances = np.linalg.norm(hand - np.repeat(targets, ticks, axis=0), axis=1)
-    drawn = Drawn(gains, name, 1e3 * oscillation(icub(), run.last(DRAWN_REST), MARKER), dead, 1e3 * float(distances[-1]))
+    still = 1e3 * oscillation(icub(), run.last(DRAWN_REST), MARKER)
+    drawn = rounded(gains=gains, target=name, oscillation_mm=still, dead_s=dead, from_target_mm=1e3 * float(distances[-1]))
     return drawn, run.times, distances
 
 
@@ -204,42 +187,42 @@ def dead_time(hand: Array, dt: float) -> float:
 
 def findings(found: Cells) -> dict[str, Any]:
     """Return the worst measures for every wall, and for every target."""
-    pressed, drawn = _pressed(found), _drawn(found)
-    table: dict[str, Any] = {}
-    for gains in GAINS:
-        walls = {wall: mine for wall in PUSHES if (mine := [p for p in pressed if (p.gains, p.wall) == (gains, wall)])}
-        rows = {wall: _worst_of(mine) for wall, mine in walls.items()} | {
-            f"drawn: {target}": {name: max(getattr(d, name) for d in arrived) for name in ("oscillation_mm", "dead_s", "from_target_mm")}
-            for target in GOALS
-            if (arrived := [d for d in drawn if (d.gains, d.target) == (gains, target)])
-        }
-        if rows:
-            table[gains] = rows
-    safe = all(p.solid_mm <= SOLID and p.clause_deg <= CLAUSE for p in pressed if p.gains == "default")
-    calm = all(d.oscillation_mm <= OSCILLATION and d.dead_s <= DEAD for d in drawn if d.gains == "default")
-    return {"passed": safe and calm if "default" in table else None, **table}  # the claim is about the default gains
+    pressed, drawn = _grouped(found)
+    table: dict[str, Any] = {gains: {} for gains in GAINS}
+    for (gains, wall), levels in pressed.items():
+        deep = max(levels, key=lambda level: float(level["solid_mm"]))
+        others = _largest(levels, "field_mm", "clause_deg", "limit_deg", "restless_mm")
+        table[gains][wall] = {"solid_mm": deep["solid_mm"], "pair": deep["pair"] or "none", **others}
+    for (gains, target), runs in drawn.items():
+        table[gains][f"drawn: {target}"] = _largest(runs, "oscillation_mm", "dead_s", "from_target_mm")
+    of_default = [row for (gains, _), rows in (pressed | drawn).items() if gains == "default" for row in rows]
+    allowed = {"solid_mm": SOLID, "clause_deg": CLAUSE, "oscillation_mm": OSCILLATION, "dead_s": DEAD}
+    passed = all(row[name] <= most for row in of_default for name, most in allowed.items() if name in row)
+    rows = {gains: rows for gains, rows in table.items() if rows}
+    return {"passed": passed if of_default else None, **rows}  # the claim is about the default gains
 
 
-def _worst_of(pressed: Sequence[Pressed]) -> dict[str, Any]:
-    deepest_solid = max(pressed, key=lambda p: p.solid_mm)
-    others = ("field_mm", "clause_deg", "limit_deg", "restless_mm")
-    worst = {name: max(getattr(p, name) for p in pressed) for name in others}
-    return {"solid_mm": deepest_solid.solid_mm, "pair": deepest_solid.pair or "none", **worst}
+def _grouped(found: Cells) -> tuple[dict[tuple[str, str], list[Record]], dict[tuple[str, str], list[Record]]]:
+    """Return the levels of force by gain set and wall, and the drawn hands by gain set and target."""
+    pressed: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, PUSHES)}
+    drawn: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, GOALS)}
+    for result in found.values():
+        for record in result.values.get("pressed", ()):
+            pressed[record["gains"], record["wall"]].append(record)
+        if "drawn" in result.values:
+            drawn[result.values["drawn"]["gains"], result.values["drawn"]["target"]].append(result.values["drawn"])
+    return {key: mine for key, mine in pressed.items() if mine}, {key: mine for key, mine in drawn.items() if mine}
 
 
-def _pressed(found: Cells) -> list[Pressed]:
-    return [Pressed(**record) for result in found.values() for record in result.values.get("pressed", ())]
-
-
-def _drawn(found: Cells) -> list[Drawn]:
-    return [Drawn(**result.values["drawn"]) for result in found.values() if "drawn" in result.values]
+def _largest(records: Sequence[Record], *names: str) -> Record:
+    return {name: max(record[name] for record in records) for name in names}
 
 
 def plot(found: Cells) -> Any:
     """Draw depths and margins against the force, and below them the distance of the hand from its targets over time."""
     drawing = new_figure(15.0, 8.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.1))
-    _plot_pressing(above.subplots(1, len(PANELS)), _pressed(found))
+    _plot_pressing(above.subplots(1, len(PANELS)), _grouped(found)[0])
     names = [name for name in GOALS if any(result.cell.settings.get("target") == name for result in found.values())]
     if names:
         panels = np.ravel(below.subplots(2, (len(names) + 1) // 2, squeeze=False))
@@ -250,12 +233,11 @@ def plot(found: Cells) -> Any:
     return drawing
 
 
-def _plot_pressing(panels: Any, pressed: Sequence[Pressed]) -> None:
+def _plot_pressing(panels: Any, pressed: Mapping[tuple[str, str], Sequence[Record]]) -> None:
     for axes, (quantity, label) in zip(panels, PANELS, strict=True):
-        for gains, wall in dict.fromkeys((p.gains, p.wall) for p in pressed):
-            mine = [p for p in pressed if (p.gains, p.wall) == (gains, wall)]
-            values = [getattr(p, quantity) for p in mine]
-            axes.plot([p.force for p in mine], values, ".-", color=COLORS[gains], alpha=0.6, linewidth=0.9)
+        for (gains, _), mine in pressed.items():
+            forces, values = [level["force"] for level in mine], [level[quantity] for level in mine]
+            axes.plot(forces, values, ".-", color=COLORS[gains], alpha=0.6, linewidth=0.9)
         axes.set_xscale("symlog", linthresh=LEVELS[1])
         axes.set(xlabel="force before the squash [per unit mass]", ylabel=label)
         axes.grid(alpha=0.2)
@@ -269,9 +251,9 @@ def _plot_pressing(panels: Any, pressed: Sequence[Pressed]) -> None:
 
 def _plot_distances(axes: Any, name: str, runs: dict[str, dict[str, Any]]) -> None:
     for values in runs.values():
-        drawn = Drawn(**values["drawn"])
-        label = f"{drawn.gains}: at rest ±{drawn.oscillation_mm:.2f} mm, stopped {drawn.dead_s:.1f} s"
-        axes.plot(values["times"], values["distances"], color=COLORS[drawn.gains], label=label)
+        drawn = values["drawn"]
+        label = f"{drawn['gains']}: at rest ±{drawn['oscillation_mm']:.2f} mm, stopped {drawn['dead_s']:.1f} s"
+        axes.plot(values["times"], values["distances"], color=COLORS[drawn["gains"]], label=label)
     axes.set_title(f"drawn: {name.replace('-', ' ')}", fontsize=8)
     axes.set(xlabel="time [s]", ylabel="from the target [m]", ylim=(0.0, None))
     axes.legend(fontsize=6)

@@ -14,8 +14,9 @@ acts on a robot that does not react.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ from experiments.kit.control.plant_runs import COLORS, PERIOD, icub_at_table, ru
 from experiments.kit.control.safety import AT_STOP, clause_violations, deepest, limit_violations, speeds_at_stops
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Row
-from experiments.kit.sweep import Cells, Condition, Sweep, grid
+from experiments.kit.records import rounded
+from experiments.kit.sweep import Cells, Condition, Sweep, grid, grouped_by
 from mobee import Gains
 from mobee.arrays import Array
 from mobee.control.law import FRICTION, INERTIA
@@ -47,23 +48,6 @@ RETURNED = 5.0  # mm, allowed distance of the hand from its start after the push
 GENTLE = 5.0  # N: with the default gains nothing may touch up to this force
 
 PANELS = (("moved_mm", "the hand moved [mm]"), ("solid_mm", "deepest solid [mm]"), ("away_mm", "the hand stayed away [mm]"))
-
-
-@dataclass(frozen=True, slots=True)
-class PushResult(Row):
-    """The worst measures during and after a push; the angle is negative inside."""
-
-    law: str
-    direction: str
-    force: float  # N
-    moved_mm: float  # largest distance of the hand from its start
-    solid_mm: float
-    beside_mm: float  # solid pairs that are not listed
-    field_mm: float
-    clause_deg: float
-    stop_deg_s: float  # fastest impact at a hard stop
-    away_mm: float  # distance of the hand from its start, at the end
-    pair: str  # of solids, the deepest
 
 
 class ExternalPush:
@@ -99,11 +83,15 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Push once and measure."""
-    return push_hand(settings["law"], settings["direction"], settings["force"], seed).record()
+    return push_hand(settings["law"], settings["direction"], settings["force"], seed)
 
 
-def push_hand(law: str, direction: str, force: float, seed: int) -> PushResult:
-    """Hold home while the hand is pushed; law "off": the commanded velocity is always 0."""
+def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, Any]:
+    """Hold home while the hand is pushed, and return the worst measures; law "off": the commanded velocity is always 0.
+
+    `moved_mm`, `away_mm`: distance of the hand from its start, the largest and at the end.  `solid_mm`, `beside_mm`: depths of solid pairs
+    that are listed and that are not; `pair`: the deepest.  `clause_deg`: negative inside.  `stop_deg_s`: fastest impact at a hard stop.
+    """
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
         gains = replace(gains, weights=(("*", 0.0),))
@@ -116,64 +104,64 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> PushResult:
     away = np.linalg.norm(hand - start, axis=1)
     depths = deepest(icub_at_table(), run.q)
     inside = limit_violations(plant.robot, home[None])[0] < -AT_STOP
-    return PushResult(
-        law,
-        direction,
-        force,
-        1e3 * float(away.max()),
-        1e3 * depths.solid,
-        1e3 * depths.beside,
-        1e3 * depths.field,
-        float(np.rad2deg(clause_violations(plant.robot, run.q).max())),
-        float(np.rad2deg(np.abs(speeds_at_stops(plant.robot, run, home)[:, inside]).max())),
-        1e3 * float(away[-1]),
-        depths.pair,
+    return rounded(
+        law=law,
+        direction=direction,
+        force=force,
+        moved_mm=1e3 * float(away.max()),
+        solid_mm=1e3 * depths.solid,
+        beside_mm=1e3 * depths.beside,
+        field_mm=1e3 * depths.field,
+        clause_deg=float(np.rad2deg(clause_violations(plant.robot, run.q).max())),
+        stop_deg_s=float(np.rad2deg(np.abs(speeds_at_stops(plant.robot, run, home)[:, inside]).max())),
+        away_mm=1e3 * float(away[-1]),
+        pair=depths.pair,
     )
 
 
 def findings(found: Cells) -> dict[str, Any]:
     """Return for each law and direction the least force at which each event occurred; None if it did not occur."""
-    results = _results(found)
-    table = {
-        law: {direction: _summary(mine) for direction in DIRECTIONS if (mine := _of(results, law, direction))}
-        for law in LAWS
-        if any(one.law == law for one in results)
-    }
-    judged = [one for one in results if one.law == "default" and one.force <= GENTLE]
-    passed = all(one.solid_mm == 0.0 and one.clause_deg <= 0.0 and one.away_mm <= RETURNED for one in judged)
-    return {"passed": passed if judged else None, **table}  # the claim is about the default gains
+    pushes = _pushes(found)
+    table = {law: {direction: _summary(mine) for (of, direction), mine in pushes.items() if of == law} for law in LAWS}
+    judged = [one for (law, _), mine in pushes.items() for one in mine if law == "default" and one["force"] <= GENTLE]
+    passed = all(one["solid_mm"] == 0.0 and one["clause_deg"] <= 0.0 and one["away_mm"] <= RETURNED for one in judged)
+    of_laws = {law: summaries for law, summaries in table.items() if summaries}
+    return {"passed": passed if judged else None, **of_laws}  # the claim is about the default gains
 
 
-def _summary(results: Sequence[PushResult]) -> dict[str, Any]:
+def _summary(pushes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Summarise the pushes of one law and direction."""
+
+    def least(name: str) -> float | None:
+        return next((one["force"] for one in pushes if one[name] > 0.0), None)
+
     return {
-        "solids_touch_from_N": next((one.force for one in results if one.solid_mm > 0.0), None),
-        "constraint_violated_from_N": next((one.force for one in results if one.clause_deg > 0.0), None),
-        "motor_into_its_stop_from_N": next((one.force for one in results if one.stop_deg_s > 0.0), None),
-        "deepest_solid_mm": max(one.solid_mm for one in results),
-        "back_within_mm": max((one.away_mm for one in results if one.force <= GENTLE), default=0.0),
+        "solids_touch_from_N": least("solid_mm"),
+        "constraint_violated_from_N": least("clause_deg"),
+        "motor_into_its_stop_from_N": least("stop_deg_s"),
+        "deepest_solid_mm": max(one["solid_mm"] for one in pushes),
+        "back_within_mm": max((one["away_mm"] for one in pushes if one["force"] <= GENTLE), default=0.0),
     }
 
 
-def _results(found: Cells) -> list[PushResult]:
-    return [PushResult(**result.values) for result in found.values()]
-
-
-def _of(results: Iterable[PushResult], law: str, direction: str) -> list[PushResult]:
-    return sorted((one for one in results if (one.law, one.direction) == (law, direction)), key=lambda one: one.force)
+def _pushes(found: Cells) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """Return the pushes of each law and direction, by force."""
+    groups = grouped_by(found, "law", "direction")
+    keys = (key for key in product(LAWS, DIRECTIONS) if key in groups)
+    return {key: sorted(groups[key], key=lambda one: float(one["force"])) for key in keys}
 
 
 def plot(found: Cells) -> Any:
     """Draw distances and depths against the force, a column for each direction."""
-    results = _results(found)
-    directions = [name for name in DIRECTIONS if any(one.direction == name for one in results)]
+    pushes = _pushes(found)
+    directions = [name for name in DIRECTIONS if any(direction == name for _, direction in pushes)]
     drawing = new_figure(3.0 * len(directions), 7.0)
     panels = drawing.subplots(len(PANELS), len(directions), squeeze=False, sharex=True, sharey="row")
     for row, (quantity, label) in enumerate(PANELS):
         for axes, direction in zip(panels[row], directions, strict=True):
             for law, color in {**COLORS, "off": "0.5"}.items():
-                mine = _of(results, law, direction)
-                forces, values = [one.force for one in mine], [getattr(one, quantity) for one in mine]
+                mine = pushes.get((law, direction), [])
+                forces, values = [one["force"] for one in mine], [one[quantity] for one in mine]
                 axes.plot(forces, values, ".-", color=color, label=law if law != "off" else "no MoBeE")
             axes.grid(alpha=0.2)
             axes.set_xscale("log")

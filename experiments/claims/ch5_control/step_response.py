@@ -14,8 +14,8 @@ and noise.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from typing import Any
 
@@ -26,7 +26,7 @@ from experiments.kit.control.plant_runs import COLORS, GAINS, PERIOD, icub
 from experiments.kit.control.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Row
+from experiments.kit.records import rounded
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.arrays import Array
@@ -42,25 +42,6 @@ POSTURE = "posture "  # prefix of the name of a step of many motors
 SHOWN = QUICK_MOTORS
 SHARES = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # % of a step, ticks of the plot
 ASIDE = {False: 0.96, True: 1.04}  # factors that separate the marks of motors and postures in the plot
-
-
-@dataclass(frozen=True, slots=True)
-class Response(Row):
-    """A step and its measures, see `StepResponse`."""
-
-    gains: str
-    period_ms: float
-    step: str  # the motor, or "posture 3"
-    settling: float
-    overshoot: float
-    error_deg: float
-    rest_deg: float
-    is_settled: bool
-
-    @property
-    def is_posture(self) -> bool:
-        """Whether the step is that of a posture."""
-        return self.step.startswith(POSTURE)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -105,7 +86,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
         number = icub().robot.motors.index(step)
         start, end = motor_step(number)
     measured = step_response(run_step(gains, settings["period_ms"], start, end, seed + number), start, end)
-    return Response(**settings, **asdict(measured)).record()
+    return rounded(**settings, **asdict(measured))
 
 
 def _posture_step(gains: str, number: int, seed: int) -> tuple[Array, Array]:
@@ -124,37 +105,34 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return median and worst of each gain set and period."""
     responses = _responses(found)
     table: dict[str, Any] = {}
-    for gains in GAINS:
-        for period in sorted({one.period_ms for one in responses}):
-            for kind in ("motors", "postures"):
-                mine = [one for one in responses if (one.gains, one.period_ms, one.is_posture) == (gains, period, kind == "postures")]
-                if mine:
-                    table.setdefault(gains, {})[f"{period:g} ms, {kind}"] = _summary(mine)
-    judged = [one for one in responses if one.gains == "default"]
-    return {"passed": all(map(_is_good, judged)) if judged else None, "each": "median and worst", **table}
+    for (gains, period, is_posture), mine in responses.items():
+        table.setdefault(gains, {})[f"{period:g} ms, {'postures' if is_posture else 'motors'}"] = _summary(mine)
+    judged = [_is_good(one, key[2]) for key, mine in responses.items() if key[0] == "default" for one in mine]
+    return {"passed": all(judged) if judged else None, "each": "median and worst", **table}
 
 
-def _is_good(one: Response) -> bool:
-    return one.is_settled and one.overshoot <= MAX_OVERSHOOT and one.settling <= (MAX_TOGETHER if one.is_posture else MAX_ALONE)
+def _is_good(one: Mapping[str, Any], is_posture: bool) -> bool:
+    fast = one["settling"] <= (MAX_TOGETHER if is_posture else MAX_ALONE)
+    return bool(one["is_settled"] and one["overshoot"] <= MAX_OVERSHOOT and fast)
 
 
-def _summary(responses: Sequence[Response]) -> dict[str, Any]:
-    return {
-        "steps": len(responses),
-        "never_settled": sum(not one.is_settled for one in responses),
-        "settling_time_s": _median_and_worst([one.settling for one in responses]),
-        "overshoot": _median_and_worst([one.overshoot for one in responses]),
-        "error_deg": _median_and_worst([one.error_deg for one in responses]),
-        "rest_deg": _median_and_worst([one.rest_deg for one in responses]),
-    }
+def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    names = {"settling": "settling_time_s", "overshoot": "overshoot", "error_deg": "error_deg", "rest_deg": "rest_deg"}
+    summary: dict[str, Any] = {"steps": len(responses), "never_settled": sum(not one["is_settled"] for one in responses)}
+    for name, label in names.items():
+        values = [one[name] for one in responses]
+        summary[label] = [round(float(np.median(values)), 4), round(max(values), 4)]
+    return summary
 
 
-def _median_and_worst(values: Sequence[float]) -> list[float]:
-    return [round(float(np.median(values)), 4), round(max(values), 4)]
+Responses = Mapping[tuple[str, float, bool], list[dict[str, Any]]]  # values by gain set, period [ms], and whether many motors step
 
 
-def _responses(found: Cells) -> list[Response]:
-    return [Response(**result.values) for result in found.values()]
+def _responses(found: Cells) -> Responses:
+    groups: dict[tuple[str, float, bool], list[dict[str, Any]]] = {}
+    for values in (result.values for result in found.values()):
+        groups.setdefault((values["gains"], values["period_ms"], values["step"].startswith(POSTURE)), []).append(values)
+    return dict(sorted(groups.items(), key=lambda item: (GAINS.index(item[0][0]), *item[0][1:])))
 
 
 def plot(found: Cells) -> Any:
@@ -162,24 +140,23 @@ def plot(found: Cells) -> Any:
     responses = _responses(found)
     drawing = new_figure(13.0, 4.2)
     time, overshoot, steps = drawing.subplots(1, 3)
-    _against_period(time, responses, lambda one: one.settling)
+    _against_period(time, responses, "settling")
     time.set(ylabel="settling time to 5 % [s]", title="Settling: median, least and most")
     time.legend(fontsize=7)
-    _against_period(overshoot, responses, lambda one: 100.0 * one.overshoot)
+    _against_period(overshoot, responses, "overshoot", 100.0)
     overshoot.set(ylabel="overshoot [% of the step]", title="Overshoot: median, least and most", yscale="symlog", ylim=(0.0, None))
     overshoot.set_yticks(SHARES, [f"{share:g}" for share in SHARES])
-    _single_steps(steps, [gains for gains in GAINS if any(one.gains == gains for one in responses)])
+    _single_steps(steps, list(dict.fromkeys(gains for gains, *_ in responses)))
     for axes in (time, overshoot, steps):
         axes.grid(alpha=0.2)
     return drawing
 
 
-def _against_period(axes: Any, responses: Sequence[Response], value: Callable[[Response], float]) -> None:
-    periods = sorted({one.period_ms for one in responses})
-    for gains, is_posture in sorted({(one.gains, one.is_posture) for one in responses}):
-        mine = [one for one in responses if (one.gains, one.is_posture) == (gains, is_posture)]
-        at = sorted({one.period_ms for one in mine})
-        values = [[value(one) for one in mine if one.period_ms == period] for period in at]
+def _against_period(axes: Any, responses: Responses, name: str, factor: float = 1.0) -> None:
+    periods = sorted({period for _, period, _ in responses})
+    for gains, is_posture in sorted({(gains, is_posture) for gains, _, is_posture in responses}):
+        groups = {period: responses[gains, period, is_posture] for period in periods if (gains, period, is_posture) in responses}
+        at, values = list(groups), [[factor * one[name] for one in mine] for mine in groups.values()]
         low, middle, high = (np.array([of(v) for v in values]) for of in (min, np.median, max))
         axes.errorbar(
             np.array(at) * ASIDE[is_posture],

@@ -21,5 +21,5 @@ def test_a_hand_that_stops_before_it_arrives_is_dead_and_one_that_arrives_is_not
 def test_more_force_drives_a_field_deeper_into_the_table(monkeypatch) -> None:
     monkeypatch.setattr(forced_contact, "LEVEL_SECONDS", 2.0)
     still, pushed = forced_contact.press("default", "table-left-hand", (0.0, 300.0), 0)
-    assert still.field_mm == 0.0 and pushed.field_mm > 5.0
-    assert still.clause_deg < 0.0 and still.limit_deg < 0.0
+    assert still["field_mm"] == 0.0 and pushed["field_mm"] > 5.0
+    assert still["clause_deg"] < 0.0 and still["limit_deg"] < 0.0

@@ -31,5 +31,5 @@ def test_before_its_time_a_push_moves_nothing() -> None:
 
 def test_with_mobee_the_hand_comes_back_and_without_it_does_not() -> None:
     held, free = (push_disturbance.push_hand(law, "outward", 10.0, seed=0) for law in ("default", "off"))
-    assert held.moved_mm > 20.0 and held.away_mm < 2.0
-    assert free.away_mm > 20.0 and free.moved_mm > held.moved_mm
+    assert held["moved_mm"] > 20.0 and held["away_mm"] < 2.0
+    assert free["away_mm"] > 20.0 and free["moved_mm"] > held["moved_mm"]
