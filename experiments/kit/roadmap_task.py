@@ -87,7 +87,7 @@ def both_hands(model: Model, title: str, figure: str, terms: Sequence[Term], tas
 
 def _example(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, more: Mapping[str, Any]) -> Example:
     every = (*terms, costs.collision(), costs.home())
-    return Example(title=title, figure=figure, model=model, costs=every, task=task, spacing=spacing, **({"margin": MARGIN} | more))
+    return Example(title=title, figure=figure, model=model, costs=every, task=task, spacing=spacing, **{"margin": MARGIN, **more})
 
 
 def build(

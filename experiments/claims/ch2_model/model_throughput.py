@@ -19,7 +19,7 @@ import random
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 import numpy as np
 
@@ -161,16 +161,8 @@ class _Timer:
 
 def read_flood(path: Path) -> list[Record]:
     """Read the records of a run."""
-    return [
-        Record(
-            robot=row["robot"],
-            objects=int(row["objects"]),
-            edits=int(row["edits"]),
-            seconds=float(row["seconds"]),
-            evaluations=int(row["evaluations"]),
-        )
-        for row in read_records(path, COLUMNS)
-    ]
+    types: dict[str, Any] = {"robot": str, "seconds": float}
+    return [cast(Record, {name: types.get(name, int)(text) for name, text in row.items()}) for row in read_records(path, COLUMNS)]
 
 
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:

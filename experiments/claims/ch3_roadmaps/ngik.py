@@ -134,8 +134,8 @@ def plot(found: Cells) -> Any:
                 needed = np.sort(np.concatenate([values["evaluations"] for values in mine])[reached])
                 shares = np.arange(len(needed) + 1) / len(reached)
                 axes.stairs(shares, [MIN_SHOWN, *needed, MAX_EVALUATIONS], baseline=None, color=f"C{number}", label=label, linewidth=1.5)
-        limits = {"xlim": (MIN_SHOWN, MAX_EVALUATIONS), "ylim": (0.0, 1.02)}
-        finish(axes, title=f"{motors} motors", xlabel="evaluations", xscale="log", **limits)
+        axes.set(title=f"{motors} motors", xlabel="evaluations", xscale="log", xlim=(MIN_SHOWN, MAX_EVALUATIONS), ylim=(0.0, 1.02))
+        finish(axes)
         ticks_at(axes, TICKS, [f"{tick}" for tick in TICKS])
     drawing.axes[0].set_ylabel("targets reached")
     drawing.legend(*drawing.axes[1].get_legend_handles_labels(), loc="outside right upper", fontsize=7)

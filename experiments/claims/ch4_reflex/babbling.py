@@ -240,13 +240,15 @@ def as_table(rows: Rows) -> str:
     return "\n".join([*lines, *_pairs(rows)])
 
 
+def _ranked(rows: Rows) -> list[str]:
+    """Return the pairs that touched, the most frequent first."""
+    total = sum((Counter(row["pairs"]) for row in rows.values()), Counter[str]())
+    return sorted(total, key=lambda pair: (-total[pair], pair))
+
+
 def _pairs(rows: Rows) -> list[str]:
     """Return lines with the pairs that touched, the most frequent first."""
-    total: dict[str, int] = {}
-    for row in rows.values():
-        for pair, count in row["pairs"].items():
-            total[pair] = total.get(pair, 0) + count
-    ranked = sorted(total, key=lambda pair: (-total[pair], pair))
+    ranked = _ranked(rows)
     lines = ["collisions by pair:"] if ranked else []
     lines += [
         _line(f"  {pair.replace(' ', ' - ')}", [str(row["pairs"].get(pair, 0)) for row in rows.values()]) for pair in ranked[:PRINTED_PAIRS]
@@ -285,11 +287,7 @@ def plot(rows: Rows) -> Any:
 
 
 def _by_pair(axes: Any, rows: Rows) -> None:
-    total: dict[str, int] = {}
-    for row in rows.values():
-        for pair, count in row["pairs"].items():
-            total[pair] = total.get(pair, 0) + count
-    pairs = sorted(total, key=lambda pair: (-total[pair], pair))[:DRAWN_PAIRS]
+    pairs = _ranked(rows)[:DRAWN_PAIRS]
     _bars(axes.barh, rows, [[row["pairs"].get(pair, 0) for pair in pairs] for row in rows.values()])
     axes.set_yticks(range(len(pairs)), [pair.replace(" ", " - ") for pair in pairs], fontsize=8)
     axes.invert_yaxis()

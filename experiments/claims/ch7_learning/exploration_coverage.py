@@ -32,7 +32,7 @@ from experiments.kit.learning.arm import ARM_NEIGHBOURS, Neighbours, arm_plant, 
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import first_places, first_tries, goals_of
 from experiments.kit.plots import finish, new_figure
-from experiments.kit.rules import all_hold, decides, of_each, texts, within
+from experiments.kit.rules import all_hold, decides, of_each, ratio_within, texts, within
 from experiments.kit.statistics import estimate, interval, mean_over, probability_of_improvement, ratio, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent
@@ -243,9 +243,11 @@ def depletes(published: Published) -> Measured | None:
     """Compare the two explorers in both worlds; open where an interval does not decide, or a world was not run."""
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None
-    pairs = {world: [covered(published[world, name]) for name in ("depleting", "nearest_untried")] for world in FLOORS}
-    text = ", ".join(f"{ratio_estimate(*pair, 3)} {world}" for world, pair in pairs.items())
-    return text, all_hold(decides(ratio_interval(*pair), most=1.0 + SLACK) for pair in pairs.values())
+    each = {
+        world: ratio_within(*(covered(published[world, name]) for name in ("depleting", "nearest_untried")), digits=3, most=1.0 + SLACK)
+        for world in FLOORS
+    }
+    return ", ".join(f"{text} {world}" for world, (text, _) in each.items()), all_hold(holds for _, holds in each.values())
 
 
 CLAIMS = (*half.values(), best, novel, aggressive, *near_floor.values(), depletes)

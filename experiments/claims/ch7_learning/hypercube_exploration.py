@@ -15,7 +15,7 @@ the value of earning the mean reward indefinitely.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import Any
@@ -42,7 +42,7 @@ PUBLISHED = 320  # actions
 LIKE_RANDOM = (0.5, 2.0)  # relative variances of tries that count as those of a random choice
 
 Run = Mapping[str, Any]  # the values of a cell
-Groups = Mapping[float, list[Run]]  # by discount
+Groups = Mapping[float, Sequence[Run]]  # by discount
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -148,7 +148,7 @@ def findings(found: Cells) -> dict[str, Any]:
     }
 
 
-def _row(discount: float, runs: list[Run]) -> dict[str, Any]:
+def _row(discount: float, runs: Sequence[Run]) -> dict[str, Any]:
     low, high = interval([run["transitions"] for run in runs])
     columns: dict[str, Callable[[Run], float]] = {
         "actions_until_all_tried_once": lambda run: run["all_once"] or run["transitions"],

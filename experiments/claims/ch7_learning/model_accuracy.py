@@ -199,6 +199,11 @@ def _stochastic(world: str, explorer: str, least: float, found: Last) -> Measure
     return _ratio(rival, ours, least, f"; the estimate of the true outcomes has itself an error of {floor:.3f}" if floor else "")
 
 
+def _without(found: Last) -> Measured | None:
+    counts, debiased = (_column(found, "rank3", "curious", which) for which in (COUNTS, DEBIASED))
+    return _ratio(counts, debiased, DEBIASED_RATIO)
+
+
 _AIM = "aim of this reproduction"
 CLAIMS = (
     *(
@@ -224,7 +229,7 @@ CLAIMS = (
         _AIM,
         "without imagined outcomes the error of the model is many times smaller: ratio (arm, 81 states)",
         f"at least {DEBIASED_RATIO:.0f} x",
-        rule=lambda found: _ratio(*(_column(found, "rank3", "curious", which) for which in (COUNTS, DEBIASED)), DEBIASED_RATIO),
+        rule=_without,
     ),
 )
 

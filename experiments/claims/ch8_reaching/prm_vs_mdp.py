@@ -27,8 +27,18 @@ from numpy.typing import NDArray
 from experiments.kit.control.plant_runs import place
 from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, JOINTS, PART, RANK3, arm_clauses, arm_plant, arm_space, columns, robot, whole
-from experiments.kit.learning.arm_planners import Learned, PlannedOnce, Repaired, Rival, Straight
-from experiments.kit.learning.arm_roadmap import KINDS, NEIGHBOURS, Belief, make_roadmap, with_goals
+from experiments.kit.learning.arm_planners import (
+    KINDS,
+    NEIGHBOURS,
+    Belief,
+    Learned,
+    PlannedOnce,
+    Repaired,
+    Rival,
+    Straight,
+    make_roadmap,
+    with_goals,
+)
 from experiments.kit.plots import draw_band, draw_points, finish, new_figure
 from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep

@@ -1,19 +1,182 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planners that are compared with each other: straight motions, a roadmap planned once or replanned, and a learned MDP."""
+"""Roadmaps of the published left arm, and planners that are compared with each other.
+
+Vertices and edges of a roadmap are free poses and motions in the model that a planner believes in; the graph is OMPL's PRM or the lattice
+of the learners.  The planners are straight motions, a roadmap planned once or replanned, and a learned MDP.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import heapq
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from experiments.kit.learning.arm_roadmap import Edge, Roadmap, edge
-from mobee import Lattice, TransitionModel
-from mobee.arrays import Array
+from experiments.kit.learning.arm import clear, columns, robot
+from mobee import Gains, Lattice, Model, TransitionModel
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
 from mobee.learning.planner import Planner
+from mobee.roadmap.ompl import grown
+from mobee.robot.robot import Clause
 
+STEP = 0.02  # of a joint's range, between two poses of a motion that are checked
+MILESTONES, NEIGHBOURS = 300, 10  # of OMPL's roadmap; the second is its default
+KINDS = ("OMPL", "lattice")
 ARRIVED = 0.125  # of every joint's range: half the distance of two samples of the lattice
+
+
+Edge = tuple[int, int]  # vertices, the smaller first
+
+
+class Belief:
+    """A planner's model of robot and world; a pose of the arm is sound if it is clear of contacts and cable constraints.
+
+    It is a `mobee.roadmap.ompl.ValidityChecker`.
+
+    Args:
+        model: the robot in the world, as believed.
+        turns: (4,) rad, believed minus measured joint angles.
+        clauses: the known constraints of the cables.
+    """
+
+    def __init__(self, model: Model, turns: Array, clauses: Sequence[Clause]) -> None:
+        self._model, self._turns, self._clauses = model, turns, clauses
+        limits = robot().limits[columns()]
+        self.box: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
+        """(4, 2) rad between which the joint limits exert no force."""
+        self.low: Array = self.box[:, 0]
+        self.span: Array = np.ptp(limits, axis=1)
+        """(4,) rad, the joints' ranges."""
+        self.checked = 0
+        """Number of poses that were checked."""
+
+    def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
+        """Return which of the poses (P, 4) rad are sound, (P,); `cables`: whether cable constraints count."""
+        self.checked += len(q)
+        return clear(self._model, q + self._turns, self._clauses if cables else ())
+
+    def sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
+        """Return whether the straight motion between two poses (4,) rad is sound; its start is not checked."""
+        count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
+        shares = np.arange(1, count + 1)[:, None] / count
+        return bool(self.sound(start + shares * (end - start), cables).all())
+
+
+class Roadmap:
+    """An undirected graph of V vertices, poses of the arm (V, 4) rad.
+
+    The cost of a motion is 1, for the action, plus its length in fractions of the joints' ranges.
+    """
+
+    def __init__(self, vertices: Array, edges: Iterable[Edge], belief: Belief) -> None:
+        self.vertices, self.belief = vertices, belief
+        if not len(vertices):
+            raise InvalidValue("a roadmap without vertices: no sample is sound in the planner's model.")
+        self._costs: list[dict[int, float]] = [{} for _ in vertices]
+        for first, second in edges:
+            self._join(first, second)
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return sum(len(costs) for costs in self._costs) // 2
+
+    def pose(self, vertex: int) -> Array:
+        """Return the pose of a vertex, (4,) rad."""
+        pose: Array = self.vertices[vertex]
+        return pose
+
+    def add(self, pose: Array, neighbours: int) -> int:
+        """Add a vertex, with edges to and from the nearest vertices that are `reachable`; return its number."""
+        joined = self.reachable(pose, neighbours)
+        self.vertices = np.concatenate([self.vertices, pose[None]])
+        self._costs.append({})
+        for vertex in joined:
+            self._join(len(self.vertices) - 1, vertex)
+        return len(self.vertices) - 1
+
+    def nearest(self, pose: Array, count: int) -> list[int]:
+        """Return the `count` vertices nearest to a pose; distances are fractions of the joints' ranges."""
+        return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
+
+    def reachable(self, pose: Array, neighbours: int) -> list[int]:
+        """Return those of the nearest vertices to which the straight motion is sound.
+
+        If there is none, ignore the cable constraints; if there is still none, return all nearest ones.
+        """
+        near = self.nearest(pose, neighbours)
+        for cables in (True, False):  # a pose that violates the cable constraints may still be reached
+            found = [v for v in near if self.belief.sound_motion(pose, self.vertices[v], cables)]
+            if found:
+                return found
+        return near
+
+    def path(self, starts: dict[int, float], goal: int, blocked: Collection[Edge]) -> list[int] | None:
+        """Return the vertices of the cheapest path from one of the starts (with the cost to reach it) to the goal; None without a path."""
+        best, before = dict(starts), dict.fromkeys(starts, -1)
+        queue = [(cost, vertex) for vertex, cost in starts.items()]
+        heapq.heapify(queue)
+        while queue:
+            cost, vertex = heapq.heappop(queue)
+            if vertex == goal:
+                path = [vertex]
+                while before[path[-1]] >= 0:
+                    path.append(before[path[-1]])
+                return path[::-1]
+            if cost > best[vertex]:
+                continue
+            for other, more in self._costs[vertex].items():
+                if cost + more < best.get(other, np.inf) and edge(vertex, other) not in blocked:
+                    best[other], before[other] = cost + more, vertex
+                    heapq.heappush(queue, (cost + more, other))
+        return None
+
+    def cost(self, pose: Array, vertex: int) -> float:
+        """Return the cost of the motion from a pose to a vertex."""
+        return 1.0 + float(np.linalg.norm((self.vertices[vertex] - pose) / self.belief.span))
+
+    def _lengths(self, pose: Array) -> Array:
+        lengths: Array = np.linalg.norm((self.vertices - pose) / self.belief.span, axis=1)
+        return lengths
+
+    def _join(self, first: int, second: int) -> None:
+        cost = self.cost(self.vertices[first], second)
+        self._costs[first][second] = self._costs[second][first] = cost
+
+
+def edge(first: int, second: int) -> Edge:
+    """Return the undirected edge between two vertices."""
+    return (first, second) if first < second else (second, first)
+
+
+def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
+    """Build a roadmap of one of the KINDS, all motions of which are sound in the planner's model."""
+    if kind == "OMPL":
+        return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
+    samples = np.flatnonzero(belief.sound(lattice.samples))
+    vertex = {int(state): number for number, state in enumerate(samples)}
+    wanted = {edge(vertex[s], vertex[int(g)]) for s in vertex for g in lattice.actions(s) if int(g) in vertex}
+    poses = lattice.samples[samples]
+    return Roadmap(poses, [(v, w) for v, w in sorted(wanted) if belief.sound_motion(poses[v], poses[w])], belief)
+
+
+def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
+    """Add the samples of goal states that are not vertices yet; returns the vertex of each state."""
+    found = {}
+    for state in sorted({int(goal) for goal in goals}):
+        sample = lattice.samples[state]
+        here = roadmap.nearest(sample, 1)[0]
+        found[state] = here if np.array_equal(roadmap.vertices[here], sample) else roadmap.add(sample, NEIGHBOURS)
+    return found
+
+
+def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
+    """Build a PRM over the arm's four joints by OMPL, in fractions of their ranges; raises OmplMissing."""
+    found = grown("PRM", belief, milestones, neighbours, seed, resolution=STEP)
+    return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)
 
 
 class Rival(Protocol):

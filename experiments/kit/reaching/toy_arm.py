@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.kit.learning.arm import RIGHT, arm_space
+from experiments.kit.reaching.learning import Learner
 from mobee import Lattice
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -164,8 +165,8 @@ class Truth:
 
 def toy_agent(arm: ToyArm, seed: int, predictor: Any, strategy: str, failures: str) -> ReachAgent:
     """Return an agent on a toy arm."""
-    where = {"hands": arm.hands, "jacobians": arm.jacobians}
-    return ReachAgent(arm.space, arm, arm, marker=MARKER, predictor=predictor, strategy=strategy, failures=failures, seed=seed, **where)
+    kind = Learner(predictor, strategy, failures)
+    return kind.agent(arm.space, arm, arm, marker=MARKER, seed=seed, hands=arm.hands, jacobians=arm.jacobians)
 
 
 def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:

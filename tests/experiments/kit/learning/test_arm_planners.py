@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.kit.learning.arm import arm_space
-from experiments.kit.learning.arm_planners import Learned, PlannedOnce, Repaired, Straight
-from experiments.kit.learning.arm_roadmap import Roadmap
+from experiments.kit.learning.arm_planners import Learned, PlannedOnce, Repaired, Roadmap, Straight
 from mobee import TransitionModel
 
 A, B, C, D = (np.array([x, y, 0.0, 0.0]) for x, y in ((0.0, 0.0), (0.0, 0.4), (0.3, 0.6), (0.6, 0.4)))

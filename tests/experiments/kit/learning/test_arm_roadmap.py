@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.kit.learning.arm import arm_clauses, robot
-from experiments.kit.learning.arm_roadmap import Belief, Roadmap, edge, ompl_roadmap
+from experiments.kit.learning.arm_planners import Belief, Roadmap, edge, ompl_roadmap
 from mobee import Model
 
 
