@@ -23,7 +23,7 @@ MIN_SEEDS = 5  # for a verdict: a bootstrap interval of fewer values is too narr
 class Claim:
     """A row of the table of claims.
 
-    An experiment lists its claims as CLAIMS, and returns them measured, as dicts, under "claims" in its results; see `judged`.
+    An experiment returns its claims measured, as dicts, under "claims" in its results; see `judged`.
     `source`: where it was published, as "thesis 7.2.1, fig. 7.5".  `ours`: our number with its interval.  `rule`: how the experiment
     measures and judges it, a function of its own below the decorator `claim`, or one of experiments.kit.rules.
     """

@@ -26,7 +26,7 @@ import numpy as np
 from experiments.kit.experiment import Experiment
 from experiments.kit.learning.exploration import newest
 from experiments.kit.learning.rivals import CountBonus, Curious, EpsilonGreedy, PosteriorSampling, RewardedPlant, RMax, random_world, rooms
-from experiments.kit.plots import draw_points, new_figure
+from experiments.kit.plots import draw_points, finish, new_figure
 from experiments.kit.statistics import interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
 from mobee import CuriousAgent, policy_iteration
@@ -199,7 +199,7 @@ def _dense(model: Any) -> Array:
 def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
     """Return the values of the runs of a task by world, explorer and number."""
     every = grouped_by(found, "task", "world", "explorer", "number")
-    return {key[1:]: [result.values for result in results] for key, results in every.items() if key[0] == task}
+    return {key[1:]: runs for key, runs in every.items() if key[0] == task}
 
 
 def findings(found: Cells) -> dict[str, Any]:
@@ -237,11 +237,8 @@ def plot(found: Cells) -> Any:
         shares = {name: [run["share"] for run in runs] for (where, name, _), runs in earned.items() if where == world}
         names = [name for name in RETURN if name in shares]
         draw_points(below, names, [shares[name] for name in names], fmt="o", color="k", markersize=4, capsize=2)
-        below.set_ylim(-0.02, 1.02)
         below.tick_params(axis="x", labelrotation=60, labelsize=8)
-        below.grid(alpha=0.2)
-        if column == 0:
-            below.set_ylabel("reward over that of the best policy")
+        finish(below, ylim=(-0.02, 1.02), ylabel="" if column else "reward over that of the best policy")
     return drawing
 
 
@@ -252,18 +249,12 @@ def _draw_coverage(axes: Any, runs: Mapping[str, Runs], first: bool) -> None:
         draw_points(axes, names, times, fmt="o", color=color, markersize=4, capsize=2, label=label)
     axes.axhline(1.0, color="tab:blue", linewidth=0.6, linestyle=":")
     axes.axhline(float(OFTEN), color="tab:red", linewidth=0.6, linestyle=":")
-    axes.set_yscale("log")
     axes.tick_params(axis="x", labelrotation=60, labelsize=8)
-    axes.grid(alpha=0.2)
-    if first:
-        axes.set_ylabel("transitions for each state-action")
-        axes.legend(fontsize=7)
+    finish(axes, legend=7 if first else 0, yscale="log", ylabel="transitions for each state-action" if first else "")
 
 
 EXPERIMENT = Experiment(
-    name="tabular-exploration",
     claim="how soon 'Kail' curiosity has tried everything, and what reward it finds, beside count bonus, R-MAX and posterior sampling",
     source="our own study",
-    notes=__doc__,
     method=Sweep(conditions, trial, findings, plot, add_options=add_options),
 )

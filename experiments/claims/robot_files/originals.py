@@ -197,9 +197,7 @@ def _first_match(files: Path, pattern: str) -> Path:
 
 
 EXPERIMENT = Experiment(
-    name="originals",
     claim="robot and world files of 2010 to 2014 load, and mean what the program of 2014 took them to mean",
     source="kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

@@ -255,9 +255,7 @@ def _explore(urdf: Path, srdf: Path, field: float | None, seed: int) -> tuple[fl
 
 
 EXPERIMENT = Experiment(
-    name="own-robots",
     claim="28 URDFs of others stay at home, touch nothing there, settle within 1 mm, and explore within 15 s",
     source="aims of this reproduction",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

@@ -197,9 +197,7 @@ def _cells(one: FileRecord) -> tuple[str, ...]:
 
 
 EXPERIMENT = Experiment(
-    name="urdf-files",
     claim="URDFs of others load or are refused with a remedy; links are Pinocchio's within 1e-9, contacts coal's",
     source="our own aim, docs/robots.md",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )

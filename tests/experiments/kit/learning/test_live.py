@@ -6,7 +6,20 @@ import pytest
 
 from experiments.kit.cells import Cell, write_cell
 from experiments.kit.learning import live as live_learning
-from experiments.kit.learning.live import RATE, ROBOTS, TASKS, agents, compared, learn_live, offline_plant
+from experiments.kit.learning.live import (
+    JOINTS,
+    RATE,
+    ROBOTS,
+    TASKS,
+    agents,
+    compared,
+    counts_of,
+    distance,
+    learn_live,
+    offline_plant,
+    variations,
+)
+from mobee import Lattice, load_robot
 from mobee.store import STORE, Transition, TransitionStore
 from services.launcher.scenario import read_scenario
 
@@ -86,3 +99,32 @@ def test_a_part_that_has_enough_goes_on_with_the_others_so_that_none_waits_for_i
     monkeypatch.setattr(live_learning, "summary_of", launched)
     learn_live("arms", "kinematic", 0, 25, tmp_path, lambda number: None)
     assert left == [{"left_arm": 25, "right_arm": 25}, {"left_arm": 29, "right_arm": 25}]
+
+
+@pytest.fixture(scope="module")
+def space():
+    return Lattice(load_robot("icub"), JOINTS["left_arm"], neighbours=8)
+
+
+def test_counts_say_how_often_each_outcome_was_seen(space):
+    counts = counts_of(np.array([(0, 1, 5), (0, 1, 5), (0, 1, 6), (3, 2, 3)]), space)
+    assert counts.shape == (81, 8, 81) and counts.sum() == 4
+    assert (counts[0, 1, 5], counts[0, 1, 6], counts[3, 2, 3]) == (2, 1, 1)
+    assert counts_of(np.zeros((0, 3)), space).sum() == 0
+
+
+def test_total_variation_is_half_the_distance_of_the_shares(space):
+    first = counts_of(np.array([(0, 0, 5)] * 3 + [(0, 0, 6)] + [(1, 0, 7)] * 4), space)
+    second = counts_of(np.array([(0, 0, 5)] * 2 + [(0, 0, 9)] * 2 + [(1, 0, 7)] * 9), space)
+    apart = variations(first, second, 4)
+    assert apart[0, 0] == pytest.approx(0.5) and apart[1, 0] == 0.0
+    assert np.isfinite(apart).sum() == 2 and np.isfinite(variations(first, second, 5)).sum() == 0
+    assert np.array_equal(apart, variations(second, first, 4), equal_nan=True)
+
+
+def test_the_distance_is_taken_over_the_actions_of_all_parts(space):
+    first = {"a": counts_of(np.array([(0, 0, 5)] * 3), space), "b": counts_of(np.array([(0, 0, 5)] * 3), space)}
+    second = {"a": counts_of(np.array([(0, 0, 5)] * 3), space), "b": counts_of(np.array([(0, 0, 6)] * 3), space)}
+    found = distance(first, second, 3)
+    assert (found.variation, found.agree, found.compared) == (0.5, 0.5, 2)
+    assert distance(first, second, 4).compared == 0
