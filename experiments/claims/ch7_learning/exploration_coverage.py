@@ -243,10 +243,8 @@ def depletes(published: Published) -> Measured | None:
     """Compare the two explorers in both worlds; open where an interval does not decide, or a world was not run."""
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None
-    each = {
-        world: ratio_within(*(covered(published[world, name]) for name in ("depleting", "nearest_untried")), digits=3, most=1.0 + SLACK)
-        for world in FLOORS
-    }
+    times = {world: [covered(published[world, name]) for name in ("depleting", "nearest_untried")] for world in FLOORS}
+    each = {world: ratio_within(ours, nearest, digits=3, most=1.0 + SLACK) for world, (ours, nearest) in times.items()}
     return ", ".join(f"{text} {world}" for world, (text, _) in each.items()), all_hold(holds for _, holds in each.values())
 
 
