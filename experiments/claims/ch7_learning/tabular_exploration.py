@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the 'Kail' curiosity with the explorers of the literature, in worlds of tables from the literature.
 
-Question: how soon has each explorer tried everything, and how much reward does it find, where nothing is known in advance?
+Claim: none is tested.  The question is how soon each explorer has tried everything, and how much reward it finds, where nothing is known
+in advance.
 Source: none; the thesis compares with random and least-tried actions only.  Run time: 5 minutes on 2 cores.
 
 Worlds: RiverSwim with 6 and 20 states, DeepSea of depth 10, four rooms with slipping steps, and random worlds in which every action has

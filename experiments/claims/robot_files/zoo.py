@@ -228,9 +228,7 @@ def table(found: Sequence[Measured]) -> list[str]:
 
 
 EXPERIMENT = Experiment(
-    name="zoo",
     claim="robots of five collections become curious without an edit, and stay out of themselves within 2 mm",
     source="aims of this reproduction",
-    notes=__doc__,
     method=Steps(add_arguments, run, figure),
 )
