@@ -79,6 +79,7 @@ def entry_of(who: str, module: str | None) -> Entry | None:
             3,
             after=("controller",),
             nice=_NICE_PLANS,
+            may_end=True,  # once it has made its transitions or tries
             given={"part": who.removeprefix(AGENT)},
         )
     if module is None:

@@ -16,6 +16,7 @@ import pytest
 from bus_schema.messages import EStop
 from services.common.observe import Heard, listen
 from services.common.session import open_client
+from services.launcher.catalogue import entry_of
 from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
 
 Launch = Callable[..., Launched]
@@ -158,6 +159,11 @@ def test_a_service_that_has_done_its_work_is_left_in_peace(launch: Launch) -> No
     code, summary = launched.end()
     assert code == 0
     assert summary["restarts"]["one"] == 0
+
+
+def test_an_agent_may_end_when_it_has_made_its_transitions_and_a_service_of_the_robot_may_not() -> None:
+    may_end = {who: entry.may_end for who in ("robot_sim", "model", "controller", "agent_torso") if (entry := entry_of(who, None))}
+    assert may_end == {"robot_sim": False, "model": False, "controller": False, "agent_torso": True}
 
 
 def test_a_service_of_the_robot_that_ends_unasked_has_failed(launch: Launch) -> None:
