@@ -17,10 +17,10 @@ from mobee_cli.playing.setup import add_setup_options, setup_of
 from mobee_cli.robot_options import DEFAULT, add_robot, add_world
 from services.common.exit_codes import BAD_INPUT
 
-_NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the robot
-(docs/play.md). Every transition is on disk before the next action: the same
-command continues the file, also after Ctrl-C. Beside FILE.sqlite are written the
-robot, FILE.xml, and a scenario, FILE.toml, that goes on live: mobee launch."""
+_NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the
+robot (docs/play.md). Every transition is on disk before the next action: the
+same command continues the file, also after Ctrl-C. Beside FILE.sqlite are
+written the robot, FILE.xml, and a scenario that goes on live, FILE.toml."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -23,9 +23,9 @@ from services.launcher.run import Options, launch
 
 SECONDS = 5.0  # s of real time in which it learns offline
 _NOTES = """ROBOT: a shipped robot, a URDF, MJCF or zero-position XML file, or with the
-package mujoco-menagerie a robot of MuJoCo Menagerie; without it, the iCub at its
-table. --learned goes on live with a file of `mobee learn`. The page's address is
-in the table of services; Ctrl-C ends everything. docs/play.md."""
+package mujoco-menagerie a robot of MuJoCo Menagerie; without it, the iCub at
+its table. --learned goes on live with a file of `mobee learn`. The address of
+the page is in the table of services; Ctrl-C ends everything. docs/play.md."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -93,7 +93,7 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
         left_out |= stuck
         reach = _reach(robot, arms)
         robot, width = with_fields(robot, reach, seed)
-        gains = Gains.for_reach(reach)
+        gains = Gains.for_reach(reach) if reach > 0.0 else gains
     names = tuple(sorted((robot.links[min(pair)], robot.links[max(pair)]) for pair in left_out))
     return Derived(robot, arms, tuple(limited), moved, names, width, gains)
 

@@ -157,8 +157,7 @@ def _field(solid: Shape, width: float, suffix: str) -> Shape:
 
 
 def reach_of(robot: Robot, links: Collection[int], joint: int) -> float:
-    """Return the distance [m] from a joint to the farthest point of these links at zero pose."""
+    """Return the distance [m] from a joint to the farthest point of these links at zero pose; without shapes, to the farthest joint."""
     points = [corners_of(shape) for shape in robot.shapes if shape.link in links]
-    if not points:
-        return 0.0
+    points = points or [robot.joints[link - 1].point[None] for link in links]
     return float(np.linalg.norm(np.concatenate(points) - robot.joints[joint].point, axis=1).max())

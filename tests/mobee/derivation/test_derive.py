@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -160,6 +161,14 @@ def test_a_robot_without_arms_is_refused(tmp_path: Path) -> None:
     path.write_text(f'<robot name="wheel"><link name="base"/>{wheel}{axle}</robot>')
     with pytest.raises(InvalidValue, match="no chain of joints whose motors move its end"):
         derive(load_robot(path))
+
+
+def test_a_robot_without_shapes_learns_too(tmp_path: Path) -> None:
+    urdf(tmp_path, limb("shoulder", 0.0, 0.3, 0.0))
+    path = tmp_path / "limbs.urdf"
+    path.write_text(re.sub(r"<collision>.*?</collision>", "", path.read_text()))
+    derived = derive(load_robot(path))
+    assert not derived.robot.shapes and derived.arms[0].movement > 0.1
 
 
 @pytest.mark.parametrize(
