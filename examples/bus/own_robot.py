@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig, load_config
+from services.common.emergency_stop import StopRecord
 from services.common.entry import explained, robot_of
 from services.common.rate import Rate
 from services.common.service import Service
@@ -38,6 +40,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
 
     rate: float = 50.0
     """Ticks a second."""
+    stop_record: str = ""
+    """File in which an emergency stop is kept until it is reset; the launcher names it."""
     lag: float = 0.05
     """Time constant of the simulated servos, s."""
 
@@ -92,7 +96,8 @@ class OwnRobot:
         self.dt_ns = round(1e9 / config.rate)
         self.motors = Servos(robot, config)
         service.bus.run, service.bus.dt = f"run_{secrets.token_hex(4)}", self.dt_ns
-        self.guard = Guard(service, robot, self, self.dt_ns * 1e-9)  # reads self.motors
+        record = StopRecord(Path(config.stop_record)) if config.stop_record else None
+        self.guard = Guard(service, robot, self, self.dt_ns * 1e-9, record)  # reads self.motors
         self.sensors = Sensors(service.bus, robot, self.dt_ns * 1e-9)
         self.clock = service.bus.publisher(Clock)
         service.describe = lambda: (f"own robot, tick {service.bus.k}", {"ticks": service.bus.k})

@@ -118,7 +118,7 @@ FAULTS: dict[str, Callable[[Any], Any]] = {
     "orphan": nothing(Gate, "lose_owner"),
     "mindless": nothing(Guard, "hold_all"),
     "unstoppable": nothing(Guard, "_stop_all"),
-    "silent_stop": nothing(Guard, "_repeat_estop"),
+    "silent_stop": nothing(Guard, "_repeat_stop"),
 }
 
 
