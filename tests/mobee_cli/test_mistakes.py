@@ -77,7 +77,7 @@ class Mistake:
 
 
 MISTAKES = (
-    Mistake("lanch", ("unknown verb 'lanch'. Did you mean 'launch'?", "Valid: launch, status")),
+    Mistake("lanch", ("unknown verb 'lanch'. Did you mean 'launch'?", "Valid: play, launch, status")),
     Mistake("status --jsn", ("unrecognized arguments: --jsn", "see `mobee status --help`")),
     # names
     Mistake("check iccub", ("unknown robot or world 'iccub'. Did you mean 'icub'?",)),
@@ -114,7 +114,7 @@ MISTAKES = (
     Mistake("check folder.urdf", ("folder.urdf: is a folder", "Give the path of a .xml or .urdf file in it")),
     Mistake("check nofile.urdf", ("nofile.urdf: no such file", "or a name: icub")),
     Mistake("check later.xml", ("later.xml:1:", "'9.0' is not known", "Valid: 0.1, 1.0, 2.0")),
-    Mistake("check icub --field 0.03", ("field= is for .urdf files only",)),
+    Mistake("check icub --field 0.03", ("field= is for URDF and MJCF files only",)),
     Mistake("convert icub out.txt", ("out.txt: OUT must end in .xml or .urdf",)),
     Mistake("convert icub nowhere/icub.urdf", ("there is no folder", "nowhere: create it")),
     Mistake("convert arm.urdf mesh.urdf", ("mesh.urdf exists already", "overwrite it with --force")),
@@ -133,14 +133,14 @@ MISTAKES = (
     Mistake("launch kinematic --duration ten", ("'ten' is not a positive number",)),
     Mistake("launch kinematic --ticks 10", ("a number of ticks is exact in lockstep only: set shared.mode=lock",)),
     Mistake("launch kinematic --endpoint 127.0.0.1:7447", ("write tcp/HOST:PORT, such as tcp/127.0.0.1:7447",)),
-    Mistake("launch kinematic --runs arm.urdf/runs --endpoint {endpoint}", ("cannot write the run's folder", "with --runs"), ENVIRONMENT),
+    Mistake("launch kinematic --runs arm.urdf/runs --endpoint {endpoint}", ("cannot write arm.urdf/runs: Not a directory", "with --runs"), ENVIRONMENT),
     # places and runs
     Mistake("reach --offline --target -0.3 0.2", ("argument --target: expected 3 arguments",)),
     Mistake("reach --offline --target nan 0 0", ("position (nan, 0, 0) of the target: must be three finite numbers, in m",)),
     Mistake("reach --offline --target 0 0 0", ("(0, 0, 0) m is inside the robot's own torso_1", "the nearest to which")),
     Mistake("reach --offline --target -3 2 1", ("The target is out of reach of right_arm", "with --target X Y Z"), 1),
     Mistake("reach --robot arm.urdf --target 1 0 0", ("--robot arm.urdf: only valid with --offline",)),
-    Mistake("reach --offline --run run --target -0.3 0.2 0.1", ("nobody has learned to reach in this run yet",)),
+    Mistake("reach --offline --run run --target -0.3 0.2 0.1", ("no agent has learned to reach in this run yet",)),
     Mistake("plan --run nowhere --to 3", ("nowhere: there is no such file", "runs of `mobee launch` write such files")),
     Mistake("plan --run no_store --to 3", (f"no_store/{STORE}: there is no such file",)),
     Mistake("plan --run arm.urdf --to 3", ("arm.urdf: it is not a database; give another path",)),
@@ -210,7 +210,6 @@ def test_a_port_in_use_is_named_with_a_free_one(endpoint: str, capsys: pytest.Ca
     ("package", "words", "says"),
     [
         ("rerun", "launch reach", 'monitor needs rerun, which is not installed: pip install "mobee[viz]"'),
-        ("pybullet", "launch default", "robot_sim needs pybullet, which is not installed"),
     ],
 )
 def test_a_missing_extra_is_named_with_its_remedy(
@@ -250,4 +249,4 @@ def test_a_python_that_is_too_old_is_named(tmp_path: Path) -> None:
     environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
     done = subprocess.run(["bash", "-c", command, "launch"], capture_output=True, text=True, env=environment)
     assert done.returncode == 1
-    assert done.stderr == "launch: needs Python 3.11 or newer, found Python 3.9.2: install python3.11 with its venv module.\n"
+    assert done.stderr == "launch: needs Python 3.11 to 3.14, found Python 3.9.2: install one of them with its venv module.\n"
