@@ -133,7 +133,11 @@ MISTAKES = (
     Mistake("launch kinematic --duration ten", ("'ten' is not a positive number",)),
     Mistake("launch kinematic --ticks 10", ("a number of ticks is exact in lockstep only: set shared.mode=lock",)),
     Mistake("launch kinematic --endpoint 127.0.0.1:7447", ("write tcp/HOST:PORT, such as tcp/127.0.0.1:7447",)),
-    Mistake("launch kinematic --runs arm.urdf/runs --endpoint {endpoint}", ("cannot write arm.urdf/runs: Not a directory", "with --runs"), ENVIRONMENT),
+    Mistake(
+        "launch kinematic --runs arm.urdf/runs --endpoint {endpoint}",
+        ("cannot write arm.urdf/runs: Not a directory", "with --runs"),
+        ENVIRONMENT,
+    ),
     # places and runs
     Mistake("reach --offline --target -0.3 0.2", ("argument --target: expected 3 arguments",)),
     Mistake("reach --offline --target nan 0 0", ("position (nan, 0, 0) of the target: must be three finite numbers, in m",)),
