@@ -78,7 +78,7 @@ RUN_ELSEWHERE = {
     r"./launch": "tests/services/launcher/test_run.py",
     r"./test.*": "is what runs this test",
     r"pip install .": "tests/packaging/test_wheel.py",
-    r"pip install (\"mobee\[planning\]\"|--target erd .*)": "needs a package index",
+    r"pip install (\"mobee\[planning\]\"|--target (erd|zoo) .*)": "needs a package index",
     r"mobee launch reach": "tests/services/launcher/test_scenario.py",
     r"mobee launch filtered": "tests/services/port_filter/test_process.py",
     r"mobee reach --target [-. 0-9]+": "tests/system/test_reach.py",

@@ -214,15 +214,12 @@ def figure(folder: Path) -> Path:
 
 def table(found: Sequence[Measured]) -> list[str]:
     """Return the lines of the table in Markdown."""
-    heads = (
-        "robot | motors | arms (joints) | load and derive [s] | transitions | deepest [mm] | tried of what can be tried | of all | cannot"
-    )
-    lines = [f"| {heads} |", "|---" * 9 + "|"]
+    heads = "robot | motors | arms (joints) | transitions | deepest [mm] | tried of what can be tried | cannot"
+    lines = [f"| {heads} |", "|---" * 7 + "|"]
     for one in found:
         arms = ", ".join(f"{part} ({joints})" for part, joints in zip(one.arms.split(), one.joints.split(), strict=True))
-        cells = [one.robot, f"{one.motors:.0f}", arms, f"{one.load_s:.1f}, {one.derive_s:.1f}", f"{one.transitions:.0f}"]
         tried = f"{one.tried:.0f} of {one.can_be_tried:.0f}" if one.can_be_tried else ""
-        cells += [f"{one.depth_mm:.2f}", tried, f"{one.state_actions:.0f}", "; ".join(failures(one))]
+        cells = [one.robot, f"{one.motors:.0f}", arms, f"{one.transitions:.0f}", f"{one.depth_mm:.2f}", tried, "; ".join(failures(one))]
         lines.append("| " + " | ".join(cells) + " |")
     return lines
 
