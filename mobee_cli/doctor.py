@@ -125,7 +125,8 @@ def _disk() -> Finding:
 def _core() -> Finding:
     """Load the native core, as every use of the library does."""
     try:
-        from mobee._core import FORCED, choose, library, processor_flags
+        from mobee._core import FORCED, choose, library
+        from mobee._core.levels import processor_flags
 
         library()
         level = choose(os.environ.get(FORCED, ""), processor_flags())

@@ -41,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
         robot = load_robot(arguments.file, **urdf_options(arguments))
         world = world_around(arguments.world, arguments.file) if arguments.world else None
     except MobeeError as error:
-        world = f" It is a world: `mobee view icub --world {arguments.file}`." if arguments.file in shipped_worlds() else ""
-        raise UserError(f"{error}{world}", BAD_INPUT) from None
+        hint = f" It is a world: `mobee view icub --world {arguments.file}`." if arguments.file in shipped_worlds() else ""
+        raise UserError(f"{error}{hint}", BAD_INPUT) from None
     return show(robot, world, save)
 
 

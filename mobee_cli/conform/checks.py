@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -290,11 +291,15 @@ def _send(player: Player, part: str, mode: Mode, ref: Callable[[], Array], field
     return player.send(part, mode, ref(), **fields)
 
 
+def _follows(player: Player, part: str, seq: int) -> bool:
+    return player.status(part).cmd_seq == seq
+
+
 def _in_force(player: Player, part: str) -> int:
     """Bring a valid command into force, and return its seq; on a busy machine some come too late."""
     for _ in range(ATTEMPTS):
         valid = player.send(part, "velocity", np.zeros(len(player.robot.part(part))))
-        if player.until(lambda sent=valid: player.status(part).cmd_seq == sent, 1e-3 * TTL):
+        if player.until(partial(_follows, player, part, valid), 1e-3 * TTL):
             return valid
     raise Broken(f"no valid command comes into force: the ticks have gate {player.status(part).gate!r}, and never its cmd_seq")
 
@@ -312,7 +317,7 @@ def _require_ignored(player: Player, part: str, what: str, send: Callable[[], in
 def _hold_without(player: Player, part: str, who: str, owner: bool) -> None:
     """Require that an armed part holds when the token of a service disappears; the other commands go on."""
     session, instance = player.service.bus.session, f"i0_conform_{who}"
-    token = session.liveliness().declare_token(keys.alive(who, instance))
+    token: Any = session.liveliness().declare_token(keys.alive(who, instance))
     try:
         player.wait(0.1)
         player.drive(part, "release", player.take(part))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,7 +46,10 @@ class Player:
         self._hear(Clock, lambda heard, clock: self.clocks.append(clock))
         self._hear(EStop, lambda heard, stop: self.stops.append(stop))
         for part in robot.parts:
-            self._hear(State, lambda heard, state, part=part: self.states[part].append(state), part)
+            self._hear(State, partial(self._note_state, part), part)
+
+    def _note_state(self, part: str, heard: Heard, state: State) -> None:
+        self.states[part].append(state)
 
     def _hear(self, cls: type[_M], note: Callable[[Heard, _M], object], part: str = "") -> None:
         size = len(self.robot.part(part)) if part else None
@@ -95,7 +99,7 @@ class Player:
 
     # Calls
 
-    def call(self, key: str, request: type[Request], reply: type[_R], **fields: object) -> _R:
+    def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
         """Call the robot; raises rpc.CallFailed."""
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
@@ -161,4 +165,7 @@ class Player:
         while time.monotonic() < end:
             seen = self.tick.k
             self.send(part, mode, ref())
-            self.until(lambda seen=seen: self.tick.k > seen, ANSWER)
+            self.until(partial(self._is_after, seen), ANSWER)
+
+    def _is_after(self, k: int) -> bool:
+        return self.tick.k > k
