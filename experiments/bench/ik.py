@@ -223,7 +223,7 @@ class Entrant:
 
 
 def solve_by_turns(entrants: Mapping[str, Entrant], speeds: Calibration, show: Callable[[int, str], None]) -> dict[str, Tries]:
-    """Solve all targets, some by each solver in turn, so that all solvers share a slow minute of the machine.
+    """Solve all targets, a few with each solver in turn, so that a slow minute of the machine affects all solvers equally.
 
     `show` is called with the number of targets done and the solver's name.
     """

@@ -82,7 +82,7 @@ def published_terms() -> tuple[str, ...]:
 
 
 def needs_contacts() -> bool:
-    """Return whether the law has terms that depend on its own state: then the model publishes the contacts too."""
+    """Return whether some terms depend on the law's state, such as its velocity: then the model publishes the contacts too."""
     return bool(state_term_names())
 
 

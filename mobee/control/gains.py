@@ -200,7 +200,10 @@ class Gains:
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """Return the gain `name` of each motor, (n,), all in units of rad; raises UnknownName for a pattern of `motors` without a match."""
+        """Return the gain `name` of each motor, (n,), as it was set, without a conversion for motors that slide.
+
+        `motors`: the names of the motors.  Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
+        """
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
                 raise UnknownName("motor pattern", pattern, motors)

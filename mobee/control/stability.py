@@ -18,7 +18,7 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest stable step, and the motion that becomes unstable beyond it."""
+    """The largest stable time step of the control law, and the motion of the joints that becomes unstable at a larger one."""
 
     step: float  # s
     motor: str  # the motor that moves most in that motion

@@ -54,8 +54,9 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 def guarded(robot: Robot) -> Robot:
     """Return the robot with only those pairs of solids that its contact fields keep apart.
 
-    A link without fields, such as a finger, belongs to the next one towards the base that has some.  Pairs of links whose fields
-    are not tested against each other, such as upper arm and pelvis of the iCub, whose hulls overlap beside the body, are left out.
+    A link without fields, such as a finger, counts as the next link towards the base that has fields.  Left out are pairs of links
+    whose fields are not tested against each other, such as upper arm and pelvis of the iCub: their hulls overlap when the arm is beside
+    the body.
     """
     with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
     guard = list(range(len(robot.links)))

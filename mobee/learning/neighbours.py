@@ -111,7 +111,7 @@ def joined(edges: Edges) -> Edges:
 
 
 def table_of(edges: Edges, states: int) -> Ints:
-    """Return the table of goals (S, A) of ascending edges, padded with NO_ACTION."""
+    """Return the table of goals (S, A) from edges in ascending order; a state with fewer actions has NO_ACTION in the rest of its row."""
     counts = np.bincount([state for state, _ in edges], minlength=states)
     goals: Ints = np.full((states, max(1, int(counts.max(initial=0)))), NO_ACTION, dtype=np.intp)
     for (state, goal), action in zip(edges, _ranks(counts), strict=True):

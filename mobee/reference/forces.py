@@ -112,7 +112,7 @@ def clause_force(s: State) -> Array:
 def clauses_default(s: State) -> Array:
     """Return f_cst of the default law: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
 
-    The row that is nearest to holding sets the size of the push, so that the force is continuous.
+    The size of the push is computed from the row that is nearest to being satisfied, so that the force is continuous.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:

@@ -134,7 +134,10 @@ def published(r: Reach, v: View) -> Array:
 
 
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
-    """Return the force of the default law on the pulled motors (m,), not yet bounded, and a shift of their springs."""
+    """Return the force of the default law on the pulled motors (m,), not yet bounded, and the shift of their springs, (m,).
+
+    The shift moves the arm out of a singular pose.  `against` (n,): all other forces but the springs.
+    """
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
     slope = jacobian.T @ error  # the decrease of half the squared error along each motor

@@ -53,8 +53,8 @@ def fine_units(robot: Robot) -> Array:
 def limit_zones(robot: Robot, width: Array) -> Array:
     """Return the widths of the zones at the lower and the upper limit of each motor, (n, 2), in the unit of the motor.
 
-    In a zone the law pushes inward. `width` (n,): the width in the gains. A zone takes at most WIDEST of the range, and ends at home
-    for a motor whose `zone_ends_at_home` is set.
+    In a zone the law pushes inward. `width` (n,): the width in the gains. A zone is at most the fraction WIDEST of the motor's range. If
+    the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
     """
     low, high = robot.limits.T
     widest = np.minimum(width, WIDEST * (high - low))

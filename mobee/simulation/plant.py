@@ -312,7 +312,7 @@ class OfflinePlant:
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:
-        """Return the work of `run` in steps, for a caller that runs several plants at once."""
+        """Return the computation of `run` as a generator of its steps, for a caller that runs several plants at once."""
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
             rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))

@@ -59,7 +59,7 @@ class StopRecord:
             self.release()
 
     def remove(self) -> None:
-        """Remove the record of a robot that is not stopped and will not be started with it; raises OSError."""
+        """Remove the record at the end of a launch, unless a stop is in force; raises OSError."""
         if self.read() is None:
             self._path.unlink(missing_ok=True)
 

@@ -50,9 +50,10 @@ class Participant:
 class Barrier:
     """The participants that must answer a tick, and their answers.
 
-    A participant is present from its first answer until its liveliness token disappears, it is dropped because it is late, or it gives its
-    last answer; it is present again after its next answer.  A participant that the controller's answer lists as busy need not answer that
-    tick.  The others get a `Turn` message after that answer, so that an agent need not read every tick.
+    A tick waits only for participants that are present.  A participant is present from its first answer on.  It is absent when its
+    liveliness token has disappeared, when it was dropped because it was late, or when it has given its last answer; with another answer
+    it is present again.  The controller's answer to a tick lists participants that are busy with an action: these need not answer this
+    tick.  All others get a `Turn` message after the controller's answer, so that an agent need not read every tick.
     """
 
     def __init__(

@@ -111,7 +111,7 @@ def _forwarded() -> Iterator[None]:
 
 
 class Forwarder:
-    """Forwards metadata, emergency stops and the router's token between the robot (`service`) and its filtered twin."""
+    """Forwards metadata, emergency stops and the router's token between the robot (`service`) and the namespace of the clients (`twin`)."""
 
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:
         self._service, self._twin = service, twin

@@ -20,10 +20,11 @@ NO_CONTACT = SolidContact()
 
 
 class BulletBackend:
-    """The upper body of iCub v2.5 with gravity; fingers and eyes are the motor model alone.
+    """The upper body of iCub v2.5 with gravity; fingers and eyes have no physics, only the motor model.
 
-    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight, as it does on the robot. In
-    torque mode it gets the torque itself, through a gear (bullet_torque.py), and must include the torque that carries the weight.
+    A joint is a velocity constraint whose largest torque is that of the motor, so the servo holds the weight, as on the real robot. In
+    torque mode the commanded torque acts on the joint, through a gear (bullet_torque.py), and must include the torque that holds the
+    weight.
     """
 
     name = "pybullet"

@@ -24,7 +24,7 @@ DRAWN_TICKS = 256  # ticks whose jitter is drawn at once
 
 
 class Phases:
-    """Seeded sampling times of the parts."""
+    """The time within each tick at which each part is sampled: a fixed phase for each part plus jitter, both drawn from a seed."""
 
     def __init__(self, parts: Sequence[str], jitter: float, seed: int) -> None:
         """`jitter`: standard deviation, share of a tick."""

@@ -41,7 +41,7 @@ def speeds_at_stops(robot: Robot, run: PlantRun, start: Array) -> Array:
 
 
 def clause_label(robot: Robot, number: int) -> str:
-    """Return a clause as an inequality in degrees; the names of its motors are without the side."""
+    """Return a clause as an inequality in degrees; the prefixes `l_` and `r_` of its motors are left out."""
     rows = []
     for a, b in zip(robot.clauses[number].a, robot.clauses[number].b, strict=True):
         terms = [f"{a[i]:+.3g} {robot.motors[i].split('_', 1)[1]}" for i in np.flatnonzero(a)]

@@ -59,7 +59,7 @@ class LeastTries:
 
 @dataclass(eq=False)
 class Log:
-    """The transitions of one part; `poses` are the positions of all motors at the ends, (n,) rad."""
+    """The transitions of one part; `poses`: positions of all motors at the end of each transition, (n,) rad each."""
 
     seen: list[tuple[int, int, int]] = field(default_factory=list)
     settled: list[bool] = field(default_factory=list)

@@ -142,10 +142,10 @@ RETREAT, CLEAR = 0.02, 0.2  # m, step away from the target, and largest distance
 def goals(
     belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, most: int = MAX_POSES, free: bool = False
 ) -> tuple[Array, Array]:
-    """Return poses with the marker on the target, and poses clear of it from which the hand goes straight there, (K, d) rad each.
+    """Return poses with the marker on the target, and for each a pose away from it, from which the hand moves straight to the target.
 
-    At most `most` poses, those that fields push least.  Poses in which joint limits push are used only if there are no others, and never
-    with `free`.
+    Both are (K, d) rad.  At most `most` poses: those on which the forces of fields are smallest.  Poses in which the forces of joint limits
+    act are used only if there are no others, and never with `free`.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))

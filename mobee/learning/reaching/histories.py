@@ -16,7 +16,7 @@ from mobee.learning.transitions import Scalar
 
 
 def grown(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
-    """Return the array, or a copy twice as long if it has no such index."""
+    """Return the array, or, if the index is beyond its end, a copy of twice the length that is filled with zeros."""
     return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
 
 

@@ -23,12 +23,13 @@ World = Callable[[Array], tuple[Array, Array]]
 class ReachTable(TabularPlant):
     """A TabularPlant on which a part can reach, and the presented target may block transitions.
 
-    The draw of action number n depends on the seed and n alone.
+    The random outcome of the n-th action depends on the seed and n alone.
 
     Args:
         space, outcomes, probabilities, seed, start: of the TabularPlant.
         world: function of a target (3,) m that returns the mean remaining error of a reach from each state, (S,) m, and the probability
-            that the target blocks each transition, (S, A), which then ends in its start.  Called once for each position.
+            that the target blocks each transition, (S, A); a blocked one
+            ends in the state where it began.  Called once for each position.
         noise: m, standard deviation of the remaining error.
     """
 

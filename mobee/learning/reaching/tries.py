@@ -81,9 +81,9 @@ class Try:
     """A problem-try that has ended.
 
     `number`: 1, 2, ...  `problem`: number of its target.  `path`: its transitions, as (s, a, s', failed).  `reach_state`: where the reach
-    started; None: no reach within the limit of actions, and the next four are 0.  `reward`, `expected`: of the reach; `intrinsic`: expected
-    minus actual reward (thesis eq. 8.6).  `missing`: m, remaining error.  `timeouts`: number of actions that did not settle.
-    `duration`: s, by the plant's clock.
+    started; None: the try ended at the limit of actions without a reach.  `reward`, `expected`: observed and predicted reward of the reach;
+    `intrinsic`: expected minus observed reward (thesis eq. 8.6); `missing`: m, remaining error.  These four are 0 without a reach.
+    `timeouts`: number of actions that did not settle.  `duration`: s, by the plant's clock.
     """
 
     number: int

@@ -15,9 +15,9 @@ from mobee.roadmap.ik.terms import Aim
 
 
 class TaskIK:
-    """Solves a problem's terms together with given task coordinates.
+    """Finds poses that satisfy the terms of a problem and have given task coordinates, by least squares.
 
-    `deviations`: (m,) largest deviation of each coordinate.  Raises InvalidValue for a coordinate that has no derivative.
+    `deviations`: (m,) largest accepted deviation of each coordinate.  Raises InvalidValue for a coordinate that has no derivative.
     """
 
     def __init__(self, problem: Problem, task: Task, deviations: Array) -> None:

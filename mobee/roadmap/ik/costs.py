@@ -216,7 +216,10 @@ def comfort(weight: float = 0.5) -> Term:
 
 
 def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps the centre of mass above a place (2,) m, None: as at home; the residual is a horizontal distance [m]."""
+    """Return the term that keeps the centre of mass above a place; the residual is the horizontal distance [m].
+
+    `place`: (2,) m, x and y in the root frame; None: the place above which the centre of mass is at the home pose.
+    """
     above = None if place is None else np.array(place, dtype=np.float64)
     if above is not None and above.shape != (2,):
         raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")

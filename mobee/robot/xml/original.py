@@ -57,7 +57,7 @@ class Evidence:
 def find_evidence(root: Node) -> Evidence | None:
     """Return the clearest sign that a robot file was written in 2010 to 2014; None if there is none.
 
-    A sign that names the generation of the format comes first. The result is certain if any sign in the file is.
+    A sign that shows in which years the file's format was used is preferred. The result is `certain` if any sign in the file is certain.
     """
     found = sorted(_evidence(root), key=lambda one: (one.generation == GENERATION, not one.certain))
     return replace(found[0], certain=any(one.certain for one in found)) if found else None

@@ -67,12 +67,12 @@ class Reached:
         return self._target_of.get(target.tobytes())
 
     def pair(self, state: int, target: Array) -> int | None:
-        """Return the index of a pair; None: never tried."""
+        """Return the index of a pair of state and target; None: never tried."""
         known = self.find(target)
         return None if known is None else self._pair_of.get((state, known))
 
     def add(self, state: int, target: Array, reward: float) -> int:
-        """Add one reach; returns the index of its pair."""
+        """Add one reach; return the index of its pair of state and target, which is new at the first try."""
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
         self._places = grown(self._places, place)
