@@ -41,7 +41,7 @@ def waypoint(part: str) -> str:
 
 
 def sim(verb: str) -> str:
-    """Return the key of a call to robot_sim about the simulation; `verb`: reset, pause, resume or place."""
+    """Return the key of a call to robot_sim about the simulation; `verb`: reset, pause, resume, place or pace."""
     return f"sim/rpc/{chunk(verb)}"
 
 
@@ -51,7 +51,7 @@ def world_rpc(verb: str) -> str:
 
 
 def service_rpc(who: str, verb: str) -> str:
-    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown."""
+    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown; of an agent also rest or go_on."""
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 
 

@@ -332,9 +332,29 @@ class Transition(Message, frozen=True, kw_only=True):
     s_next: Count
     reward: float  # 'Kail' divergence, nats; of a reaching agent 0, or the penalty of a failure
     value: float  # V(s) before the action
+    probability: Annotated[float, Meta(ge=0, le=1)]  # of s_next, as the agent believed before the action
     settled: bool
     duration: float  # s
     touched: list[Name]
+
+
+class Decision(Message, frozen=True, kw_only=True):
+    """The action that an agent begins, and what it expects of it."""
+
+    stream: ClassVar[Stream] = Stream("agents/{part}/decision", "NEWEST", writer="agents, at the start of an action", readers="monitor")
+
+    agent: Name
+    n: Count  # transitions the agent has observed
+    s: Count
+    a: Count
+    goal: Count  # intended state of the action
+    tries: Count  # of this state-action so far
+    reached: Annotated[float, Meta(ge=0, le=1)]  # believed probability of the goal
+    expected: Count  # most probable outcome
+    probability: Annotated[float, Meta(ge=0, le=1)]  # of that outcome
+    reward: float  # the last information gain of this state-action, nats
+    explorer: Text  # how the agent chooses actions
+    plan: list[Count]  # states that the agent expects to pass after this action, up to the state-action where it expects to learn most
 
 
 class Surprise(Struct, frozen=True, forbid_unknown_fields=True):

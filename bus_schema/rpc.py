@@ -73,6 +73,12 @@ class Place(Request, frozen=True, kw_only=True):
     position: Vector3  # m
 
 
+class Pace(Request, frozen=True, kw_only=True):
+    """Set the speed of a simulation in lockstep."""
+
+    speed: Annotated[float, Meta(ge=0, le=1000)]  # largest simulated time per real time; 0: as fast as the processes answer
+
+
 class AddObject(Request, frozen=True, kw_only=True):
     """Add an object to the model's world, or replace the one of the same name."""
 
@@ -236,11 +242,13 @@ CALLS = (
     Call("{service}/rpc/{verb}", ("pulse",), Empty, Pulse, "every service"),
     Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, "every service"),
     Call("{service}/rpc/{verb}", ("config",), Empty, Config, "every service"),
+    Call("{service}/rpc/{verb}", ("rest", "go_on"), Empty, Done, "agents"),
     Call("{part}/meta", (), Empty, PartMeta, "robot_sim"),
     Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, "robot_sim"),
     Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, "robot_sim"),
     Call("sim/rpc/{verb}", ("reset", "pause", "resume"), Empty, Done, "robot_sim"),
     Call("sim/rpc/{verb}", ("place",), Place, Done, "robot_sim"),
+    Call("sim/rpc/{verb}", ("pace",), Pace, Done, "robot_sim"),
     Call("estop/rpc/{verb}", ("reset",), Empty, Done, "robot_sim"),
     Call("{part}/rpc/{verb}", ("take",), Take, Taken, "controller"),
     Call("{part}/rpc/{verb}", ("release",), WithEpoch, Done, "controller"),

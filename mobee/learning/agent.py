@@ -128,9 +128,13 @@ class CuriousAgent(CuriousLearner):
 
         Raises ActionInterrupted if the plant does; nothing is stored then, and the next step measures again.
         """
-        action = self.decide(self.state)
+        self.decide(self.state)
+        return self.act()
+
+    def act(self) -> float:
+        """Perform the action just decided, and observe; returns the reward in nats, and raises as `step` does."""
         try:
-            outcome = self.plant.act(self.part, self.target(action))
+            outcome = self.plant.act(self.part, self.target(self._decided()[1]))
         except ActionInterrupted:
             self.interrupt()
             raise

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from bus_schema import VERSION, keys
+from bus_schema.messages import Decision
 from bus_schema.messages import Transition as TransitionMessage
+from bus_schema.rpc import Done, Empty
 from mobee import ActionInterrupted, CuriousAgent, ReachTarget
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
@@ -17,7 +20,7 @@ from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore, store_of
 from services.agents.config import Config
-from services.agents.streams import LearnedStream, ReachStream, publish_transition
+from services.agents.streams import LearnedStream, ReachStream, publish_decision, publish_transition
 from services.common.bus_plant import BusPlant
 from services.common.hands import hand_of
 from services.common.rate import NOT_MEASURED
@@ -25,11 +28,16 @@ from services.common.service import Service
 
 
 class Work:
-    """The main loop of an agent's process; counts the interruptions of the measurement under way."""
+    """The main loop of an agent's process; counts the interruptions of the measurement under way.
 
-    def __init__(self, service: Service, plant: BusPlant) -> None:
-        self._service, self._plant = service, plant
+    On request the agent rests: it gives its goal away, so that another client can move its part, until it is asked to go on.
+    """
+
+    def __init__(self, service: Service, plant: BusPlant, part: str) -> None:
+        self._service, self._plant, self._part = service, plant, part
         self.interrupted = 0
+        service.on_request(keys.service_rpc(service.who, "rest"), Empty, self._rest)
+        service.on_request(keys.service_rpc(service.who, "go_on"), Empty, self._go_on)
 
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
         """Run steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, else empty."""
@@ -43,8 +51,20 @@ class Work:
                 self.interrupted += 1
                 self._service.bus.event("warning", "interrupted", str(interruption))
             self._service.spin(time.monotonic())
+            while self._plant.idle():
+                continue
         if self._service.locked:
             self._plant.leave()
+
+    def _rest(self, request: Empty, key: str) -> Done:
+        """Release the goal at once: the action under way ends as interrupted, and is not learned from."""
+        self._plant.rest()
+        self._service.bus.event("info", "rests", f"{self._part}: its agent rests, as {request.who} asked")
+        return Done(v=VERSION)
+
+    def _go_on(self, request: Empty, key: str) -> Done:
+        self._plant.go_on()
+        return Done(v=VERSION)
 
 
 class AgentNode:
@@ -57,8 +77,9 @@ class AgentNode:
         continued = store_of(Path(config.continues)) if config.continues else None
         self._agent = CuriousAgent(config.space(robot), plant, settings=config.curious(), store=self._store, continues=continued)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
+        self._decisions = service.bus.publisher(Decision, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
-        self._work = Work(service, plant)
+        self._work = Work(service, plant, config.part)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 
@@ -69,18 +90,20 @@ class AgentNode:
         self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
 
     def _step(self) -> None:
-        state = self._agent.state
-        values, _ = self._agent.plan()
-        value = float(values[state])
-        self._agent.step()
-        made = self._agent.last
+        agent = self._agent
+        state = agent.state
+        value, action = float(agent.plan()[0][state]), agent.decide(state)
+        publish_decision(self._decisions, agent, state, action)
+        believed = agent.beliefs.probabilities[state, action].copy()
+        outcomes = agent.beliefs.outcomes[state, action].copy()
+        agent.act()
+        made = agent.last
         if made is None:
             return
         self._made += 1
         self._timeouts += not made.settled
         self._seconds += made.duration
-        publish_transition(self._stream, self._agent.space, made.n, made, value)
-        agent = self._agent
+        publish_transition(self._stream, agent.space, made.n, made, value, float(believed[outcomes == made.s_next].sum()))
         self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 
     def _mark(self) -> None:
@@ -115,7 +138,7 @@ class ReachNode:
             store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
         )
         self._stream = ReachStream(service.bus, self._agent)
-        self._work = Work(service, plant)
+        self._work = Work(service, plant, config.part)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 

@@ -9,14 +9,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bus_schema.messages import Learned, Surprise
+from bus_schema.messages import Decision, Learned, Surprise
 from bus_schema.messages import Transition as TransitionMessage
-from mobee import ReachTarget, TransitionModel
+from mobee import CuriousAgent, ReachTarget, TransitionModel
 from mobee.arrays import Array
 from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Step
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import OutcomeModel
 from mobee.store import Transition
 from services.common.bus import Bus, Publisher
 
@@ -24,8 +25,16 @@ PERIOD = 0.5  # s of wall-clock time between two `Learned` messages: in lockstep
 MAX_SURPRISES = 2000  # in one message
 
 
-def publish_transition(stream: Publisher[TransitionMessage], space: Space, n: int, made: Transition | Step, value: float) -> None:
-    """Publish a transition, the n-th of its agent; `value`: V(s) of the plan in which it was chosen."""
+LONGEST_PLAN = 12  # states of a plan that are published
+
+
+def publish_transition(
+    stream: Publisher[TransitionMessage], space: Space, n: int, made: Transition | Step, value: float, probability: float
+) -> None:
+    """Publish a transition, the n-th of its agent.
+
+    `value`: V(s) of the plan in which it was chosen.  `probability`: of its outcome, as it was believed before.
+    """
     stream.put(
         agent=space.part,
         n=n,
@@ -35,10 +44,57 @@ def publish_transition(stream: Publisher[TransitionMessage], space: Space, n: in
         s_next=made.s_next,
         reward=made.reward,
         value=value,
+        probability=probability,
         settled=made.settled,
         duration=made.duration,
         touched=list(made.touched),
     )
+
+
+def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
+    """Return the believed probability of an outcome; 0 for one that was never observed."""
+    return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
+
+
+def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: int, action: int) -> None:
+    """Publish the action that an agent begins."""
+    beliefs, goal = agent.beliefs, int(agent.space.goal(state, action))
+    expected, probability = _likeliest(beliefs, state, action)
+    stream.put(
+        agent=agent.part,
+        n=agent.transitions,
+        s=state,
+        a=action,
+        goal=goal,
+        tries=int(agent.model.tries[state, action]),
+        reached=probability_of(beliefs, state, action, goal),
+        expected=expected,
+        probability=probability,
+        reward=float(agent.model.reward[state, action]),
+        explorer=agent.explorer,
+        plan=planned_states(agent, expected),
+    )
+
+
+def planned_states(agent: CuriousAgent, state: int) -> list[int]:
+    """Return the states that an agent expects to pass from a state on, by its plan, until the reward there is the largest.
+
+    The first is `state`; at most LONGEST_PLAN states.
+    """
+    action_values, reward = agent.plan()[1], agent.model.reward
+    passed, rewards = [state], []
+    while len(passed) <= LONGEST_PLAN:
+        action = int(action_values[passed[-1]].argmax())
+        rewards.append(float(reward[passed[-1], action]))
+        passed.append(_likeliest(agent.beliefs, passed[-1], action)[0])
+    return passed[: int(np.argmax(rewards)) + 1]
+
+
+def _likeliest(beliefs: OutcomeModel, s: int, a: int) -> tuple[int, float]:
+    """Return the most probable outcome of a state-action, of equal ones the newest, and its probability."""
+    probabilities = beliefs.probabilities[s, a]
+    best = len(probabilities) - 1 - int(probabilities[::-1].argmax())
+    return int(beliefs.outcomes[s, a, best]), float(probabilities[best])
 
 
 class LearnedStream:
@@ -94,9 +150,10 @@ class ReachStream:
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
         """Publish a step towards a target; `plan`: values V (S,) and Q (S, A + 1) of the plan in which the step was chosen."""
         values, action_values = plan
+        believed = probability_of(self._seen, step.s, step.a, step.s_next) if step.a != REACH else 0.0
         self._note(step)
         if step.a != REACH:
-            publish_transition(self._transitions, self._agent.space, self._count, step, float(values[step.s]))
+            publish_transition(self._transitions, self._agent.space, self._count, step, float(values[step.s]), believed)
 
         def numbers() -> tuple[Array, Array]:
             value = action_values[:, :-1]

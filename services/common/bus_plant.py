@@ -167,6 +167,7 @@ class BusPlant:
         self._runs = 0
         self._participant = Participant(service)
         self._wanted: set[str] = set()  # parts that were measured
+        self._is_resting = False
         self._to_answer: int | None = None  # lockstep: the tick that waits for this service
         for part in parts:
             robot.part(part)
@@ -191,8 +192,10 @@ class BusPlant:
 
     def measure(self, part: str) -> Array:
         """Return the part's motor positions, (n_part,) rad, once the part is under control and its goal belongs to this service."""
+        self._require_awake(part)
         self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
+            self._require_awake(part)
             self._service.check_router()
             self._take(part)
             self._wait(lambda: self._owns(part) and self._is_free(part))
@@ -253,12 +256,35 @@ class BusPlant:
         if epoch is not None:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
 
+    def rest(self) -> None:
+        """Release all goals at once and take none until `go_on`; an action under way raises ActionInterrupted."""
+        self._is_resting = True
+        self._wanted.clear()
+        for part in list(self._epochs):
+            with suppress(CallFailed):  # lost already, or there is no controller
+                self.release(part)
+
+    def go_on(self) -> None:
+        """End the rest."""
+        self._is_resting = False
+
+    def idle(self) -> bool:
+        """Wait for a moment if this plant rests; returns whether it still does."""
+        if self._is_resting:
+            self._service.check_router()
+            self._wait(lambda: not self._is_resting)
+        return self._is_resting
+
     def leave(self) -> None:
         """Release all goals and, in lockstep, leave the participants."""
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()
         self._participant.done(self._service.bus.k, last=True)
+
+    def _require_awake(self, part: str) -> None:
+        if self._is_resting:
+            raise ActionInterrupted(f"{part}: this service rests")
 
     def _wait(self, enough: Callable[[], bool]) -> None:
         """Run handlers for a while, or until `enough` returns True; answer the tick before waiting."""

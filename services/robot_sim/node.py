@@ -11,7 +11,7 @@ from typing import Literal, NoReturn
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock
-from bus_schema.rpc import Done, Empty, PartMeta, Place
+from bus_schema.rpc import Done, Empty, Pace, PartMeta, Place
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common.emergency_stop import StopRecord
@@ -41,6 +41,7 @@ class Node:
         self._period = self._dt / config.speed  # s of real time a tick
         self._bus.run, self._bus.dt = _new_run(), self._dt_ns
         self._paused = False
+        self._pace = 0.0  # lockstep: s of real time that a simulated second takes at least
         self._guard = Guard(service, robot, backend, self._dt, StopRecord(Path(config.stop_record)) if config.stop_record else None)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
@@ -58,6 +59,7 @@ class Node:
         for verb, handler in (("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
             service.on_request(keys.sim(verb), Empty, handler)
         service.on_request(keys.sim("place"), Place, self._place)
+        service.on_request(keys.sim("pace"), Pace, self._set_pace)
         for part in robot.parts:
             service.on_request(keys.meta(part), Empty, self._meta)
 
@@ -91,8 +93,9 @@ class Node:
                 self._service.spin(now + IDLE_PERIOD)
             else:
                 self._tick_locked(lockstep)
-                if lockstep.is_degraded():
-                    self._service.spin(now + self._period)
+                wait = self._period if lockstep.is_degraded() else self._dt * self._pace
+                if wait:
+                    self._service.spin(now + wait)
 
     def _tick_locked(self, lockstep: Lockstep) -> None:
         begin = time.monotonic()
@@ -194,6 +197,12 @@ class Node:
         except MobeeError as error:
             raise CallRefused("object", str(error)) from None
         self._note_disturbance(f"{request.name} placed by {request.who}")
+        return Done(v=VERSION)
+
+    def _set_pace(self, request: Pace, key: str) -> Done:
+        if self._lockstep is None:
+            raise CallRefused("mode", 'the robot runs in real time; a pace can be set in lockstep only (shared.mode = "lock")')
+        self._pace = 1.0 / request.speed if request.speed > 0.0 else 0.0
         return Done(v=VERSION)
 
     def _note_disturbance(self, why: str) -> None:

@@ -70,7 +70,7 @@ def values(hint: Any, metas: tuple[Meta, ...] = ()) -> st.SearchStrategy[Any]:
         type(None): st.none(),
         bytes: st.binary(max_size=20),
         str: st.text(min_size=bound("min_length") or 0, max_size=min(bound("max_length") or 20, 64)),
-        float: st.floats(allow_nan=False, allow_infinity=False, min_value=1e-6 if bound("gt") == 0 else None, max_value=bound("le")),
+        float: st.floats(allow_nan=False, allow_infinity=False, min_value=1e-6 if bound("gt") == 0 else bound("ge"), max_value=bound("le")),
         int: st.integers(-(2**63) if bound("ge", "gt") is None else 1, bound("le") or 2**62),
     }
     return plain[hint]
