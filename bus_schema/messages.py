@@ -190,7 +190,10 @@ class Reach(Message, frozen=True, kw_only=True):
     """State of a part's reach."""
 
     stream: ClassVar[Stream] = Stream(
-        "{part}/reach", "CONTROL", writer="controller, at once after a change, during a reach up to 100 per second", readers="model, agents"
+        "{part}/reach",
+        "CONTROL",
+        writer="controller, at once after a change, during a reach up to 100 per second",
+        readers="model, agents, monitor",
     )
 
     action_id: Text  # as in Motion
@@ -399,7 +402,7 @@ class EStop(Message, frozen=True, kw_only=True):
         "estop",
         "STOP",
         writer="any client; robot_sim repeats it while it is latched (LATEST), launcher and controller until then",
-        readers="robot_sim, controller, port_filter, launcher",
+        readers="robot_sim, controller, port_filter, launcher, monitor",
     )
 
     set: bool

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Take the picture of the running system: start the default scenario, open its page in headless Chromium, take a screenshot.
+"""Take the picture of the running system: start a scenario, open its page in headless Chromium, take a screenshot.
 
-`python -m experiments.live_picture` writes docs/figures/live.png in about a minute and a half, with `--page learning` that of the
-tab of the agents' models.  Chromium renders in software here and would take the robot's time: it runs at the lowest priority and on
-one core (2 cores suffice for both).
+`python -m experiments.live_picture` writes docs/figures/live.png in about two minutes.  Chromium draws the 3D view in software here and
+would take the robot's time: it runs at the lowest priority and on one core (2 cores suffice for both).
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import signal
 import socket
@@ -20,6 +20,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser")
 DRAW_IN_SOFTWARE = (
@@ -28,13 +29,16 @@ DRAW_IN_SOFTWARE = (
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--ignore-gpu-blocklist",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
 )
-SIZE = (1280, 800)  # pixels
-MIN_BYTES = {"robot": 120_000, "learning": 50_000}  # of a picture of that size; a page without a scene needs less
-START_TIMEOUT = 60.0  # s for the system to start
-SCENE_TIMEOUT = 120.0  # s for the first picture with a scene
-POLL_PERIOD = 1.0  # s
+SIZE = (1280, 720)  # pixels
+START_TIMEOUT = 120.0  # s for the system to start
+SCENE_TIMEOUT = 180.0  # s for the first picture of the 3D view
+POLL_PERIOD = 0.5  # s
 FIGURES = Path(__file__).parents[1] / "docs" / "figures"
+IS_DRAWN = "document.querySelector('#loading').hidden && Boolean(document.querySelector('.card .now'))"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -45,11 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("live picture: no Chromium. Install it: apt-get install chromium", file=sys.stderr)
         return 1
     options.out.mkdir(parents=True, exist_ok=True)
-    settings = [f"services.monitor.page={options.page}", *options.set]
-    with _attached(options.url) if options.url else _launched(options.scenario, settings) as url:
+    with _attached(options.url) if options.url else _launched(options.scenario, options.set) as url:
         lower_priority()
-        drawn = options.drawn or MIN_BYTES[options.page]
-        for path in take(url, chromium, options.out, drawn, options.size, options.shots, options.gap, options.warm_up):
+        for path in take(url, chromium, options.out, options.size, options.shots, options.gap, options.warm_up):
             print(path)
     return 0
 
@@ -59,9 +61,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--url", default="", help="address of the page of a system that runs already")
     parser.add_argument("--scenario", default="default", help="the scenario to start otherwise")
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", help="change a setting of the scenario")
-    parser.add_argument("--page", choices=MIN_BYTES, default="robot", help="the tab that is open (default: robot)")
-    parser.add_argument("--size", type=int, nargs=2, default=SIZE, metavar=("WIDTH", "HEIGHT"), help="pixels (default: 1280 800)")
-    parser.add_argument("--drawn", type=int, metavar="BYTES", help="smallest size of a picture with a scene")
+    parser.add_argument("--size", type=int, nargs=2, default=SIZE, metavar=("WIDTH", "HEIGHT"), help="pixels (default: 1280 720)")
     parser.add_argument("--shots", type=int, default=1)
     parser.add_argument("--gap", type=float, default=10.0, help="s between two shots")
     parser.add_argument("--warm-up", type=float, default=45.0, help="s from the first picture to the first shot")
@@ -80,19 +80,15 @@ def lower_priority() -> None:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def take(url: str, chromium: str, folder: Path, drawn: int, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
-    """Yield screenshots of the page at `url`, `gap` seconds apart, after the first that has `drawn` bytes."""
+def take(url: str, chromium: str, folder: Path, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
+    """Yield screenshots of the page at `url`, `gap` seconds apart, `warm_up` seconds after the 3D view shows the robot."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=list(DRAW_IN_SOFTWARE))
         page = browser.new_page(viewport={"width": size[0], "height": size[1]}, color_scheme="dark")
-        page.goto(f"{url}&renderer=webgl")
-        give_up = time.monotonic() + SCENE_TIMEOUT
-        while len(page.screenshot(timeout=0)) < drawn:
-            if time.monotonic() > give_up:
-                raise SystemExit(f"live picture: the page at {url} drew no scene within {SCENE_TIMEOUT:g} s")
-            time.sleep(POLL_PERIOD)
+        page.goto(url)
+        _wait_until_drawn(page, url)
         time.sleep(warm_up)
         for shot in range(1, shots + 1):
             path = folder / ("live.png" if shots == 1 else f"live-{shot}.png")
@@ -103,6 +99,14 @@ def take(url: str, chromium: str, folder: Path, drawn: int, size: Sequence[int],
         browser.close()
 
 
+def _wait_until_drawn(page: Any, url: str) -> None:
+    give_up = time.monotonic() + SCENE_TIMEOUT
+    while not page.evaluate(IS_DRAWN):
+        if time.monotonic() > give_up:
+            raise SystemExit(f"live picture: the page at {url} drew no scene within {SCENE_TIMEOUT:g} s")
+        time.sleep(POLL_PERIOD)
+
+
 @contextmanager
 def _attached(url: str) -> Iterator[str]:
     yield url
@@ -111,29 +115,30 @@ def _attached(url: str) -> Iterator[str]:
 @contextmanager
 def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
     """Start a system on free ports, yield the address of its page, and stop the system as by Ctrl-C."""
-    router, web, grpc = free_ports(3)
+    router, web = free_ports(2)
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "mobee_system", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
-        for setting in (f"services.monitor.web_port={web}", f"services.monitor.grpc_port={grpc}", *settings):
+        for setting in (f"services.monitor.web_port={web}", *settings):
             command += ["--set", setting]
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True) as launcher:
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True) as launcher:
             try:
-                _wait_for(web, launcher)
-                yield f"http://127.0.0.1:{web}/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{grpc}%2Fproxy"
+                yield _address(launcher)
             finally:
                 launcher.send_signal(signal.SIGINT)
-                launcher.wait(30.0)
+                launcher.communicate(timeout=60.0)
 
 
-def _wait_for(port: int, launcher: subprocess.Popen[bytes]) -> None:
+def _address(launcher: subprocess.Popen[str]) -> str:
+    """The address of the page, with its key, from what the launcher prints."""
     give_up = time.monotonic() + START_TIMEOUT
-    while True:
-        with socket.socket() as probe:
-            if probe.connect_ex(("127.0.0.1", port)) == 0:
-                return
-        if launcher.poll() is not None or time.monotonic() > give_up:
-            raise SystemExit("live picture: the system did not start")
-        time.sleep(0.2)
+    assert launcher.stderr is not None
+    for line in launcher.stderr:
+        found = re.search(r"http://127\.0\.0\.1:\S+", line)
+        if found:
+            return found[0]
+        if time.monotonic() > give_up:
+            break
+    raise SystemExit("live picture: the system did not start")
 
 
 def free_ports(count: int) -> list[int]:

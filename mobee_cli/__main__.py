@@ -37,6 +37,7 @@ VERBS = {
     "doctor": "check this machine and installation, and name what mends them",
     "completion": "print the script with which a shell completes this command",
     "conform": "test a robot_sim of your own against the contract of the bus",
+    "replay": "show the page of a run again, with a time line",
 }
 
 EXTRAS = {

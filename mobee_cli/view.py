@@ -57,7 +57,7 @@ def require_recording(save: Path | None) -> None:
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None) -> int:
     """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges."""
     try:
-        from services.monitor.view import view  # needs the viewer, which is an extra
+        from services.monitor.viewer.view import view  # needs the viewer, which is an extra
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "rerun":
             raise

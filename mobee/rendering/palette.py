@@ -37,6 +37,16 @@ def colors_of(parts: Collection[str]) -> dict[str, Color]:
     return dict(zip(list(parts)[:SHOWN_PARTS], PARTS.values(), strict=False))
 
 
+MORE_PARTS: tuple[Color, ...] = ((124, 214, 150), (178, 150, 255), (240, 150, 90), (120, 200, 200), (210, 200, 120))
+
+
+def colors_of_all(parts: Collection[str]) -> dict[str, Color]:
+    """All parts with their colours: those of `colors_of`, then others in turn."""
+    known = colors_of(parts)
+    rest = [part for part in parts if part not in known]
+    return {part: known[part] if part in known else MORE_PARTS[rest.index(part) % len(MORE_PARTS)] for part in parts}
+
+
 def faded(color: Color, share: float) -> Color:
     """Return the colour, mixed with the dark background; `share`: of the colour, 0 to 1."""
     red, green, blue = (round(share * channel) for channel in color)

@@ -20,7 +20,7 @@ from mobee_cli.view import require_recording, show
 from services.common.exit_codes import BAD_INPUT
 
 if TYPE_CHECKING:
-    from services.monitor.view import Stretch
+    from services.monitor.viewer.view import Stretch
 
 DESCRIPTION = "Describe a roadmap, and draw the positions of a marker in all its poses."
 NOTES = """The picture shows the robot in the middle pose of the map, and a point for each
@@ -92,7 +92,7 @@ TOUR_PLACES = 8
 
 def tour(trm: Roadmap, places: int = TOUR_PLACES) -> list[Stretch]:
     """Return paths between places far apart in the largest part of the map, one after the other, from its middle."""
-    from services.monitor.view import RATE, Stretch  # imports rerun
+    from services.monitor.viewer.view import RATE, Stretch  # imports rerun
 
     inside = np.flatnonzero(trm.graph.components == 0)
     y = trm.y[inside] / trm.spacing

@@ -93,6 +93,8 @@ class AgentNode:
         agent = self._agent
         state = agent.state
         value, action = float(agent.plan()[0][state]), agent.decide(state)
+        if not self._made:
+            self._publish_learned()
         publish_decision(self._decisions, agent, state, action)
         believed = agent.beliefs.probabilities[state, action].copy()
         outcomes = agent.beliefs.outcomes[state, action].copy()
@@ -104,6 +106,10 @@ class AgentNode:
         self._timeouts += not made.settled
         self._seconds += made.duration
         publish_transition(self._stream, agent.space, made.n, made, value, float(believed[outcomes == made.s_next].sum()))
+        self._publish_learned()
+
+    def _publish_learned(self) -> None:
+        agent = self._agent
         self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 
     def _mark(self) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor: a page on loopback and a recording, made from what is published on the bus.
+"""The monitor: a page on loopback that tells what the robot does, from which people can act on it; and a recording.
 
-Reads: clock, {part}/state, {part}/motion, model/forces, controller/forces, model/contacts, world/*, vision/image/{left,right},
-agents/*/{transition,learned}, event/*, alive/*/*; asks model/rpc/world/list.
-Writes: event/monitor; nothing that another service acts on.
+Reads: clock, {part}/state, {part}/motion, {part}/reach, model/forces, controller/forces, model/contacts, world/*,
+vision/image/{left,right}, agents/*/{decision,transition,learned}, event/*, estop, alive/*/*; asks model/rpc/world/list.
+Writes: event/monitor.  When a person asks for it on the page: estop, and calls of robot_sim, controller, model and agents (controls.py).
 """

@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.service import Service
-from services.monitor.blueprint import blueprint, shown_of
 from services.monitor.config import Config
 from services.monitor.node import MonitorNode
-from services.monitor.output import open_output, recording_of
+from services.monitor.viewer.blueprint import blueprint, shown_of
+from services.monitor.viewer.output import open_output
+
+LAST_WORDS = 0.4  # s in which open pages learn that the system has ended
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -19,13 +22,19 @@ def main(argv: Sequence[str] | None = None) -> None:
     config = load_config(Config, argv, "services.monitor")
     with explained("services.monitor"):
         robot = robot_of(config)
+        nodes: list[MonitorNode] = []
         with (
-            open_output(config, blueprint(shown_of(robot), config.page), recording_of(config)) as output,
+            open_output(config, blueprint(shown_of(robot)), lambda: nodes[0].now if nodes else 0.0) as output,
             Service("monitor", config, robot) as service,
         ):
-            MonitorNode(service, config, robot, output)
+            nodes.append(MonitorNode(service, config, robot, output))
             service.ready()
-            service.run()
+            try:
+                service.run()
+            finally:
+                nodes[0].end()
+                if output.server is not None and output.server.site.pages.open():
+                    time.sleep(LAST_WORDS)
 
 
 if __name__ == "__main__":

@@ -21,15 +21,9 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Address the page is served at; every interface only inside a container whose ports are published on loopback."""
     web_port: Port = 9090
     """Port of the page."""
-    grpc_port: Port = 9876
-    """Port of the page's data."""
     run_dir: str = ""
-    """Folder for recording.rrd; empty: no recording."""
-    page: Literal["robot", "learning"] = "robot"
-    """The tab that is open at first."""
+    """Folder for recording.rrd and story.jsonl; empty: no recording."""
     rate: Annotated[float, Meta(ge=1, le=20)] = 20.0
     """Updates of the robot a second."""
     image_rate: Annotated[float, Meta(gt=0, le=10)] = 2.0
     """Eye pictures shown a second."""
-    memory_limit: Annotated[str, Meta(pattern=r"^[0-9]+(MB|GB)$")] = "300MB"
-    """Memory of the page's server for data that late viewers get."""

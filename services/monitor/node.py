@@ -1,32 +1,58 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the monitor: the newest message of every stream, twenty times a second, to a page and a file."""
+"""Runs the monitor: the newest message of every stream, twenty times a second, to the page and to files."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
 from bus_schema import keys
-from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Image, Learned, Motion, Transition, WorldObject
+from bus_schema.messages import (
+    Clock,
+    ContactItem,
+    Contacts,
+    Decision,
+    EStop,
+    Event,
+    Forces,
+    Image,
+    Learned,
+    Motion,
+    Reach,
+    Transition,
+    WorldObject,
+)
 from bus_schema.rpc import World
-from mobee.rendering.palette import colors_of
+from mobee.rendering.palette import colors_of_all
 from mobee.robot.robot import Robot
 from services.common.body import Body
-from services.common.exit_codes import FAILED
 from services.common.rate import Percentiles, Rate
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.monitor.blueprint import TIMELINE
+from services.common.worlds import AT_TABLE
 from services.monitor.config import Config
-from services.monitor.learning import Learning
-from services.monitor.output import Output
-from services.monitor.plots import Plots
-from services.monitor.scene import Poses, Scene
+from services.monitor.controls import Known, PageControls
+from services.monitor.status import STALE, Seen, banner
+from services.monitor.story.teller import Teller
+from services.monitor.story.words import joint_words, title_of
+from services.monitor.viewer.blueprint import TIMELINE
+from services.monitor.viewer.learning import Learning
+from services.monitor.viewer.output import Output
+from services.monitor.viewer.plots import Plots
+from services.monitor.viewer.scene import Poses, Scene
+from services.monitor.web.body import contacts_of, look, shapes_of, thing
 
 WORLD_PERIOD = 1.0  # s between two requests for the model's world
+BODY_PERIOD = 0.1  # s between two poses of the page's own picture of the body
+STORY_PERIOD = 0.25  # s between two looks at the story and the state
+RECORD_PERIOD = 0.2  # s between two poses in the record of the page
+SHOWN_EVENTS = 60
+STOP_REPEATED = 2.0  # s after the last message of an emergency stop, which robot_sim repeats, for which it counts as set
 JPEG_QUALITY = 85
 LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
@@ -35,59 +61,154 @@ class MonitorNode:
     """Shows the newest messages at its own rate; those between are not shown."""
 
     def __init__(self, service: Service, config: Config, robot: Robot, output: Output) -> None:
-        self._service, self._output, self._stream = service, output, output.stream
+        self._service, self._output, self._robot = service, output, robot
+        self._stream, self._board = output.frames, output.board
+        self._colors = colors_of_all(robot.parts)
         bus = service.bus
         self._body = Body(bus, robot)
-        self._motions = {part: bus.latest(Motion, part) for part in colors_of(robot.parts)}
+        self._motions = {part: bus.latest(Motion, part) for part in robot.parts}
+        self._reaches = {part: bus.latest(Reach, part) for part in robot.parts}
         self._forces = [bus.latest(Forces, source) for source in ("model", "controller")]
         self._contacts = bus.latest(Contacts)
         self._images = {eye: bus.latest(Image, eye) for eye in keys.EYES}
         self._touching: list[ContactItem] = []
+        self._recorded: list[dict[str, Any]] = []  # contacts
         self._offset = self._last = 0.0  # s: runs are shown one after the other
         self._time = Percentiles()
+        self._teller, self._known = Teller(robot, self._colors), Known()
+        self._seen = Seen(patience=STALE + (config.patience if service.locked else 0.0))
+        self._ticked: float | None = None  # monotonic clock
+        self._stop: tuple[float, EStop] | None = None  # with the monotonic clock of the newest
+        self._held_since: dict[str, float] = {}  # monotonic clock
+        self._why_held: dict[str, str] = {}
+        self._events: deque[dict[str, Any]] = deque(maxlen=SHOWN_EVENTS)
         self._mark()
         self._set_time()
         self._scene, self._plots = Scene(self._stream, robot), Plots(self._stream, robot)
         self._learning, self._poses = Learning(self._stream, robot), Poses(self._stream, robot)
+        self._board.put("robot", self._described())
+        output.controls.real = PageControls(service, robot, self._known, self._board, self._scene.show_fields)
+        self._subscribe()
+        self._rate = Rate(1.0 / config.rate)
+        self._repeat(self._rate, self._show_robot)
+        for period, show in (
+            (1.0 / config.image_rate, self._show_images),
+            (WORLD_PERIOD, self._ask_world),
+            (BODY_PERIOD, self._show_body),
+            (STORY_PERIOD, self._show_story),
+            (RECORD_PERIOD, self._record_pose),
+        ):
+            self._repeat(Rate(period), show)
+
+    def _subscribe(self) -> None:
+        service = self._service
         service.mark, service.describe = self._mark, self._describe
         service.on_run(self._new_run)
         service.on_clock(self._note_clock)
         service.on_alive(self._note_alive)
         service.on_each(WorldObject, self._show_object)
+        service.on_each(Decision, self._teller.note_decision, history=True)
         service.on_each(Transition, self._show_transition)
         service.on_each(Learned, self._show_learned, history=True)
         service.on_each(Event, self._show_event, history=True, any_run=True)
-        self._rate, self._image_rate, self._world_rate = Rate(1.0 / config.rate), Rate(1.0 / config.image_rate), Rate(WORLD_PERIOD)
-        for rate, look in ((self._rate, self._show_robot), (self._image_rate, self._show_images), (self._world_rate, self._ask_world)):
-            self._repeat(rate, look)
+        service.on_each(EStop, self._note_stop, any_run=True)
 
-    def _repeat(self, rate: Rate, look: Callable[[], None]) -> None:
+    def _described(self) -> dict[str, Any]:
+        """What the page must know of the robot once."""
+        robot = self._robot
+        parts = [
+            {
+                "name": name,
+                "title": title_of(name),
+                "color": list(self._colors[name]),
+                "motors": [
+                    {"name": joint_words(motor, name), "low": float(low), "high": float(high)}
+                    for motor, (low, high) in zip(part.motors, robot.limits[part.slice], strict=True)
+                ],
+            }
+            for name, part in robot.parts.items()
+        ]
+        shapes = shapes_of(robot, self._colors)
+        about = {"icub": robot.name in AT_TABLE, "lockstep": self._service.locked, "monitor": self._service.instance}
+        return {"name": robot.name, "parts": parts, "shapes": shapes, **about}
+
+    def _repeat(self, rate: Rate, look_: Callable[[], None]) -> None:
         def turn() -> None:
-            look()
+            look_()
             self._service.inbox.at(rate.next(), turn)
 
         self._service.inbox.at(rate.next(), turn)
 
+    # What is shown regularly
+
     def _show_robot(self) -> None:
-        """Show robot, contacts and plots."""
+        """Show robot, contacts and plots in the 3D view."""
         begin = time.perf_counter()
-        self._check_page()
         self._set_time()
-        contacts = self._contacts.take()
-        if contacts is not None:
-            self._touching = contacts.contacts
+        self._take_states()
+        self._stream.begin_look()
         if self._body.update():
             self._scene.log_robot(self._body.q(), self._touching)
-        for part, stream in self._motions.items():
-            motion = stream.take()
-            if motion is not None:
-                self._plots.log_motion(part, motion)
+        for part, motion in self._known.motions.items():
+            self._plots.log_motion(part, motion)
         for said in self._forces:
             forces = said.take()
             if forces is not None:
                 self._plots.log_forces(forces)
+        self._stream.end_look()
         self._looks += 1
         self._time.add(1e3 * (time.perf_counter() - begin))
+
+    def _take_states(self) -> None:
+        contacts = self._contacts.take()
+        if contacts is not None:
+            self._touching = contacts.contacts
+        for part, stream in self._motions.items():
+            motion = stream.take()
+            if motion is not None:
+                self._known.motions[part] = motion
+        for part, reaching in self._reaches.items():
+            reach = reaching.take()
+            if reach is not None:
+                self._known.reaches[part] = reach
+                self._teller.note_reach(part, reach)
+        self._known.gates = {part: state.gate for part, state in self._body.states.items()}
+
+    def _show_body(self) -> None:
+        server = self._output.server
+        if server is not None and server.site.pages.open() and len(self._body.states) == len(self._robot.parts):
+            q = self._body.q()
+            seen = look(self._robot, q, self._touching)
+            self._board.put("body", {"t": round(self._last, 3), "q": np.round(q, 4).tolist(), **seen})
+
+    def _record_pose(self) -> None:
+        if self._output.record is not None and len(self._body.states) == len(self._robot.parts):
+            q = self._body.q()
+            self._board.record("q", np.round(q, 4).tolist())
+            contacts = contacts_of(self._touching)
+            if contacts != self._recorded:
+                self._recorded = contacts
+                self._board.record("contacts", contacts)
+
+    def _show_story(self) -> None:
+        for name, value in self._teller.values().items():
+            self._board.put(name, value)
+        self._board.put("status", self._status())
+        if self._output.record is not None:
+            self._output.record.flush()
+
+    def _status(self) -> dict[str, Any]:
+        now, seen = time.monotonic(), self._seen
+        seen.clock_age = None if self._ticked is None else now - self._ticked
+        seen.gates, seen.why_held, seen.services = self._known.gates, self._why_held, set(self._service.alive)
+        held = {part for part, motion in self._known.motions.items() if motion.status == "held"}
+        self._held_since = {part: self._held_since.get(part, now) for part in held}
+        seen.held_for = {part: now - since for part, since in self._held_since.items()}
+        seen.stop = None if self._stop is None or now - self._stop[0] > STOP_REPEATED else self._stop[1]
+        said = banner(seen)
+        agents = sorted(title_of(who.removeprefix("agent_")) for who in seen.services if who.startswith("agent_"))
+        services = sorted(seen.services)
+        return {"banner": said, "mode": seen.mode, "time": round(self._last, 1), "agents": agents, "services": services}
 
     def _show_images(self) -> None:
         """Show the newest pictures of the eyes."""
@@ -104,47 +225,76 @@ class MonitorNode:
     def _note_world(self, answer: World | CallFailed) -> None:
         if isinstance(answer, World):
             self._scene.set_objects(answer.objects)
+            self._known.objects = {one.name: one for one in answer.objects}
+            self._show_things()
+
+    def _show_things(self) -> None:
+        self._board.put("objects", [thing(one) for one in self._known.objects.values()])
+
+    # What is shown when it happens
 
     def _show_object(self, seen: WorldObject) -> None:
         self._scene.log_object(seen)
 
     def _show_transition(self, seen: Transition) -> None:
-        part = seen.agent.removeprefix("agent_")
-        if part in self._motions:
-            self._plots.log_transition(part, seen)
-            self._learning.log_step(part, seen)
-            if self._body.update():
-                self._poses.note(self._body.q())
-            self._transitions += 1
+        part = seen.agent
+        if part not in self._robot.parts:
+            return
+        self._teller.note_transition(seen)
+        self._plots.log_transition(part, seen)
+        self._learning.log_step(part, seen)
+        if self._body.update():
+            self._poses.note(self._body.q())
+        self._transitions += 1
 
     def _show_learned(self, learned: Learned) -> None:
-        if learned.agent in self._motions:
+        if learned.agent in self._robot.parts:
+            self._teller.note_learned(learned)
             self._learning.log(learned.agent, learned)
 
     def _show_event(self, event: Event) -> None:
+        if event.code == "held":
+            part, _, why = event.text.partition(" holds: ")
+            self._why_held[part] = why
         self._stream.log("events", rr.TextLog(f"{event.src}: {event.text}", level=LEVELS[event.level]))
+        self._tell(event.level, event.src, event.text)
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         self._stream.log("events", rr.TextLog(f"{who} {'is up' if up else 'is gone'}", level="INFO" if up else "WARN"))
+        self._tell("info" if up else "warning", who, "is up" if up else "is gone")
+
+    def _tell(self, level: str, who: str, text: str) -> None:
+        self._events.append({"t": round(self._last, 1), "level": level, "who": who, "text": text[:300]})
+        self._board.put("events", list(self._events))
+
+    def _note_stop(self, stop: EStop) -> None:
+        self._stop = (time.monotonic(), stop) if stop.set else None
 
     def _note_clock(self, clock: Clock) -> None:
         self._last = max(self._last, self._offset + 1e-9 * clock.t)
+        self._ticked, self._seen.mode = time.monotonic(), clock.mode
 
     def _new_run(self) -> None:
         self._offset = self._last
         self._body.forget()
         self._scene.forget()
+        self._teller.forget_run()
+
+    def end(self) -> None:
+        """Give parts back, and let the open pages say that the system has ended."""
+        controls = self._output.controls.real
+        if isinstance(controls, PageControls):
+            controls.give_all_back()
+        self._seen.ended = True
+        self._board.put("status", self._status())
+
+    @property
+    def now(self) -> float:
+        """The robot's time, s, since the first run that was seen."""
+        return self._last
 
     def _set_time(self) -> None:
-        self._stream.set_time(TIMELINE, duration=self._last)
-
-    def _check_page(self) -> None:
-        page = self._output.page
-        if page is not None and page.poll() is not None:
-            self._service.log.error(
-                "the server of the page ended with code %s: the monitor ends too, and is started again", page.returncode
-            )
-            raise SystemExit(FAILED)
+        self._stream.set_time(TIMELINE, self._last)
 
     def _mark(self) -> None:
         self._looks = self._transitions = 0
@@ -158,4 +308,7 @@ class MonitorNode:
             "look_ms_p50": self._time.at(50),
             "look_ms_p99": self._time.at(99),
         }
+        server = self._output.server
+        if server is not None:
+            numbers["pages"] = len(server.site.pages.open())
         return self._output.url or "recording only", numbers

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import pytest
 
-import services.monitor.view
+import services.monitor.viewer.view
 from mobee_cli import bench, check, roadmap, robots, topic
 from mobee_cli.__main__ import VERBS, main
 from tests.services.launcher.launched import mobee
@@ -93,7 +93,7 @@ def test_ctrl_c_is_how_to_end_what_has_no_end(arguments: list[str], code: int, m
 
 
 def test_ctrl_c_ends_a_page_but_breaks_off_a_recording(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(services.monitor.view, "view", interrupt)
+    monkeypatch.setattr(services.monitor.viewer.view, "view", interrupt)
     assert main(["view", "katana"]) == 0
     assert main(["view", "katana", "--save", str(tmp_path / "katana.rrd")]) == 130
 

@@ -17,7 +17,7 @@ from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.urdf_files import arm_with
 
 pytest.importorskip("rerun")
-from services.monitor.page import program
+from services.monitor.viewer.files import program
 
 BALL = '<World><sphere name="ball" radius="0.03" px="-0.37" pz="0.1"/></World>'
 
@@ -38,7 +38,7 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mobee_cli", "view", str(robot)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as shown:
         assert shown.stdout and shown.stderr
-        told = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/\?url=\S+)\n", shown.stdout.readline())
+        told = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/viewer\.html\?recording=view\.rrd)\n", shown.stdout.readline())
         assert told
         with urllib.request.urlopen(told[1], timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()

@@ -21,7 +21,7 @@ STOPPED = 0.01  # rad/s
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Watcher]]:
-    settings = [f"services.monitor.web_port={free_port()}", f"services.monitor.grpc_port={free_port()}"]
+    settings = [f"services.monitor.web_port={free_port()}"]
     with running(tmp_path_factory.mktemp("kill"), "default", *settings, headless=False) as pair:
         yield pair
 

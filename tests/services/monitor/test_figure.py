@@ -13,7 +13,7 @@ from tests.mobee.check.arm import arm
 
 rr = pytest.importorskip("rerun")
 from mobee.rendering import palette  # noqa: E402  # only where Rerun is
-from services.monitor.figure import Figure  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.figure import Figure  # noqa: E402  # only where Rerun is
 
 
 class Notebook:

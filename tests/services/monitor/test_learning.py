@@ -18,8 +18,8 @@ from services.agents.streams import surprises
 from tests.services.robots import ARM as OWN
 
 rr = pytest.importorskip("rerun")
-from services.monitor.learning import MAX_DRAWN, Learning  # noqa: E402  # only where Rerun is
-from services.monitor.scene import Poses  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.learning import MAX_DRAWN, Learning  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.scene import Poses  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]
@@ -38,7 +38,19 @@ class Notebook:
 
 HEADER = {"v": VERSION, "run": "r", "src": "agent_left_arm", "seq": 0, "k": 0, "t": 0, "tw": 0}
 STEP = Transition(
-    **HEADER, agent="left_arm", n=1, s=0, a=0, goal=1, s_next=1, reward=0.1, value=0.1, settled=True, duration=1.0, touched=[]
+    **HEADER,
+    agent="left_arm",
+    n=1,
+    s=0,
+    a=0,
+    goal=1,
+    s_next=1,
+    reward=0.1,
+    value=0.1,
+    probability=0.5,
+    settled=True,
+    duration=1.0,
+    touched=[],
 )
 
 

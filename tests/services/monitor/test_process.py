@@ -28,10 +28,10 @@ from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
 from mobee.rendering import palette  # noqa: E402  # only where Rerun is
-from services.monitor.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
-from services.monitor.page import program  # noqa: E402  # only where Rerun is
-from services.monitor.plots import Plots  # noqa: E402  # only where Rerun is
-from services.monitor.scene import Scene  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.files import program  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.plots import Plots  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.scene import Scene  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)
@@ -45,21 +45,11 @@ def stage(free_port: int) -> Iterator[Stage]:
 
 
 @pytest.fixture
-def ports() -> tuple[int, int]:
-    """Two free ports of loopback."""
-    with socket.socket() as first, socket.socket() as second:
-        for probe in (first, second):
-            probe.bind(("127.0.0.1", 0))
-        return first.getsockname()[1], second.getsockname()[1]
-
-
-def flags(ports: tuple[int, int]) -> list[str]:
-    return ["--web-port", str(ports[0]), "--grpc-port", str(ports[1])]
-
-
-def page_of(monitor: subprocess.Popen[str]) -> psutil.Process:
-    (page,) = psutil.Process(monitor.pid).children()
-    return page
+def web_port() -> int:
+    """A free port of loopback."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 class Notebook:
@@ -215,7 +205,7 @@ def whole_chain(stage: Stage) -> Callable[[], None]:
             stream.put(eye=eye, k_capture=stage.k, width=16, height=12, encoding="rgb8", data=bytes(16 * 12 * 3))
         for part, stream in transitions.items():
             counts = {"n": 1, "s": 0, "a": 0, "goal": 1, "s_next": 1}
-            stream.put(agent=part, **counts, reward=0.5, value=1.0, settled=True, duration=4.0, touched=[])
+            stream.put(agent=part, **counts, reward=0.5, value=1.0, probability=0.5, settled=True, duration=4.0, touched=[])
         pose = {"position": [-0.35, 0.0, -0.07], "quaternion": [1.0, 0.0, 0.0, 0.0], "covariance": [0.0] * 9}
         ball.put(name="ball", geometry=Geometry("sphere", [0.03]), **pose, role="target", t_capture=0, valid_until=10**12)
         events.put(level="warning", code="note", text="hello", values={})
@@ -247,57 +237,58 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
     assert any("mesh/l_hand/visual" in path or "l_hand" in path and "visual" in path for path in shown)
 
 
-def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published(stage: Stage, ports: tuple[int, int]) -> None:
+def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published(stage: Stage, web_port: int) -> None:
     heard: set[str] = set()
-    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
+    with stage.running("services.monitor", "monitor", "--web-port", str(web_port)) as monitor:
         watch = stage.session.declare_subscriber("**", lambda sample: heard.add(str(sample.key_expr)))
         assert stage.play(DOWN, lambda: stage.k > 100)
-        with urllib.request.urlopen(f"http://127.0.0.1:{ports[0]}/", timeout=30.0) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{web_port}/", timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()
-        listening = {c.laddr for c in page_of(monitor).net_connections("tcp") if c.status == psutil.CONN_LISTEN}
-        assert {address.port for address in listening} == set(ports)
-        assert {address.ip for address in listening} == {"127.0.0.1"}
         own = [c for c in psutil.Process(monitor.pid).net_connections("tcp") if c.status == psutil.CONN_LISTEN]
-        assert own == []
+        assert {(c.laddr.ip, c.laddr.port) for c in own} == {("127.0.0.1", web_port)}
         watch.undeclare()
     others = {Clock.stream.key(), Truth.stream.key()} | {State.stream.key(part) for part in ROBOT.parts}
     assert heard - others <= {Event.stream.key("monitor")}
 
 
-def test_a_frozen_page_does_not_stop_the_monitor(stage: Stage, ports: tuple[int, int]) -> None:
-    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
-        page = page_of(monitor)
+def test_browsers_that_do_not_read_do_not_stop_the_monitor(stage: Stage, web_port: int) -> None:
+    with stage.running("services.monitor", "monitor", "--web-port", str(web_port)) as monitor:
         assert stage.play(DOWN, lambda: stage.k > 50)
-        page.suspend()
+        deaf = []
+        for path in ("/frame?after=0", "/news?after=0&page=a", "/frame?after=0", "/news?after=0&page=b"):
+            deaf.append(socket.create_connection(("127.0.0.1", web_port)))
+            deaf[-1].sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
         try:
+            assert stage.play(DOWN, lambda: stage.k > 150, 30.0)
             before, memory = stage.stat("monitor").numbers["looks"], psutil.Process(monitor.pid).memory_info().rss
-            assert stage.play(DOWN, lambda: stage.k > 450, 30.0)
+            assert stage.play(DOWN, lambda: stage.k > 550, 30.0)
             assert stage.stat("monitor").numbers["looks"] - before > 20
             assert psutil.Process(monitor.pid).memory_info().rss - memory < 50_000_000
         finally:
-            page.resume()
+            for one in deaf:
+                one.close()
 
 
-def test_page_and_monitor_end_together(stage: Stage, ports: tuple[int, int]) -> None:
-    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:
-        page = page_of(monitor)
-        os.kill(monitor.pid, signal.SIGKILL)
-        page.wait(20.0)
-    with stage.running("services.monitor", "monitor", *flags(ports)) as monitor:  # the ports are free again
-        page_of(monitor).kill()
-        assert monitor.wait(20.0) == 1
+def test_a_monitor_that_was_killed_is_started_again_with_the_same_address(stage: Stage, web_port: int, tmp_path: Path) -> None:
+    flags, addresses = ("--web-port", str(web_port), "--run-dir", str(tmp_path)), []
+    for _ in range(2):
+        with stage.running("services.monitor", "monitor", *flags) as monitor:
+            addresses.append(stage.stat("monitor").text)
+            os.kill(monitor.pid, signal.SIGKILL)
+            monitor.wait(20.0)
+    assert addresses[0] == addresses[1]
+    assert (tmp_path / "page.key").stat().st_mode & 0o077 == 0
 
 
-@pytest.mark.parametrize("taken", [0, 1])
-def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, ports: tuple[int, int], taken: int) -> None:
+def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, web_port: int) -> None:
     with socket.socket() as other:
-        other.bind(("127.0.0.1", ports[taken]))
+        other.bind(("127.0.0.1", web_port))
         other.listen()
-        command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", *flags(ports)]
+        command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", "--web-port", str(web_port)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
-    assert f"{('web_port', 'grpc_port')[taken]} {ports[taken]} is in use" in done.stderr
+    assert f"web_port {web_port} is in use" in done.stderr
     assert "mobee stop" in done.stderr
 
 

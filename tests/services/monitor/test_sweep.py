@@ -6,7 +6,7 @@ import pytest
 
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from services.monitor.view import sweep
+from services.monitor.viewer.view import sweep
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from mobee.robot.robot import ShapeKind
 
 rr = pytest.importorskip("rerun")
-from services.monitor.figure import drawn, recolored  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.figure import drawn, recolored  # noqa: E402  # only where Rerun is
 
 TURN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # z to x
 PLACE = np.array([1.0, 2.0, 3.0])

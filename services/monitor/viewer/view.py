@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-import socket
+import tempfile
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +16,12 @@ import rerun.blueprint as rrb
 from mobee.arrays import Array
 from mobee.model.world import World
 from mobee.robot.robot import Motor, Robot
-from services.monitor.blueprint import BACKGROUND, eye_of
-from services.monitor.config import Config
-from services.monitor.figure import TIMELINE, Figure
-from services.monitor.output import open_output
+from services.monitor.viewer.blueprint import BACKGROUND, eye_of
+from services.monitor.viewer.figure import TIMELINE, Figure
+from services.monitor.viewer.files import ViewerFiles
+from services.monitor.viewer.output import HOST, NoControls
+from services.monitor.web.board import Board
+from services.monitor.web.server import PageServer, Site
 
 RATE = 20.0  # poses a second
 ALONE = 2.0  # s a motor
@@ -79,19 +82,23 @@ MOST_NAMES = 4  # a longer legend hides the plot
 def view(
     robot: Robot, world: World | None, save: Path | None, tell: Callable[[str], None], stretches: Sequence[Stretch] | None = None
 ) -> None:
-    """Show a motion on a page until the user interrupts or the page's server ends, or save it to a file.
+    """Show a motion on a page until the user interrupts, or save it to a file.
 
     `tell` is called with the page's address when all data is there.  `stretches`: of the motion, RATE poses a second; None: a sweep
     through all that the robot can do.
     """
-    web_port, grpc_port = _free_ports()
-    config = Config(serve=save is None, web_port=web_port, grpc_port=grpc_port, memory_limit="1GB")
-    with open_output(config, layout(robot), save) as output:
-        _log(output.stream, robot, world, sweep(robot) if stretches is None else stretches)
-        output.stream.disconnect()  # when all has arrived: the page's server keeps it
-        if output.page is not None:
-            tell(output.url)
-            output.page.wait()
+    with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
+        file = Path(private) / "view.rrd" if save is None else save
+        stream = rr.RecordingStream("mobee")
+        stream.set_sinks(rr.FileSink(file), default_blueprint=layout(robot))
+        _log(stream, robot, world, sweep(robot) if stretches is None else stretches)
+        stream.disconnect()
+        if save is None:
+            site = Site(Board(), "", NoControls(), None, ViewerFiles(Path(private)).path, lambda: 0.0, {"view.rrd": file})
+            server = PageServer(site, HOST, 0)
+            tell(f"http://{HOST}:{server.port}/viewer.html?recording=view.rrd")
+            while True:
+                time.sleep(3600.0)
 
 
 def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretches: Sequence[Stretch]) -> None:
@@ -130,11 +137,3 @@ def layout(robot: Robot) -> rrb.Blueprint:
         auto_views=False,
         auto_layout=False,
     )
-
-
-def _free_ports() -> tuple[int, int]:
-    """Two free ports on the loopback interface."""
-    with socket.socket() as first, socket.socket() as second:
-        for probe in (first, second):
-            probe.bind(("127.0.0.1", 0))
-        return int(first.getsockname()[1]), int(second.getsockname()[1])

@@ -18,6 +18,7 @@ from mobee.learning.space import Space
 from mobee.rendering import palette
 from mobee.rendering.palette import Rgba
 from mobee.robot.robot import Robot
+from services.monitor.viewer.frames import Frames
 
 CERTAIN = (92, 98, 110, 110)  # colour of an action that has always reached its goal
 MIN_WIDTH, MAX_WIDTH = 0.012, 0.06  # of arrows, in steps of the lattice
@@ -39,9 +40,9 @@ class Drawn:
 class Learning:
     """Logs to a stream under learning/."""
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+    def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
-        self._colors = palette.colors_of(robot.parts)
+        self._colors = palette.colors_of_all(robot.parts)
         self._drawn: dict[str, Drawn | None] = {}
         self._made_from: dict[str, str] = {}
 

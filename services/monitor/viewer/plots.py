@@ -12,6 +12,7 @@ from bus_schema.messages import Forces, Motion, Transition
 from mobee.control.forces import published_terms
 from mobee.rendering import palette
 from mobee.robot.robot import Robot
+from services.monitor.viewer.frames import Frames
 
 SHOWN = 4  # joints of a part: shoulder and elbow of an arm, all of the torso
 LEARNED = ("reward", "value", "transitions")
@@ -20,9 +21,9 @@ LEARNED = ("reward", "value", "transitions")
 class Plots:
     """Logs numbers to a stream under plots/; few entities with many series each, because a recording pays by the entity."""
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+    def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
-        parts = palette.colors_of(robot.parts)
+        self._parts = parts = palette.colors_of(robot.parts)
         for part in parts:
             motors = robot.part(part).motors[:SHOWN]
             short = [motor.rsplit("_", 1)[-1] for motor in motors]  # pitch, roll, yaw, elbow
@@ -38,7 +39,9 @@ class Plots:
                 self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
 
     def log_motion(self, part: str, motion: Motion) -> None:
-        """State and goal of a part."""
+        """State and goal of a part; parts without a plot are left out."""
+        if part not in self._parts:
+            return
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
@@ -50,7 +53,9 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Reward, value and number of a transition."""
+        """Reward, value and number of a transition; of a part without a plot nothing."""
+        if part not in self._parts:
+            return
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):
             self._stream.log(f"plots/{quantity}/{part}", rr.Scalars(value))
 

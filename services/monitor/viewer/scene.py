@@ -20,14 +20,15 @@ from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quat
 from mobee.rendering import palette
 from mobee.robot.icub_urdf import write_upper_body_urdf
 from mobee.robot.robot import Robot, Shape
-from services.monitor.blueprint import ROOT
-from services.monitor.figure import drawn
+from services.monitor.viewer.blueprint import ROOT
+from services.monitor.viewer.figure import drawn
+from services.monitor.viewer.frames import Frames
 
 
 class Solids:
     """Logs to a stream under robot/: what moves is one transform a link that has solids."""
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+    def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
         colors = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
         solids = [shape for shape in robot.shapes if shape.role == "solid"]
@@ -57,7 +58,7 @@ HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["ri
 class Scene:
     """Logs poses to a stream; what does not move is logged once."""
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+    def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
         self._fields = [shape for shape in robot.shapes if shape.role == "field"]
         self._trails: dict[str, deque[Array]] = {name: deque(maxlen=TRAIL) for name in HANDS if name in robot.markers}
@@ -70,6 +71,10 @@ class Scene:
         joints = self.tree.joints() if self.tree else []
         self.meshes = [(joint, names[joint.name]) for joint in joints if joint.name in names]  # with the index in the robot
         self._solids = None if self.tree else Solids(stream, robot)
+
+    def show_fields(self, shown: bool) -> None:
+        """Show or hide the fields."""
+        self._fields = [shape for shape in self._robot.shapes if shape.role == "field"] if shown else []
 
     def forget(self) -> None:
         """A new run: trails end."""
@@ -158,7 +163,10 @@ class Scene:
                 moving = {joint.name for joint in tree.joints() if joint.joint_type == "revolute"}
                 if not moving <= {joint.name for joint in self._robot.joints}:
                     return None
-                tree.log_urdf_to_recording(self._stream)
+                if isinstance(self._stream, rr.RecordingStream):
+                    tree.log_urdf_to_recording(self._stream)
+                else:
+                    self._stream.log_tree(tree)
                 return tree
         except MobeeError:
             return None
@@ -198,7 +206,7 @@ SHOULDERS = {"left_arm": "l_shoulder_pitch", "right_arm": "r_shoulder_pitch"}
 class Poses:
     """Logs a cloud of arms to a stream: shoulder, elbow and palm of each pose as a thin line."""
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot) -> None:
+    def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
         joints = {joint.name: index for index, joint in enumerate(robot.joints)}
         known = (set(robot.markers), set(joints))

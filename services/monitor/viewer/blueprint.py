@@ -42,18 +42,21 @@ ROOT = "root_link"  # frame of everything in the scene
 BACKGROUND = (24, 27, 33)
 WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
-TABS = ("robot", "learning")
+EYES = {"left_eye", "right_eye"}
 
 
 @dataclass(frozen=True)
 class Shown:
     """The content of the monitor's page.
 
-    `name`: of the robot.  `parts`: those with plots.  `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
+    `name`: of the robot.  `parts`: those with plots.  `has_eyes`: whether it may have pictures to show.
+
+    `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
     """
 
     name: str
     parts: tuple[str, ...]
+    has_eyes: bool
     eye: Array
     target: Array
 
@@ -61,15 +64,21 @@ class Shown:
 def shown_of(robot: Robot) -> Shown:
     """Return the view of a robot; that of the iCub includes its table."""
     parts = tuple(colors_of(robot.parts))
+    has_eyes = robot.markers.keys() >= EYES
     if robot.name in AT_TABLE:
-        return Shown("iCub", parts, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
-    return Shown(robot.name, parts, *eye_of(robot))
+        return Shown("iCub", parts, has_eyes, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
+    return Shown(robot.name, parts, has_eyes, *eye_of(robot))
 
 
-def blueprint(shown: Shown, page: str = TABS[0]) -> rrb.Blueprint:
-    """Make two tabs, one of the robot and its forces and one of the agents' knowledge, without side panels; `page` is the open one."""
+def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
+    """Make tabs of the robot, its eyes, its motion, its learning and its state spaces, without side panels.
+
+    `in_motion`: False for the tab of the robot alone.
+    """
+    eyes = [rrb.Horizontal(_eye("left"), _eye("right"), name="eyes")] if shown.has_eyes else []
+    others = [*eyes, _motion(shown.parts), _learning(), _spaces(shown.parts), _log()] if in_motion else []
     return rrb.Blueprint(
-        rrb.Tabs(_robot(shown), _learning(shown.parts), active_tab=TABS.index(page)),
+        rrb.Tabs(_scene(shown), *others, active_tab=0),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         rrb.TopPanel(state="hidden"),
@@ -79,24 +88,25 @@ def blueprint(shown: Shown, page: str = TABS[0]) -> rrb.Blueprint:
     )
 
 
-def _robot(shown: Shown) -> rrb.Horizontal:
-    """The tab of the robot: a large view of it, the camera pictures and the log below, plots on the right."""
-    left = rrb.Vertical(_scene(shown), rrb.Horizontal(_eye("left"), _eye("right"), _log(), column_shares=[1, 1, 1.9]), row_shares=[3.2, 1])
-    plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in shown.parts]
-    learning = rrb.Tabs(
+def _motion(parts: Sequence[str]) -> rrb.Grid:
+    """Positions and goals of the joints, and the forces."""
+    plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in parts]
+    return rrb.Grid(*plots, _plot("forces, rad/s²", "plots/forces"), name="motion")
+
+
+def _learning() -> rrb.Vertical:
+    return rrb.Vertical(
         _plot("reward, nats", "plots/reward", rrb.ScalarAxis(range=SURPRISE)),
-        _plot("value", "plots/value"),
+        _plot("value, nats", "plots/value"),
         _plot("transitions", "plots/transitions"),
+        name="learning",
     )
-    forces = _plot("forces, rad/s²", "plots/forces")
-    right = rrb.Vertical(*plots, rrb.Horizontal(forces, learning), row_shares=[*[1] * len(plots), 0.9])
-    return rrb.Horizontal(left, right, column_shares=[1.75, 1], name=TABS[0])
 
 
-def _learning(parts: Sequence[str]) -> rrb.Horizontal:
+def _spaces(parts: Sequence[str]) -> rrb.Horizontal:
     """One column for each agent: its state space, with surprising actions coloured, and bar charts of all state-actions."""
     shares = [1.0 if part == "torso" else 1.4 for part in parts]
-    return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name=TABS[1])
+    return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name="states")
 
 
 def _agent(part: str) -> rrb.Vertical:

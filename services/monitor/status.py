@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The state of the system in one sentence, with what a person can do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bus_schema.messages import EStop
+from services.monitor.story.words import listed, title_of
+
+STALE = 5.0  # s of real time without the robot's clock, or the patience of lockstep
+HELD = 1.0  # s of real time for which a part must hold before it is reported: every action of a filter or a start holds for a moment
+
+
+@dataclass
+class Seen:
+    """What the monitor knows of the system now."""
+
+    clock_age: float | None = None  # s of real time since the last tick; None: there was none
+    mode: str = ""  # of the clock
+    gates: Mapping[str, str] = field(default_factory=dict)  # by part
+    held_for: Mapping[str, float] = field(default_factory=dict)  # s of real time, of the parts in hold
+    why_held: Mapping[str, str] = field(default_factory=dict)  # the controller's reason
+    stop: EStop | None = None  # while it is set
+    services: Collection[str] = ()  # that are up
+    patience: float = STALE  # s of real time for which the clock may stand still
+    ended: bool = False  # the monitor was asked to end
+
+
+def banner(seen: Seen) -> dict[str, Any] | None:
+    """Return what must be said in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
+    names = sorted(seen.services)
+    if seen.ended:
+        return _said(
+            "ended",
+            "The system has ended",
+            "This is the last picture of it.",
+            "Start it again: mobee launch. See the run again: mobee replay RUN.",
+        )
+    if seen.clock_age is None:
+        text = f"Running so far: {', '.join(names)}." if names else "No service is up yet."
+        return _said("waiting", "Waiting for the robot", text, "If this takes more than a minute: mobee status")
+    stopped = [part for part, gate in seen.gates.items() if gate == "estop"]
+    if seen.stop is not None or stopped:
+        who = f"{seen.stop.reason[:1].upper()}{seen.stop.reason[1:]}." if seen.stop is not None else "All motors are stopped."
+        return _said(
+            "stop", "EMERGENCY STOP", who, "Release: key R, or mobee estop --reset. The controller then arms all parts, and agents go on."
+        )
+    faulty = [title_of(part) for part, gate in seen.gates.items() if gate == "fault"]
+    if faulty:
+        return _said(
+            "fault",
+            f"FAULT: {listed(faulty)}",
+            "The gate before the motors has stopped this part.",
+            "Reset: key 0. Reasons: the events below, mobee status",
+        )
+    if "robot_sim" not in seen.services:
+        return _said("fault", "The robot is gone", "robot_sim has ended.", "The launcher starts it again; if not: mobee status")
+    if seen.mode == "paused":
+        return _said("paused", "Paused", "The robot's time stands still, and all parts hold.", "Go on: space bar")
+    if seen.clock_age > seen.patience:
+        return _said(
+            "fault", "The robot does not answer", f"No tick of its clock for {seen.clock_age:.0f} s.", "mobee status shows what runs"
+        )
+    for who in ("model", "controller"):
+        if who not in seen.services:
+            return _said("fault", f"The {who} is gone", "The whole robot holds.", "The launcher starts it again; if not: mobee status")
+    held = [part for part, since in seen.held_for.items() if since > HELD]
+    if held:
+        reasons = sorted({seen.why_held.get(part, "") for part in held} - {""})
+        return _said(
+            "hold",
+            f"HOLD: {listed([title_of(part) for part in held])}",
+            f"Why: {'; '.join(reasons)}." if reasons else "These parts take no commands.",
+            "They are armed again by themselves when all is well. If not: mobee status",
+        )
+    return None
+
+
+def _said(level: str, title: str, text: str, todo: str) -> dict[str, Any]:
+    return {"level": level, "title": title, "text": text, "todo": todo}

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an agent knows and what is left to learn, from its `Learned` messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bus_schema.messages import Learned
+from mobee.arrays import Array, Ints
+from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.space import Space
+
+PREDICTABLE_TRIES = 2
+PREDICTABLE_SHARE = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """Numbers of all state-actions of an agent, (S, A): tries, last information gain [nats], value, and which are state-actions at all.
+
+    `usual`: share of its most frequent outcome.  `n`: transitions.  `state`: where the agent is.
+    """
+
+    exists: NDArray[np.bool_]
+    tries: Ints
+    reward: Array
+    value: Array
+    usual: Array
+    n: int
+    state: int
+
+    @property
+    def tried(self) -> float:
+        """Share of the state-actions that were tried."""
+        return float((self.tries > 0)[self.exists].mean())
+
+    @property
+    def predictable(self) -> float:
+        """Share of the state-actions that were tried at least twice and ended alike in at least 80 % of the tries."""
+        return float(((self.tries >= PREDICTABLE_TRIES) & (self.usual >= PREDICTABLE_SHARE))[self.exists].mean())
+
+    def left(self, first: float) -> Array:
+        """Return how much is left to learn in each state, (S,) in 0..1: the mean information gain of its actions over the `first` one."""
+        gain = np.where(self.exists, self.reward, 0.0).sum(axis=1) / np.maximum(self.exists.sum(axis=1), 1)
+        return np.clip(gain / max(first, 1e-12), 0.0, 1.0)
+
+    def untried(self) -> Ints:
+        """Return how many actions of each state were never tried, (S,)."""
+        return ((self.tries == 0) & self.exists).sum(axis=1)
+
+
+def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:
+    """Return what a message tells; None if its numbers do not fit the space."""
+    shape = space.goals.shape
+    tries, reward, value = (_numbers(data, kind, shape) for data, kind in zip(_data(learned), ("<u4", "<f4", "<f4"), strict=True))
+    if tries is None or reward is None or value is None or learned.s >= shape[0]:
+        return None
+    exists = space.goals != NO_ACTION
+    missed, most = np.zeros(shape), np.zeros(shape)
+    for one in learned.surprises:
+        if one.s < shape[0] and one.a < shape[1]:
+            missed[one.s, one.a] += one.share
+            most[one.s, one.a] = max(most[one.s, one.a], one.share)
+    usual = np.maximum(np.clip(1.0 - missed, 0.0, 1.0), most)
+    finite = np.where(exists, reward, 0.0)
+    return Knowledge(exists, tries.astype(np.int64), finite, np.where(exists, value, -np.inf), usual, learned.n, learned.s)
+
+
+def _data(learned: Learned) -> tuple[bytes, bytes, bytes]:
+    return learned.tries, learned.reward, learned.value
+
+
+def _numbers(data: bytes, kind: str, shape: tuple[int, ...]) -> Array | None:
+    found = np.frombuffer(data, kind) if len(data) == 4 * int(np.prod(shape)) else None
+    return None if found is None else found.reshape(shape).astype(np.float64)

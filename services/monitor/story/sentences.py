@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sentences of an agent's story: what it tries, what it expects, what happened, what it wants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from bus_schema.messages import Decision, Reach, Transition
+from mobee.arrays import Array
+from mobee.learning.space import Space
+from services.monitor.story.words import action_words, displacement, listed, ordinal, percent
+
+LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
+STRATEGIES = {
+    "curious": "by curiosity: it goes where it expects to learn most",
+    "random": "at random",
+    "least_tried": "by the action that it has tried least here",
+    "nearest_untried": "by the shortest path to an untried action",
+    "count_bonus": "by a bonus for rarely tried actions",
+    "posterior_sampling": "by curiosity under a drawn model",
+    "depleting": "by curiosity that plans for what will be left",
+}
+
+
+def surprise_of(probability: float) -> float:
+    """Return −ln p of an outcome, nats."""
+    return -math.log(max(probability, LEAST_PROBABILITY))
+
+
+def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:
+    """Return what the agent tries now: "elbow +32°: its hand goes 12 cm up. 4th try from here."."""
+    way = "" if places is None else displacement(places[decision.goal] - places[decision.s], space.robot.name)
+    return f"{action_words(space, decision.s, decision.goal)}{f': {way}' if way else ''}. {ordinal(decision.tries + 1)} try from here."
+
+
+def expects_sentence(decision: Decision) -> str:
+    """Return what the agent expects of the action under way."""
+    if decision.tries == 0:
+        return f"It cannot know what will happen; it gives getting there {percent(decision.reached)}."
+    if decision.expected == decision.goal:
+        return f"It expects to get there ({percent(decision.reached)})."
+    where = "to stay where it is" if decision.expected == decision.s else "to end in another pose"
+    return f"It expects {where} ({percent(decision.probability)}), not to get there ({percent(decision.reached)})."
+
+
+def outcome_sentence(seen: Transition) -> str:
+    """Return what happened: "It got there", "It ended against the table and did not get there"."""
+    touched = listed([f"the {name}" for name in seen.touched[:2]]) if seen.touched else ""
+    against = f" against {touched}" if touched else ""
+    rest = "" if seen.settled else ", still moving when its time was over"
+    if seen.s_next == seen.goal:
+        return f"It got there{f', and touches {touched}' if touched else ''}{rest}."
+    if seen.s_next == seen.s:
+        return f"It did not get out of its pose{f': it ended{against}' if against else ''}{rest}."
+    return f"It ended{against or ' in another pose'}, not where it wanted{rest}."
+
+
+def surprise_sentence(seen: Transition) -> str:
+    """Return how surprised the agent was, and how much it learned."""
+    if seen.probability < LEAST_PROBABILITY:
+        return f"It had never seen that: surprise over {surprise_of(0.0):.1f} nats, learned {seen.reward:.3f} nats."
+    return f"Surprise {surprise_of(seen.probability):.2f} nats, learned {seen.reward:.3f} nats."
+
+
+def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence[int]) -> str:
+    """Return where the agent's plan leads and why; `untried`, `actions`: of each state, how many actions were never tried, and all."""
+    end = decision.plan[-1] if decision.plan else decision.goal
+    steps = len(decision.plan)
+    if not untried or end >= len(untried):
+        return ""
+    why = f"{untried[end]} of {actions[end]} actions were never tried" if untried[end] else "it still learns most, though all was tried"
+    if steps <= 1:
+        return f"to go on from there, where {why}."
+    return f"to go on by {steps - 1} more action{'s' if steps > 2 else ''}, to a pose where {why}."
+
+
+def reach_sentence(reach: Reach) -> str:
+    """Return the state of a reach."""
+    target, left = ("the place" if reach.object == "reach_target" else f"the {reach.object}"), f"{1000 * reach.missing:.0f} mm"
+    if reach.phase == "reaching":
+        return f"Reaches for {target}: {left} to go."
+    if reach.phase == "interrupted":
+        return f"Its reach for {target} was interrupted."
+    if reach.missing < 0.01:
+        return f"Has reached {target}: {left} from it."
+    return f"Reached for {target} and came to rest {left} from it."

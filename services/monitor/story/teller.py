@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps the story of every agent from its messages, as plain data for the page."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bus_schema.messages import Decision, Learned, Reach, Transition
+from mobee.arrays import Array
+from mobee.learning.space import Space
+from mobee.rendering.palette import Color
+from mobee.robot.robot import Robot
+from services.monitor.story.knowledge import Knowledge, knowledge_of
+from services.monitor.story.places import MAX_STATES, base_link, places, shown_marker, space_of
+from services.monitor.story.sentences import (
+    STRATEGIES,
+    expects_sentence,
+    outcome_sentence,
+    reach_sentence,
+    surprise_of,
+    surprise_sentence,
+    tries_sentence,
+    wants_sentence,
+)
+from services.monitor.story.words import action_words, title_of
+
+RECENT = 60  # transitions whose surprise is shown
+LARGEST_CURVE = 400  # points
+
+
+@dataclass
+class _Agent:
+    """What is known of one agent."""
+
+    part: str
+    color: Color
+    space: Space | None = None
+    settings: str = ""
+    where: Array | None = None  # (S, 3) m, see places
+    marker: str | None = None
+    known: Knowledge | None = None
+    first: float = 0.0  # nats: the largest information gain ever seen
+    decision: Decision | None = None
+    last: Transition | None = None
+    reach: Reach | None = None
+    recent: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=RECENT))  # surprise, whether the goal was reached
+    curve: list[tuple[int, float, float]] = field(default_factory=list)  # transitions, share tried, share predictable
+
+
+class Teller:
+    """The agents' stories; `changed` holds the names of the board's values that are to be put again."""
+
+    def __init__(self, robot: Robot, colors: dict[str, Color]) -> None:
+        """`colors`: of all parts."""
+        self._robot, self._colors = robot, colors
+        self._agents: dict[str, _Agent] = {}
+        self.changed: set[str] = set()
+
+    @property
+    def parts(self) -> list[str]:
+        """Parts that an agent moves, or that reach."""
+        return [part for part in self._colors if part in self._agents]
+
+    def forget_run(self) -> None:
+        """A new run of the robot: actions under way are void."""
+        for agent in self._agents.values():
+            agent.decision = agent.reach = None
+        self.changed.add("cards")
+
+    def note_decision(self, seen: Decision) -> None:
+        """An agent begins an action."""
+        agent = self._agent(seen.agent)
+        if agent is not None:
+            agent.decision = seen
+            self.changed |= {"cards", "left"}
+
+    def note_transition(self, seen: Transition) -> None:
+        """An action has ended."""
+        agent = self._agent(seen.agent)
+        if agent is not None:
+            agent.last, agent.decision = seen, None
+            agent.recent.append((surprise_of(seen.probability), seen.s_next == seen.goal))
+            self.changed.add("cards")
+
+    def note_learned(self, learned: Learned) -> None:
+        """An agent reports what it knows."""
+        agent = self._agent(learned.agent)
+        if agent is None:
+            return
+        if agent.settings != learned.space:
+            self._make_space(agent, learned.space)
+        if agent.space is None or (known := knowledge_of(learned, agent.space)) is None:
+            return
+        agent.known = known
+        agent.first = max(agent.first, float(known.reward[known.exists].max()))
+        if not agent.curve or agent.curve[-1][0] < known.n:
+            agent.curve.append((known.n, round(known.tried, 4), round(known.predictable, 4)))
+            if len(agent.curve) > LARGEST_CURVE:
+                agent.curve = agent.curve[::2]
+        self.changed |= {"cards", "left", "curves"}
+
+    def note_reach(self, part: str, reach: Reach) -> None:
+        """A part reaches, or has reached."""
+        agent = self._agent(part)
+        if agent is not None and agent.reach != reach:
+            agent.reach = reach
+            self.changed.add("cards")
+
+    def values(self) -> dict[str, Any]:
+        """Return the values that have changed, by name, as plain JSON data."""
+        made = {name: getattr(self, f"_{name}")() for name in sorted(self.changed)}
+        self.changed.clear()
+        return made
+
+    def _agent(self, part: str) -> _Agent | None:
+        if part not in self._colors:  # of another robot
+            return None
+        if part not in self._agents:
+            self._agents[part] = _Agent(part, self._colors[part])
+            self.changed |= {"cards", "places"}
+        return self._agents[part]
+
+    def _make_space(self, agent: _Agent, settings: str) -> None:
+        agent.settings, agent.space = settings, space_of(settings, self._robot)
+        agent.where = agent.known = None
+        agent.curve.clear()
+        if agent.space is not None and agent.space.part != agent.part:
+            agent.space = None
+        if agent.space is not None and len(agent.space) <= MAX_STATES:
+            agent.marker = shown_marker(self._robot, agent.part)
+            if agent.marker is not None:
+                agent.where = places(agent.space, agent.marker, np.clip(self._robot.home, *self._robot.limits.T))
+        self.changed.add("places")
+
+    def _cards(self) -> list[dict[str, Any]]:
+        return [self._card(self._agents[part]) for part in self.parts]
+
+    def _card(self, agent: _Agent) -> dict[str, Any]:
+        decision, last, known, space = agent.decision, agent.last, agent.known, agent.space
+        card: dict[str, Any] = {"part": agent.part, "title": title_of(agent.part), "recent": [[round(s, 2), ok] for s, ok in agent.recent]}
+        if agent.reach is not None:
+            card["reach"] = reach_sentence(agent.reach)
+        if known is not None and space is not None:
+            card |= {"n": known.n, "states": len(space), "actions": int(known.exists.sum())}
+            card |= {"tried": round(known.tried, 4), "predictable": round(known.predictable, 4)}
+        if decision is not None and space is not None and max(decision.s, decision.goal) < len(space):
+            card["now"] = tries_sentence(decision, space, agent.where)
+            card["expects"] = expects_sentence(decision)
+            card["chooses"] = STRATEGIES.get(decision.explorer, f"by the function {decision.explorer}")
+            if known is not None:
+                card["wants"] = wants_sentence(decision, known.untried().tolist(), known.exists.sum(axis=1).tolist())
+        if last is not None:
+            card["last"] = {
+                "action": action_words(space, last.s, last.goal) if space is not None and max(last.s, last.goal) < len(space) else "",
+                "outcome": outcome_sentence(last),
+                "surprise": surprise_sentence(last),
+                "reached": last.s_next == last.goal,
+                "n": last.n,
+            }
+        return card
+
+    def _places(self) -> dict[str, Any]:
+        return {
+            part: {
+                "link": base_link(self._robot, part),
+                "marker": title_of(agent.marker or ""),
+                "points": np.round(agent.where, 4).tolist(),
+            }
+            for part, agent in self._agents.items()
+            if agent.where is not None
+        }
+
+    def _left(self) -> dict[str, Any]:
+        found = {}
+        for part, agent in self._agents.items():
+            if agent.known is None or agent.where is None:
+                continue
+            known, decision = agent.known, agent.decision
+            found[part] = {
+                "left": np.round(known.left(agent.first), 3).tolist(),
+                "untried": known.untried().tolist(),
+                "actions": known.exists.sum(axis=1).tolist(),
+                "here": known.state if decision is None else decision.s,
+                "path": [] if decision is None else [decision.goal, *decision.plan],
+            }
+        return found
+
+    def _curves(self) -> dict[str, Any]:
+        return {part: agent.curve for part, agent in self._agents.items() if agent.curve}

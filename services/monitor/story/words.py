@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Words for parts, motions and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.learning.space import Space
+from services.common.worlds import AT_TABLE
+
+ROOT_AXES = ("x", "y", "z")
+ICUB_AXES = (("back", "forward"), ("right", "left"), ("up", "down"))  # of the root frame, positive and negative: x is backwards
+SHORTEST = 0.015  # m: a hand that moves less stays where it is
+SHARE = 0.5  # of the largest displacement: smaller ones along other axes are not named
+SIDES = ("l_", "r_", "left_", "right_")
+
+
+def title_of(name: str) -> str:
+    """Return the name of a part for people: left_arm is "left arm"."""
+    return name.replace("_", " ")
+
+
+def joint_words(name: str, part: str) -> str:
+    """Return the name of a motor without its part and side: l_shoulder_pitch of left_arm is "shoulder pitch"."""
+    for prefix in (f"{part}_", *SIDES):
+        if name.startswith(prefix) and len(name) > len(prefix):
+            name = name.removeprefix(prefix)
+            break
+    return name.replace("_", " ")
+
+
+def ordinal(n: int) -> str:
+    """Return 1st, 2nd, 3rd, 4th, 11th, ..."""
+    suffix = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
+    return f"{n}{suffix}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return "a", "a and b", "a, b and c"."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def displacement(way: Array, robot: str) -> str:
+    """Describe how a hand moves by `way` (3,) m, by its main directions: "12 cm up and forward"; empty if it hardly moves.
+
+    The robots of the iCub's family have a front; the axes of the root frame are named for others.
+    """
+    length = float(np.linalg.norm(way))
+    if length < SHORTEST:
+        return ""
+    main = [axis for axis in np.argsort(-np.abs(way)).tolist() if abs(way[axis]) >= SHARE * np.abs(way).max()]
+    return f"{100 * length:.0f} cm {listed([_direction(axis, float(way[axis]), robot) for axis in main])}"
+
+
+def _direction(axis: int, along: float, robot: str) -> str:
+    if robot in AT_TABLE:
+        return ICUB_AXES[axis][along < 0.0]
+    if axis == 2:
+        return "up" if along > 0.0 else "down"
+    return f"{'+' if along > 0.0 else '−'}{ROOT_AXES[axis]}"
+
+
+def action_words(space: Space, state: int, goal: int) -> str:
+    """Describe an action by the joints that it turns: "elbow +32°, shoulder yaw −20°"."""
+    turns = space.samples[goal] - space.samples[state]
+    named = []
+    for index in np.argsort(-np.abs(turns)).tolist():
+        if abs(turns[index]) > 1e-6:
+            named.append(f"{joint_words(space.joints[index], space.part)} {_amount(space, index, float(turns[index]))}")
+    return ", ".join(named) or "stay in this pose"
+
+
+def _amount(space: Space, index: int, turn: float) -> str:
+    motor = space.robot.motor_table[space.robot.motor_index(space.joints[index])]
+    slides = any(space.robot.joints[joint].kind == "prismatic" for joint, _, _ in motor.joints)
+    sign = "+" if turn > 0.0 else "−"
+    return f"{sign}{1000 * abs(turn):.0f} mm" if slides else f"{sign}{np.rad2deg(abs(turn)):.0f}°"
+
+
+def percent(share: float) -> str:
+    """Return a share as whole percent, never 0 % or 100 % for what is neither."""
+    rounded = round(100 * share)
+    if rounded == 0 and share > 0.0:
+        return "under 1 %"
+    if rounded == 100 and share < 1.0:
+        return "over 99 %"
+    return f"{rounded} %"

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Data for viewers in browsers: a viewer asks for its next frame when it has shown the last one, so that a slow one skips frames."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections import deque
+from threading import Condition
+from typing import Any, Protocol
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.urdf import UrdfTree
+
+LARGEST_HISTORY = 4_000_000  # bytes of changes that a new viewer gets
+WANTED_FOR = 15.0  # s after its last request for which a viewer counts as open, and changes are kept for it
+
+
+class Stream(Protocol):
+    """The calls of a recording stream that the scene uses."""
+
+    def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
+        """Log components at the present time."""
+
+
+class _Part:
+    """A recording stream whose bytes are collected; each piece is a complete file of Rerun."""
+
+    def __init__(self, recording_id: str) -> None:
+        self.stream = rr.RecordingStream("mobee", recording_id=recording_id)
+        self._bytes = self.stream.binary_stream()
+        self.is_dirty = True
+
+    def log(self, path: str | list[object], *what: Any, static: bool) -> None:
+        self.stream.log(path, *what, static=static)
+        self.is_dirty = True
+
+    def take(self) -> bytes:
+        """Return what was logged since the last call; empty if there was nothing."""
+        if not self.is_dirty:
+            return b""
+        self.is_dirty = False
+        return self._bytes.read(flush=True) or b""
+
+    def close(self) -> None:
+        """End the stream; Rerun warns of bytes that nobody has read."""
+        self.stream.disconnect()
+        self._bytes.read(flush=True)
+
+
+class Frames:
+    """A stream that logs to a file, if there is one, and for open viewers keeps what they need.
+
+    What is static is kept for all; changes are kept up to a size; of the looks at the robot only the newest is kept, and it is made only
+    if a viewer waits for one.
+    """
+
+    def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
+        self._file = file
+        self._static, self._changes, self._look = (_Part(recording_id) for _ in range(3))
+        self._static.stream.send_blueprint(layout)
+        self._kept: list[tuple[int, bytes]] = []  # static pieces, by the number of the frame in which they came
+        self._history: deque[tuple[int, bytes]] = deque()
+        self._size = 0  # bytes of the history
+        self._newest = (0, 0.0, b"")  # number, s of robot time, the look
+        self._published = Condition()
+        self._asked, self._waiting = -WANTED_FOR, 0
+        self._is_looking = self._is_wanted = False
+        self._time = 0.0
+
+    def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
+        """Log to the file, and for viewers."""
+        if self._file is not None:
+            self._file.log(path, *what, static=static)
+        if static:
+            self._static.log(path, *what, static=True)
+        elif not self._is_looking:
+            if time.monotonic() - self._asked < WANTED_FOR:
+                self._changes.log(path, *what, static=False)
+        elif self._is_wanted:
+            self._look.log(path, *what, static=False)
+
+    def log_tree(self, tree: UrdfTree) -> None:
+        """Log the meshes of a robot, which are static."""
+        for recording in (self._file, self._static.stream):
+            if recording is not None:
+                tree.log_urdf_to_recording(recording)
+        self._static.is_dirty = True
+
+    def set_time(self, timeline: str, seconds: float) -> None:
+        """Set the time of what is logged next."""
+        self._time = seconds
+        for stream in (self._file, self._changes.stream, self._look.stream):
+            if stream is not None:
+                stream.set_time(timeline, duration=seconds)
+
+    def close(self) -> None:
+        """Discard what no viewer has asked for; nothing can be logged afterwards."""
+        for part in (self._static, self._changes, self._look):
+            part.close()
+
+    def begin_look(self) -> None:
+        """What is logged until `end_look` is one look at the robot, all of it."""
+        self._is_looking = True
+        with self._published:
+            self._is_wanted = self._waiting > 0
+
+    def end_look(self) -> None:
+        """Give the look, and all changes since the one before, to the viewers that wait."""
+        self._is_looking = False
+        if not self._is_wanted:
+            return
+        static, changes, look = self._static.take(), self._changes.take(), self._look.take()
+        with self._published:
+            number = self._newest[0] + 1
+            if static:
+                self._kept.append((number, static))
+            if changes:
+                self._history.append((number, changes))
+                self._size += len(changes)
+            while self._size > LARGEST_HISTORY:
+                self._size -= len(self._history.popleft()[1])
+            self._newest = (number, self._time, look)
+            self._published.notify_all()
+
+    def newest(self, after: int, patience: float) -> bytes:
+        """Return what a viewer needs that has shown frame `after`, waiting for a newer one; any thread may call this.
+
+        Bytes: number of the frame (uint64) and its time (float64, s), then pieces, each with its length (uint32) before it; all
+        little-endian.  Without a newer frame there are no pieces.
+        """
+        give_up = time.monotonic() + patience
+        with self._published:
+            self._asked = time.monotonic()
+            self._waiting += 1
+            try:
+                while self._newest[0] <= after and (left := give_up - time.monotonic()) > 0.0:
+                    self._published.wait(left)
+            finally:
+                self._waiting -= 1
+            number, when, look = self._newest
+            if after > number:
+                after = 0
+            pieces = [piece for count, piece in (*self._kept, *self._history) if count > after]
+            if number > after:
+                pieces.append(look)
+        return b"".join([struct.pack("<Qd", number, when), *(struct.pack("<I", len(piece)) + piece for piece in pieces)])

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Outputs of the monitor: a page on loopback, a recording, or both."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from services.common.exit_codes import BAD_INPUT
+from services.monitor.config import Config
+from services.monitor.viewer.files import ViewerFiles
+from services.monitor.viewer.frames import Frames
+from services.monitor.web.board import Board
+from services.monitor.web.record import Record
+from services.monitor.web.server import Controls, PageServer, Refused, Site
+
+HOST = "127.0.0.1"
+RECORDING, STORY, KEY = "recording.rrd", "story.jsonl", "page.key"  # in the folder of a run
+
+
+class NoControls:
+    """The controls of a page before the monitor is on the bus, and of one that shows the past."""
+
+    def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
+        """Refuse."""
+        raise Refused("the page cannot do that now")
+
+    def tend(self, open_pages: set[str]) -> None:
+        """There is nothing to give back."""
+
+
+class LaterControls:
+    """Passes calls on to controls that are made later."""
+
+    def __init__(self) -> None:
+        self.real: Controls = NoControls()
+
+    def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
+        """See Controls."""
+        return self.real.do(page, verb, arguments)
+
+    def tend(self, open_pages: set[str]) -> None:
+        """See Controls."""
+        self.real.tend(open_pages)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where the monitor shows what it sees: the 3D view and the recording (`frames`), the page's values (`board`), the page itself."""
+
+    frames: Frames
+    board: Board
+    record: Record | None
+    server: PageServer | None
+    controls: LaterControls
+    url: str
+
+
+@contextmanager
+def open_output(config: Config, layout: rrb.Blueprint, now: Callable[[], float]) -> Iterator[Output]:
+    """Serve as configured, and record to a run_dir if there is one; exits with code 2 and one line if a port cannot be used.
+
+    `now`: the robot's time, s.
+    """
+    folder = _folder_of(config)
+    with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
+        record = Record(folder / STORY, now) if folder else None
+        board = Board(record.put if record else None)
+        controls = LaterControls()
+        identity = f"mobee-{secrets.token_hex(4)}"
+        file = rr.RecordingStream("mobee", recording_id=identity) if folder else None
+        if file is not None and folder is not None:
+            file.set_sinks(rr.FileSink(folder / RECORDING), default_blueprint=layout)
+        frames = Frames(file, layout, identity)
+        server, url = None, ""
+        try:
+            if config.serve:
+                key = _key_of(folder)
+                site = Site(board, key, controls, frames, ViewerFiles(Path(private)).path, now)
+                server = serve(site, config.bind, config.web_port)
+                url = f"http://{HOST}:{config.web_port}/?key={key}"
+            yield Output(frames, board, record, server, controls, url)
+        finally:
+            if server is not None:
+                server.close()
+            frames.close()
+            if file is not None:
+                file.disconnect()
+            if record is not None:
+                record.close()
+
+
+def _key_of(folder: Path | None) -> str:
+    """Return a new key, or that of the monitor that ran before in the folder: its pages stay open when it is started again."""
+    if folder is None:
+        return secrets.token_urlsafe(9)
+    file = folder / KEY
+    if not file.exists():
+        file.touch(mode=0o600)
+        file.write_text(secrets.token_urlsafe(9))
+    return file.read_text()
+
+
+def serve(site: Site, bind: str, port: int) -> PageServer:
+    """Serve a page; exits with code 2 and one line if the port cannot be used, after a second: one that has just ended may hold it."""
+    give_up = time.monotonic() + 1.0
+    while True:
+        try:
+            _require_free(bind, port)
+            return PageServer(site, bind, port)
+        except OSError:
+            if time.monotonic() > give_up:
+                _refuse(f"web_port {port} is in use: end the other system with `mobee stop`, or choose another web_port")
+        time.sleep(0.05)
+
+
+def _require_free(bind: str, port: int) -> None:
+    """Raise OSError if another program listens, also where Python's server would share the port with it."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((bind, port))
+
+
+def _folder_of(config: Config) -> Path | None:
+    folder = Path(config.run_dir) if config.run_dir else None
+    if folder is not None and not folder.is_dir():
+        _refuse(f"run_dir {folder} is not a folder: make it, or set run_dir to an empty text for no recording")
+    return folder
+
+
+def _refuse(text: str) -> NoReturn:
+    print(f"services.monitor: {text}", file=sys.stderr)
+    raise SystemExit(BAD_INPUT)

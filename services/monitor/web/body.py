@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's shapes and their poses as plain data, for the page's own picture of the body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bus_schema.messages import ContactItem, WorldObject
+from bus_schema.rpc import ObjectState
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms, matrix_from_quaternion
+from mobee.rendering import palette
+from mobee.rendering.palette import Color
+from mobee.robot.robot import Robot, Shape
+
+MOST_VERTICES = 60  # of a convex shape: its outline needs no more
+DIGITS = 4  # of lengths in m
+
+
+def shapes_of(robot: Robot, colors: dict[str, Color]) -> list[dict[str, Any]]:
+    """Return all shapes as they are with every joint at zero, in the root frame."""
+    return [_shape(shape, list(colors)) for shape in robot.shapes]
+
+
+def _shape(shape: Shape, parts: list[str]) -> dict[str, Any]:
+    made: dict[str, Any] = {
+        "link": shape.link,
+        "kind": shape.kind,
+        "size": list(shape.size),
+        "position": _rounded(shape.position),
+        "rotation": _rounded(shape.rotation),
+        "part": parts.index(shape.part) if shape.part in parts else -1,
+        "name": shape.name,
+    }
+    if shape.role == "field":
+        made["field"] = True
+    if shape.vertices is not None:
+        made["vertices"] = _rounded(_fewer(shape.vertices))
+    return made
+
+
+def _fewer(vertices: Array) -> Array:
+    """Return those of the vertices that are the farthest in some of many directions."""
+    if len(vertices) <= MOST_VERTICES:
+        return vertices
+    turn, height = np.pi * (1.0 + 5.0**0.5) * np.arange(MOST_VERTICES), 1.0 - (2.0 * np.arange(MOST_VERTICES) + 1.0) / MOST_VERTICES
+    ring = np.sqrt(1.0 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    return vertices[np.unique((vertices @ directions.T).argmax(axis=0))]
+
+
+def look(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:
+    """Return the poses of the links at q (n,) rad, rows of [R | p], and the contacts."""
+    transforms = link_transforms(robot, q)
+    return {
+        "links": np.round(transforms[:, :3, :].reshape(len(transforms), 12), DIGITS).tolist(),
+        "contacts": contacts_of(contacts),
+    }
+
+
+def contacts_of(contacts: list[ContactItem]) -> list[dict[str, Any]]:
+    """Return the contacts."""
+    return [{"kind": c.kind, "first": c.first, "second": c.second, "point": _rounded(np.array(c.point))} for c in contacts]
+
+
+def thing(item: ObjectState | WorldObject) -> dict[str, Any]:
+    """Return an object of the world."""
+    return {
+        "name": item.name,
+        "kind": item.geometry.kind,
+        "size": list(item.geometry.size),
+        "position": _rounded(np.array(item.position)),
+        "rotation": _rounded(matrix_from_quaternion(np.array(item.quaternion))),
+        "role": item.role,
+        "color": list(palette.of_object(item.geometry.kind, item.role)[:3]),
+    }
+
+
+def _rounded(numbers: Array) -> list[Any]:
+    found: list[Any] = np.round(numbers, DIGITS).tolist()
+    return found

@@ -1,0 +1,432 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page: asks the monitor for news, shows them, and sends what a person asks for.
+import { BodyPicture, title } from "./body.js";
+import { drawCurves, drawSurprise } from "./curves.js";
+import { MovePanel } from "./move.js";
+
+const $ = (id) => document.getElementById(id);
+const key = new URLSearchParams(location.search).get("key") || "";
+const me = sessionStorage.getItem("page") || Math.random().toString(36).slice(2, 12);
+sessionStorage.setItem("page", me);
+
+const state = { robot: null, status: {}, control: {}, cards: [], curves: {}, connected: false, viewerTime: null, past: false, pace: 0, place: null };
+const colorOf = (part) => state.robot?.parts.find((one) => one.name === part)?.color || [152, 165, 179];
+
+const picture = new BodyPicture($("body"), $("tip"), {
+  dropped: async (name, place) => {
+    if (await send("place", { name, position: place })) send("reach", { object: name });
+  },
+  picked: (place, name) => {
+    state.place = place ? { position: place } : { object: name };
+    say(place ? "A place is picked: H lets the nearest hand reach for it." : `The ${name} is picked: H lets the nearest hand reach for it; or drag it.`);
+  },
+});
+const move = new MovePanel($("move"), { send, state });
+
+// ---- calls
+
+async function send(verb, given = {}) {
+  let answer;
+  try {
+    const reply = await fetch("do", {
+      method: "POST",
+      headers: { "Content-Type": "application/json", "X-Key": key },
+      body: JSON.stringify({ page: me, verb, arguments: given }),
+    });
+    answer = await reply.json();
+  } catch {
+    answer = { ok: false, text: "The monitor does not answer: the system has ended, or the connection is lost." };
+  }
+  say(answer.text, !answer.ok);
+  return answer.ok;
+}
+
+let silence = 0;
+function say(text, bad = false) {
+  $("said").textContent = text;
+  $("said").className = bad ? "bad" : "";
+  $("said").hidden = false;
+  clearTimeout(silence);
+  silence = setTimeout(() => ($("said").hidden = true), bad ? 9000 : 4000);
+}
+
+// ---- news
+
+async function follow() {
+  let after = 0;
+  for (;;) {
+    try {
+      const late = `${picture.body ? `&body=${picture.body.t}` : ""}${state.viewerTime === null ? "" : `&viewer=${state.viewerTime}`}`;
+      const answer = await fetch(`news?after=${after}&page=${me}${late}`);
+      if (!answer.ok) throw new Error(answer.statusText);
+      const news = await answer.json();
+      state.connected = true;
+      after = news.version;
+      show(news);
+      await new Promise((resolve) => (document.hidden ? setTimeout(resolve, 500) : requestAnimationFrame(resolve)));
+    } catch (error) {
+      console.debug(error);
+      state.connected = false;
+      after = 0;
+      showState();
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+    }
+  }
+}
+
+const shows = {
+  robot(robot) {
+    const restarted = state.robot && state.robot.monitor !== robot.monitor;
+    state.robot = picture.robot = robot;
+    document.title = `MoBeE: ${robot.name}`;
+    $("title").textContent = `MoBeE: ${robot.name}`;
+    picture.look("oblique");
+    move.build(robot);
+    showLegend();
+    if (restarted && $("viewer").src) reloadViewer();
+  },
+  status(status) {
+    state.status = status;
+    showState();
+  },
+  control(control) {
+    state.control = control;
+    const mine = control.holder === me;
+    $("holder").textContent = control.pages > 1 ? `${control.pages} pages open; ${mine ? "this one" : control.holder ? "another one" : "none"} holds the controls` : "";
+    move.update();
+  },
+  body(body) {
+    picture.body = body;
+    picture.dirty = true;
+    move.follow(body.q);
+  },
+  objects(objects) {
+    if (!picture.dragging) picture.objects = objects;
+    picture.dirty = true;
+    move.update();
+  },
+  places(places) {
+    picture.places = places;
+    picture.dirty = true;
+    showLegend();
+  },
+  left(left) {
+    picture.left = left;
+    picture.dirty = true;
+  },
+  cards(cards) {
+    state.cards = cards;
+    showCards();
+  },
+  curves(curves) {
+    state.curves = curves;
+    showCurves();
+  },
+  events(events) {
+    $("events").replaceChildren(
+      ...[...events].reverse().map((one) => {
+        const row = document.createElement("p");
+        row.className = one.level;
+        const when = document.createElement("time");
+        when.textContent = `${one.t.toFixed(1)} s`;
+        row.append(when, `${one.who}: ${one.text}`);
+        return row;
+      }),
+    );
+  },
+  late(late) {
+    const parts = [];
+    if (late.body !== undefined) parts.push(`body ${late.body.toFixed(1)} s behind`);
+    if (late.viewer !== undefined) parts.push(`3D ${late.viewer.toFixed(1)} s behind`);
+    if (!state.past) $("late").textContent = parts.join(", ");
+  },
+  player(player) {
+    state.past = true;
+    $("timeline").hidden = false;
+    $("seek").max = player.length;
+    if (document.activeElement !== $("seek")) $("seek").value = player.at;
+    $("when").textContent = `${player.at.toFixed(0)} of ${player.length.toFixed(0)} s`;
+    $("play").textContent = player.plays ? "Pause" : "Play";
+    showState();
+  },
+};
+
+function show(news) {
+  if (news.robot) shows.robot(news.robot); // before all that refers to its parts
+  for (const name of Object.keys(news)) if (name in shows && name !== "robot") shows[name](news[name]);
+}
+
+// ---- the state in words
+
+function banner() {
+  if (!state.connected) {
+    return state.robot
+      ? { level: "lost", title: "The connection is lost", text: "The system has ended, or its monitor starts again. The picture below is the last one.", todo: "Start it again: mobee launch. See the run again: mobee replay RUN." }
+      : { level: "waiting", title: "Waiting for the monitor", text: "It does not answer yet.", todo: "" };
+  }
+  if (state.past) return null;
+  return state.status.banner || null;
+}
+
+const PILLS = { waiting: ["waits", "rest"], stop: ["emergency stop", "bad"], fault: ["fault", "bad"], hold: ["hold", "rest"], paused: ["paused", "rest"], ended: ["ended", "bad"], lost: ["not connected", "bad"] };
+
+function showState() {
+  const said = banner();
+  $("banner").hidden = !said;
+  if (said) {
+    $("banner").className = said.level;
+    $("banner").children[0].textContent = said.title;
+    $("banner").children[1].textContent = said.text;
+    $("banner").children[2].textContent = said.todo;
+  }
+  const [word, kind] = said ? PILLS[said.level] || ["", "rest"] : [state.past ? "recording" : "running", state.past ? "rest" : "running"];
+  $("state").textContent = word;
+  $("state").className = `pill ${kind}`;
+  if (state.status.time !== undefined) $("clock").textContent = `${state.status.time.toFixed(0)} s`;
+  $("pause").firstChild.textContent = state.status.mode === "paused" ? "Go on " : "Pause ";
+  for (const button of document.querySelectorAll("[data-do=stop], [data-do=pause], [data-do=tab-move]")) button.hidden = state.past;
+  if (!state.cards.length) showCards();
+}
+
+// ---- the story
+
+function node(tag, kind, ...content) {
+  const made = document.createElement(tag);
+  made.className = kind;
+  made.append(...content);
+  return made;
+}
+
+function labelled(kind, label, text) {
+  return node("p", kind, node("b", "", `${label} `), text);
+}
+
+function showCards() {
+  const known = new Set(state.cards.map((card) => title(card.part)));
+  const silent = (state.status.agents || []).filter((name) => !known.has(name));
+  const cards = state.cards.map(card);
+  for (const name of silent) cards.push(waiting(name, "Its agent is up. Waiting for its first decision."));
+  if (!cards.length) cards.push(waiting("No agent moves this robot", state.robot ? "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders." : "Waiting for the robot."));
+  $("cards").replaceChildren(...cards);
+  for (const one of state.cards) {
+    const plot = $("cards").querySelector(`[data-part="${one.part}"] canvas`);
+    if (plot) drawSurprise(plot, one.recent, colorOf(one.part));
+  }
+}
+
+function waiting(name, text) {
+  const made = node("article", "card", node("h3", "", name), node("p", "", text));
+  made.style.setProperty("--hue", "#98a5b3");
+  return made;
+}
+
+function card(one) {
+  const facts = one.n === undefined ? "" : `${one.n} transitions, ${share(one.tried)} of ${one.actions} actions tried, ${share(one.predictable)} predictable`;
+  const plot = node("canvas", "");
+  plot.title = "Surprise of the last 60 transitions, −ln p in nats; amber: it did not get where it wanted";
+  const small = node("small", "", facts);
+  small.title = "Predictable: tried at least twice, and at least 80 % of the tries ended alike";
+  const made = node("article", `card${picture.chosen === one.part ? " chosen" : ""}`, node("h3", "", one.title, small, plot));
+  made.dataset.part = one.part;
+  made.style.setProperty("--hue", `rgb(${colorOf(one.part)})`);
+  made.title = "Click: show the places of this part only";
+  const taken = state.control.taken?.includes(one.part);
+  if (one.reach && (taken || !one.now)) made.append(node("p", "now", one.reach));
+  else if (taken) made.append(node("p", "now", "Taken over on this page. Its agent rests. G gives it back."));
+  else if (one.now) {
+    const now = node("p", "", node("b", "", "Tries "), node("strong", "now", one.now), ` ${one.expects}`);
+    now.title = one.chooses ? `It chooses ${one.chooses}.` : "";
+    made.append(now);
+  } else if (!one.last) made.append(node("p", "", "Waiting for its first action to begin."));
+  if (one.last) {
+    const kind = one.last.reached ? "reached" : "missed";
+    const line = labelled("", "Last", node("span", kind, one.last.outcome));
+    const surprise = node("span", "", ` ${one.last.surprise}`);
+    surprise.title = "Surprise: −ln of the probability that it gave to what happened. Learned: how much its model changed (Kullback-Leibler divergence).";
+    line.append(surprise);
+    made.append(line);
+  } else if (one.now && !taken) {
+    made.append(node("p", "", one.n ? `It goes on after ${one.n} transitions of an earlier run.` : "Its first action has not ended yet: nothing is learned so far."));
+  }
+  if (one.wants && !taken) made.append(labelled("", "Wants", one.wants));
+  made.addEventListener("click", () => choose(picture.chosen === one.part ? null : one.part));
+  return made;
+}
+
+function share(part) {
+  const percent = 100 * part;
+  return `${percent > 0 && percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`;
+}
+
+function choose(part) {
+  picture.chosen = part;
+  picture.dirty = true;
+  $("wonders-of").textContent = part ? title(part) : "";
+  if (part) move.choose(part);
+  showCards();
+}
+
+function chooseNext() {
+  const names = [null, ...state.cards.map((one) => one.part)];
+  choose(names[(names.indexOf(picture.chosen) + 1) % names.length]);
+}
+
+function showLegend() {
+  const entries = Object.entries(picture.places).map(([part, where]) => {
+    const ramp = node("i", "ramp");
+    ramp.style.background = `linear-gradient(90deg, rgb(26,34,44), rgb(${colorOf(part)}))`;
+    return node("span", "", ramp, `${where.marker} in the poses of the ${title(part)}: bright = much left to learn, dark = learned`);
+  });
+  if (entries.length > 1) entries.splice(0, entries.length, ...Object.entries(picture.places).map(([part, where]) => {
+    const ramp = node("i", "ramp");
+    ramp.style.background = `linear-gradient(90deg, rgb(26,34,44), rgb(${colorOf(part)}))`;
+    return node("span", "", ramp, `${title(part)} (${where.marker})`);
+  }), node("span", "", "dark: learned, bright: much left to learn"));
+  if (entries.length) entries.push(node("span", "", "white arrow: the action, dashed: its plan"));
+  $("legend").replaceChildren(...entries);
+}
+
+function showCurves() {
+  if ($("knows").hidden) return;
+  const colors = Object.fromEntries(Object.keys(state.curves).map((part) => [part, colorOf(part)]));
+  drawCurves($("curves"), state.curves, colors, "The curve begins when an agent has ended its first action.");
+}
+
+// ---- the 3D view
+
+function openViewer() {
+  const frame = $("viewer");
+  if (frame.src || window.innerWidth < 640) {
+    if (!frame.src) $("loading").textContent = "The 3D view needs a wide window.";
+    return;
+  }
+  frame.src = "viewer.html";
+  frame.hidden = false;
+}
+
+addEventListener("message", (event) => {
+  if (event.source !== $("viewer").contentWindow || event.origin !== location.origin) return;
+  const { kind, share: part, time, text } = event.data;
+  if (kind === "loading") $("loading").textContent = `The 3D view loads: ${Math.round(100 * part)} %. The story beside it is live already.`;
+  if (kind === "ready") $("loading").textContent = "The 3D view draws its first picture.";
+  if (kind === "time") {
+    $("loading").hidden = true;
+    state.viewerTime = state.past ? null : time;
+  }
+  if (kind === "failed") {
+    $("loading").hidden = false;
+    $("loading").textContent = `The 3D view has failed (${String(text).slice(0, 200)}). Press V to load it again.`;
+  }
+});
+
+// ---- keys and buttons
+
+let resets = 0;
+let seeking = 0;
+function seek(at) {
+  clearTimeout(seeking);
+  seeking = setTimeout(() => fetch(`seek?at=${at}`), 80);
+}
+
+const actions = {
+  " ": ["pause", "stop the robot's time, or let it go on", () => (state.past ? fetch("seek?toggle=1") : send(state.status.mode === "paused" ? "resume" : "pause"))],
+  s: ["stop", "EMERGENCY STOP: all motors, at once", () => send("stop")],
+  r: ["release", "release the emergency stop", () => send("release")],
+  c: ["control", "take the controls from another page", () => send("control")],
+  m: ["tab-move", "move a part: sliders, take over (T), give back (G)", () => tab("move")],
+  t: ["take", "take the chosen part over from its agent", () => move.take()],
+  g: ["give", "give the chosen part back", () => move.give()],
+  n: ["next", "choose the next part", () => move.next()],
+  h: ["reach", "let the nearest hand reach for the place or ball that was clicked", () => (state.place ? send("reach", state.place) : say("Click a place in the picture of the body first.", true))],
+  b: ["ball", "let the nearest hand reach for the ball (the first target in the world)", () => move.reachTarget(picture.objects)],
+  f: ["fields", "show or hide the fields around the body", () => toggleFields()],
+  "1": ["view-oblique", "see the body from the front, left and above (drag turns it)", () => picture.look("oblique")],
+  "2": ["view-front", "see it from the front", () => picture.look("front")],
+  "3": ["view-top", "see it from above", () => picture.look("top")],
+  "4": ["view-side", "see it from the side", () => picture.look("side")],
+  p: ["part", "show the places of one agent after the other, then of all", () => chooseNext()],
+  k: ["tab-knows", "what the agents know, as curves", () => tab("knows")],
+  e: ["tab-events", "the events", () => tab("events")],
+  "+": ["faster", "lockstep: double the largest speed", () => pace(2)],
+  "-": ["slower", "lockstep: halve the largest speed", () => pace(0.5)],
+  "0": ["reset", "start the simulation again at home (press twice)", () => resetTwice()],
+  v: ["viewer", "load the 3D view again", () => reloadViewer()],
+  "?": ["help", "list these keys", () => help()],
+};
+const byName = { ...Object.fromEntries(Object.values(actions).map(([name, , act]) => [name, act])), play: () => fetch("seek?toggle=1") };
+
+function toggleFields() {
+  picture.fields = !picture.fields;
+  picture.dirty = true;
+  if (key && !state.past) send("fields", { shown: picture.fields });
+}
+
+function pace(factor) {
+  if (!state.robot?.lockstep) return say("The robot runs in real time; a speed can be set in lockstep only.", true);
+  state.pace = Math.min(64, Math.max(0.25, (state.pace || 4) * factor));
+  send("pace", { speed: state.pace });
+}
+
+function resetTwice() {
+  if (performance.now() - resets < 2500) return send("reset");
+  resets = performance.now();
+  say("Press 0 again to start the simulation anew.");
+}
+
+function reloadViewer() {
+  $("viewer").src = "";
+  $("viewer").removeAttribute("src");
+  $("loading").hidden = false;
+  state.viewerTime = null;
+  openViewer();
+}
+
+function tab(name) {
+  for (const one of ["knows", "move", "events"]) {
+    $(one).hidden = one !== name;
+    document.querySelector(`[data-do=tab-${one}]`).setAttribute("aria-selected", String(one === name));
+  }
+  if (name === "knows") showCurves();
+}
+
+function help() {
+  const rows = Object.entries(actions).map(([press, [, text]]) => node("tr", "", node("td", "", node("kbd", "", press === " " ? "space" : press.toUpperCase())), node("td", "", text)));
+  const close = node("button", "", "Close (Esc)");
+  close.addEventListener("click", () => $("help").close());
+  const note = key || state.past ? "" : "This page can only show: it was opened without the key that the launcher prints in its address.";
+  $("help").replaceChildren(node("h2", "", "Keys"), node("p", "", note), node("table", "", ...rows), close);
+  $("help").showModal();
+}
+
+addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT" && event.key !== "s") return;
+  if ($("help").open) return;
+  const found = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (!found || (event.target.tagName === "BUTTON" && event.key === " ")) return;
+  event.preventDefault();
+  found[2]();
+});
+document.addEventListener("click", (event) => {
+  const name = event.target.closest?.("[data-do]")?.dataset.do;
+  if (name) {
+    byName[name]?.();
+    event.target.blur?.();
+  }
+});
+$("seek").addEventListener("input", () => seek($("seek").value));
+const watch = new ResizeObserver(() => {
+  picture.frame = null;
+  picture.dirty = true;
+  showCurves();
+});
+watch.observe($("body"));
+watch.observe($("knows"));
+
+function animate() {
+  picture.draw();
+  requestAnimationFrame(animate);
+}
+
+animate();
+follow();
+setTimeout(openViewer, 1500); // after the story, which is light

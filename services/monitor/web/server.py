@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Serves the page on loopback: its files, the board's news, pictures for the 3D view, and calls of people who have the key."""
+
+from __future__ import annotations
+
+import hmac
+import json
+import mimetypes
+import shutil
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, Protocol
+from urllib.parse import parse_qs, urlsplit
+
+from services.monitor.web.board import Board
+
+FILES = Path(__file__).with_name("files")
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+NEWS_PATIENCE = 5.0  # s that a request for news waits
+FRAME_PATIENCE = 2.0  # s that a request for the 3D view waits
+GONE = 6.0  # s without a request after which a page counts as closed
+LARGEST_CALL = 20_000  # bytes
+POLICY = (
+    "default-src 'self'; connect-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; worker-src 'self' blob:; frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+)
+"""Content security policy: the browser itself refuses every address but this server."""
+
+
+class Refused(Exception):
+    """A call that cannot be done; the text is shown on the page."""
+
+
+class Controls(Protocol):
+    """The calls of the page."""
+
+    def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
+        """Do what a page asks for; returns a sentence for the person, raises Refused."""
+
+    def tend(self, open_pages: set[str]) -> None:
+        """Called every second with the ids of the open pages."""
+
+
+class Frames(Protocol):
+    """The 3D view's data."""
+
+    def newest(self, after: int, patience: float) -> bytes:
+        """Return what a viewer needs after a frame: see viewer/frames.py."""
+
+
+@dataclass
+class Pages:
+    """The open pages, by the ids that they chose, and how late each is."""
+
+    seen: dict[str, float] = field(default_factory=dict)  # monotonic clock of the last request
+    late: dict[str, dict[str, float]] = field(default_factory=dict)  # s of robot time: of the page, of its 3D view
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def note(self, page: str, late: dict[str, float]) -> None:
+        """Note a request of a page."""
+        with self.lock:
+            self.seen[page], self.late[page] = time.monotonic(), late
+
+    def open(self) -> set[str]:
+        """Return the pages that asked for something lately; the others are forgotten."""
+        with self.lock:
+            for page in [page for page, when in self.seen.items() if time.monotonic() - when > GONE]:
+                del self.seen[page], self.late[page]
+            return set(self.seen)
+
+
+@dataclass(frozen=True)
+class Site:
+    """What the server serves.
+
+    `key`: the word in the page's address without which a page shows everything and can do nothing.
+    `viewer_file`: returns the path of a file of Rerun's viewer, by name; None: there is no 3D view.
+    `time`: the robot's time now, s.  `others`: further files, by the name under which they are served.
+    `seek`: moves in time on a page that shows the past, given the query of the address.
+    """
+
+    board: Board
+    key: str
+    controls: Controls
+    frames: Frames | None
+    viewer_file: Callable[[str], Path] | None
+    time: Callable[[], float]
+    others: Mapping[str, Path] = field(default_factory=dict)
+    seek: Callable[[Mapping[str, str]], None] | None = None
+    pages: Pages = field(default_factory=Pages)
+
+
+VIEWER_FILES = ("re_viewer.js", "re_viewer_bg.wasm")
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that closes a connection is no error."""
+
+
+class PageServer:
+    """The server in threads of its own."""
+
+    def __init__(self, site: Site, bind: str, port: int) -> None:
+        """Begin to serve; raises OSError if the port cannot be used."""
+        self.site = site
+        self._server = _Server((bind, port), partial(_Handler, site))
+        self.port = int(self._server.server_address[1])
+        self._ends = threading.Event()
+        threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True, name="page").start()
+        threading.Thread(target=self._tend, daemon=True, name="tend").start()
+
+    def close(self) -> None:
+        """End the server."""
+        self._ends.set()
+        self._server.shutdown()
+        self._server.server_close()
+
+    def _tend(self) -> None:
+        while not self._ends.wait(1.0):
+            self.site.controls.tend(self.site.pages.open())
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers one connection."""
+
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "MoBeE", ""
+    timeout = 60.0  # s without a request after which a connection is closed
+
+    def __init__(self, site: Site, *arguments: Any) -> None:
+        self._site = site
+        super().__init__(*arguments)
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        """Log nothing: there are many requests a second."""
+
+    def do_GET(self) -> None:
+        """Answer with a file, news, or a frame of the 3D view."""
+        if not self._is_local():
+            return
+        address = urlsplit(self.path)
+        query = {name: values[-1] for name, values in parse_qs(address.query).items()}
+        name = address.path.lstrip("/") or "index.html"
+        try:
+            if name == "news":
+                self._send_news(query)
+            elif name == "frame":
+                self._send_frame(query)
+            elif name == "seek" and self._site.seek is not None:
+                self._site.seek(query)
+                self._send(HTTPStatus.NO_CONTENT, "text/plain", b"")
+            elif name in VIEWER_FILES and self._site.viewer_file is not None:
+                self._send_file(self._site.viewer_file(name))
+            elif name in self._site.others:
+                self._send_file(self._site.others[name])
+            elif "/" not in name and (FILES / name).is_file():
+                self._send_file(FILES / name)
+            else:
+                self._send(HTTPStatus.NOT_FOUND, "text/plain", b"there is no such file\n")
+        except ValueError:
+            self._send(HTTPStatus.BAD_REQUEST, "text/plain", b"the query is not valid\n")
+
+    def do_POST(self) -> None:
+        """Do what a page with the key asks for."""
+        length = int(self.headers.get("Content-Length") or 0)
+        if not self._is_local() or not self._is_from_the_page():
+            return
+        if length > LARGEST_CALL:
+            self.close_connection = True
+            self._answer(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, False, "the request is too long")
+            return
+        body = self.rfile.read(length)
+        if not hmac.compare_digest(self.headers.get("X-Key", ""), self._site.key):
+            self._answer(HTTPStatus.FORBIDDEN, False, "this page can only show: open the address that the launcher prints, with its key")
+            return
+        try:
+            asked = json.loads(body)
+            page, verb, arguments = str(asked["page"]), str(asked["verb"]), dict(asked.get("arguments", {}))
+        except (ValueError, KeyError, TypeError):
+            self._answer(HTTPStatus.BAD_REQUEST, False, "the request is not valid")
+            return
+        try:
+            self._answer(HTTPStatus.OK, True, self._site.controls.do(page, verb, arguments))
+        except Refused as refused:
+            self._answer(HTTPStatus.OK, False, str(refused))
+
+    def _is_local(self) -> bool:
+        """Refuse a request under another name than loopback's: a page of the internet could have sent the browser here."""
+        host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
+        if host in LOOPBACK:
+            return True
+        self.close_connection = True
+        self._send(HTTPStatus.FORBIDDEN, "text/plain", b"this page is served on loopback only: open it as 127.0.0.1\n")
+        return False
+
+    def _is_from_the_page(self) -> bool:
+        origin = self.headers.get("Origin")
+        if origin is None or urlsplit(origin).netloc == self.headers.get("Host"):
+            return True
+        self.close_connection = True
+        self._answer(HTTPStatus.FORBIDDEN, False, "the request comes from another page")
+        return False
+
+    def _send_news(self, query: dict[str, str]) -> None:
+        site, page, now = self._site, query.get("page", "")[:40], self._site.time()
+        shown = {name: round(max(0.0, now - float(query[name])), 2) for name in ("body", "viewer") if query.get(name)}
+        if page:
+            site.pages.note(page, shown)
+        text = site.board.news(int(query.get("after", 0)), NEWS_PATIENCE)
+        late = json.dumps({"late": shown})
+        self._send(HTTPStatus.OK, "application/json", f"{text[:-1]},{late[1:]}".encode())
+
+    def _send_frame(self, query: dict[str, str]) -> None:
+        frames = self._site.frames
+        data = b"" if frames is None else frames.newest(int(query.get("after", 0)), FRAME_PATIENCE)
+        self._send(HTTPStatus.OK, "application/octet-stream", data)
+
+    def _send_file(self, path: Path) -> None:
+        kind = "text/javascript" if path.suffix == ".js" else mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+        self._head(HTTPStatus.OK, kind, path.stat().st_size, cache=path.name in VIEWER_FILES)
+        with path.open("rb") as file:
+            shutil.copyfileobj(file, self.wfile, 1 << 20)
+
+    def _answer(self, status: HTTPStatus, ok: bool, text: str) -> None:
+        self._send(status, "application/json", json.dumps({"ok": ok, "text": text}).encode())
+
+    def _send(self, status: HTTPStatus, kind: str, data: bytes) -> None:
+        self._head(status, kind, len(data))
+        self.wfile.write(data)
+
+    def _head(self, status: HTTPStatus, kind: str, length: int, cache: bool = False) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if kind.startswith("text/") else kind)
+        self.send_header("Content-Length", str(length))
+        self.send_header("Cache-Control", "max-age=3600" if cache else "no-store")
+        self.send_header("Content-Security-Policy", POLICY)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.end_headers()

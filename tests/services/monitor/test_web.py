@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The web server of the page: what it answers, and to whom."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.monitor.web.board import Board
+from services.monitor.web.record import Record, entries
+from services.monitor.web.server import PageServer, Refused, Site
+
+
+class Asked:
+    """Controls that note what they were asked for."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[str, str, dict[str, Any]]] = []
+
+    def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
+        self.calls.append((page, verb, arguments))
+        if verb == "fly":
+            raise Refused("it has no wings")
+        return "done"
+
+    def tend(self, open_pages: set[str]) -> None:
+        pass
+
+
+@pytest.fixture
+def served() -> Iterator[tuple[PageServer, Asked]]:
+    controls = Asked()
+    server = PageServer(Site(Board(), "secret", controls, None, None, lambda: 12.0), "127.0.0.1", 0)
+    yield server, controls
+    server.close()
+
+
+def ask(server: PageServer, method: str, path: str, body: object = None, **headers: str) -> tuple[int, dict[str, str], bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20.0)
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    connection.request(method, path, None if body is None else json.dumps(body), given)
+    answer = connection.getresponse()
+    found = answer.status, dict(answer.getheaders()), answer.read()
+    connection.close()
+    return found
+
+
+CALL = {"page": "p", "verb": "pause", "arguments": {}}
+
+
+def test_the_page_may_load_nothing_from_elsewhere(served: tuple[PageServer, Asked]) -> None:
+    status, headers, page = ask(served[0], "GET", "/")
+    assert status == 200 and b"<title>MoBeE" in page
+    assert "default-src 'self'; connect-src 'self'" in headers["Content-Security-Policy"]
+    files = Path(__file__).parents[3] / "services" / "monitor" / "web" / "files"
+    for file in files.iterdir():
+        assert "//" not in file.read_text().replace("// ", "").replace("//\n", ""), f"{file} has an address"
+
+
+def test_a_call_without_the_key_or_from_another_page_is_refused(served: tuple[PageServer, Asked]) -> None:
+    server, controls = served
+    assert ask(server, "POST", "/do", CALL)[0] == 403
+    assert ask(server, "POST", "/do", CALL, X_Key="wrong")[0] == 403
+    assert ask(server, "POST", "/do", CALL, X_Key="secret", Origin="http://example.org")[0] == 403
+    assert controls.calls == []
+    status, _, body = ask(server, "POST", "/do", CALL, X_Key="secret", Origin=f"http://127.0.0.1:{server.port}")
+    assert (status, json.loads(body)) == (200, {"ok": True, "text": "done"})
+    assert controls.calls == [("p", "pause", {})]
+
+
+@pytest.mark.parametrize("host", ["example.org", "example.org:80", "127.0.0.1.example.org:80"])
+def test_another_name_of_the_host_is_refused(served: tuple[PageServer, Asked], host: str) -> None:
+    assert ask(served[0], "GET", "/", Host=host)[0] == 403
+    assert ask(served[0], "POST", "/do", CALL, X_Key="secret", Host=host)[0] == 403
+
+
+def test_a_refusal_and_an_invalid_call_are_said(served: tuple[PageServer, Asked]) -> None:
+    _, _, body = ask(served[0], "POST", "/do", CALL | {"verb": "fly"}, X_Key="secret")
+    assert json.loads(body) == {"ok": False, "text": "it has no wings"}
+    assert ask(served[0], "POST", "/do", [1], X_Key="secret")[0] == 400
+    assert ask(served[0], "GET", "/../config.py")[0] == 404
+    assert ask(served[0], "GET", "/news?after=many")[0] == 400
+
+
+def test_a_reader_gets_what_changed_and_skips_what_it_missed() -> None:
+    board = Board()
+    board.put("body", 1)
+    board.put("story", "a")
+    first = json.loads(board.news(0, 0.0))
+    assert first == {"version": 2, "body": 1, "story": "a"}
+    board.put("story", "a")  # no change
+    for pose in (2, 3, 4):
+        board.put("body", pose)
+    assert json.loads(board.news(first["version"], 0.0)) == {"version": 5, "body": 4}
+    assert json.loads(board.news(1000, 0.0))["body"] == 4  # the monitor was started again
+
+
+def test_a_reader_waits_for_news() -> None:
+    board = Board()
+    threading.Timer(0.2, board.put, ("body", 1)).start()
+    begin = time.monotonic()
+    assert json.loads(board.news(0, 20.0))["body"] == 1
+    assert time.monotonic() - begin < 15.0
+    assert json.loads(board.news(1, 0.01)) == {"version": 1}
+
+
+def test_news_say_how_late_the_page_is(served: tuple[PageServer, Asked]) -> None:
+    served[0].site.board.put("body", 1)
+    _, _, body = ask(served[0], "GET", "/news?after=0&page=p&body=11.5&viewer=10")
+    assert json.loads(body)["late"] == {"body": 0.5, "viewer": 2.0}
+    assert served[0].site.pages.open() == {"p"}
+
+
+def test_a_record_is_read_as_it_was_written_also_if_its_end_was_cut_off(tmp_path: Path) -> None:
+    times = iter((0.0, 0.5, 1.0))
+    record = Record(tmp_path / "story.jsonl", lambda: next(times))
+    board = Board(record.put)
+    board.put("cards", [{"part": "arm"}])
+    board.put("body", 1)  # not recorded
+    board.record("q", [0.1])
+    record.close()
+    with (tmp_path / "story.jsonl").open("a") as file:
+        file.write('[2.0,"cards",[{"pa')
+    assert [(one.time, one.name, one.value) for one in entries(tmp_path / "story.jsonl")] == [
+        (0.0, "cards", [{"part": "arm"}]),
+        (1.0, "q", [0.1]),
+    ]
