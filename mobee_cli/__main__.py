@@ -38,6 +38,7 @@ VERBS = {
     "completion": "print the script with which a shell completes this command",
     "conform": "test a robot_sim of your own against the contract of the bus",
     "replay": "show the page of a run again, with a time line",
+    "film": "make a film of a run: the robot and its story",
 }
 
 EXTRAS = {

@@ -122,7 +122,7 @@ class MonitorNode:
                 "title": title_of(name),
                 "color": list(self._colors[name]),
                 "motors": [
-                    {"name": joint_words(motor, name), "low": float(low), "high": float(high)}
+                    {"name": joint_words(motor, name, robot), "low": float(low), "high": float(high)}
                     for motor, (low, high) in zip(part.motors, robot.limits[part.slice], strict=True)
                 ],
             }

@@ -5,87 +5,26 @@ from __future__ import annotations
 
 import tempfile
 import time
-from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from bus_schema.messages import ContactItem, Geometry
-from bus_schema.rpc import ObjectState
-from mobee.errors import MobeeError
-from mobee.model.kinematics import quaternion_from_matrix
-from mobee.robot.load import load_robot
-from mobee.robot.robot import Robot
-from services.common.config import ConfigError, read_toml
-from services.monitor.config import Config
+from bus_schema.messages import ContactItem
+from services.monitor.past import Story, object_of
 from services.monitor.viewer.blueprint import TIMELINE, blueprint, shown_of
 from services.monitor.viewer.files import ViewerFiles
 from services.monitor.viewer.frames import Frames
-from services.monitor.viewer.output import HOST, STORY, NoControls, serve
+from services.monitor.viewer.output import HOST, NoControls, serve
 from services.monitor.viewer.scene import Scene
 from services.monitor.web.board import Board
 from services.monitor.web.body import look
-from services.monitor.web.record import Entry, entries
 from services.monitor.web.server import Site
 
 PERIOD = 0.1  # s between two pictures
 NOT_SHOWN = ("q", "contacts")  # on the page they are the body
-
-
-@dataclass(frozen=True)
-class Track:
-    """The values that something had, in the order of their times [s]."""
-
-    times: Sequence[float]
-    values: Sequence[Any]
-
-    def at(self, moment: float) -> Any:
-        """Return the newest value at a moment; None before the first."""
-        index = bisect_right(self.times, moment)
-        return self.values[index - 1] if index else None
-
-
-class Story:
-    """What was recorded of a run."""
-
-    def __init__(self, run: Path) -> None:
-        """Read the record in a run's folder; raises MobeeError."""
-        found = entries(run / STORY)
-        self.tracks = _tracks(found)
-        if "q" not in self.tracks:
-            raise MobeeError(f"{run / STORY} holds no pose of the robot: the run ended before it moved.")
-        try:
-            self.robot: Robot = load_robot(read_toml(run / "monitor.toml", Config).robot)
-        except ConfigError as error:
-            raise MobeeError(f"{error}: give the folder of a run of `mobee launch`.") from None
-        if len(self.tracks["q"].values[0]) != len(self.robot.motors):
-            raise MobeeError(
-                f"{run}: the robot had {len(self.tracks['q'].values[0])} motors then, {self.robot.name!r} has {len(self.robot.motors)}."
-            )
-        self.begin, self.end = self.tracks["q"].times[0], found[-1].time
-
-    @property
-    def length(self) -> float:
-        """Duration of the record, s."""
-        return self.end - self.begin
-
-    def at(self, seconds: float) -> dict[str, Any]:
-        """Return all values at a moment, s since the begin."""
-        moment = self.begin + min(max(seconds, 0.0), self.length)
-        return {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
-
-
-def _tracks(found: Sequence[Entry]) -> dict[str, Track]:
-    lists: dict[str, tuple[list[float], list[Any]]] = {}
-    for one in found:
-        times, values = lists.setdefault(one.name, ([], []))
-        times.append(one.time)
-        values.append(one.value)
-    return {name: Track(times, values) for name, (times, values) in lists.items()}
 
 
 class Player:
@@ -153,7 +92,7 @@ def _show(story: Story, player: Player, board: Board, frames: Frames, scene: Sce
             board.put(name, value)
     board.put("body", {"t": round(at, 2), "q": values["q"], **look(story.robot, q, contacts)})
     frames.set_time(TIMELINE, clock)  # not the time of the story: a viewer shows the newest time, also after a step back
-    scene.set_objects([_thing(one) for one in values.get("objects", [])])
+    scene.set_objects([object_of(one) for one in values.get("objects", [])])
     frames.begin_look()
     scene.log_robot(q, contacts)
     frames.end_look()
@@ -161,8 +100,3 @@ def _show(story: Story, player: Player, board: Board, frames: Frames, scene: Sce
 
 def _contact(one: Mapping[str, Any]) -> ContactItem:
     return ContactItem(one["first"], one["second"], one["kind"], 0.0, one["point"], [0.0, 0.0, 1.0], -1, -1)
-
-
-def _thing(one: Mapping[str, Any]) -> ObjectState:
-    turn = quaternion_from_matrix(np.array(one["rotation"])[None])[0].tolist()
-    return ObjectState(one["name"], Geometry(one["kind"], one["size"]), one["position"], turn, one["role"], "")

@@ -45,11 +45,13 @@ class Knowledge:
     def left(self, first: float) -> Array:
         """Return how much is left to learn in each state, (S,) in 0..1: the mean information gain of its actions over the `first` one."""
         gain = np.where(self.exists, self.reward, 0.0).sum(axis=1) / np.maximum(self.exists.sum(axis=1), 1)
-        return np.clip(gain / max(first, 1e-12), 0.0, 1.0)
+        left: Array = np.clip(gain / max(first, 1e-12), 0.0, 1.0)
+        return left
 
     def untried(self) -> Ints:
         """Return how many actions of each state were never tried, (S,)."""
-        return ((self.tries == 0) & self.exists).sum(axis=1)
+        found: Ints = ((self.tries == 0) & self.exists).sum(axis=1)
+        return found
 
 
 def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:

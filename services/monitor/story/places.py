@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.learning.record import space_from
 from mobee.learning.space import Space
+from mobee.model.contact import links_moved
 from mobee.model.kinematics import link_transforms
 from mobee.robot.robot import Robot
 from services.common.hands import moved_markers
@@ -26,17 +28,33 @@ def space_of(settings: str, robot: Robot) -> Space | None:
         return None
 
 
-def shown_marker(robot: Robot, part: str) -> str | None:
-    """Return the marker that shows where a part is: the one with the fewest motors of other parts before it, then the farthest.
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A point on a link that shows where a part is: `position` (3,) m, in the root frame with every joint at zero."""
 
-    That is an arm's palm, and a torso's head; None if the part moves no marker.
+    name: str
+    link: int
+    position: Array
+
+
+def shown_spot(robot: Robot, part: str) -> Spot | None:
+    """Return the marker with the fewest motors of other parts before it, of equal ones the farthest; without markers the last link.
+
+    That is an arm's palm, and a torso's head; None if the part moves no link.
     """
 
-    def rank(name: str) -> tuple[int, int]:
-        parts = [robot.motor_table[motor].part for motor in _motors_before(robot, name)]
+    def rank(link: int) -> tuple[int, int]:
+        parts = [robot.motor_table[motor].part for motor in _motors_before(robot, link)]
         return sum(other != part for other in parts), -len(parts)
 
-    return min(moved_markers(robot, part), key=rank, default=None)
+    marker = min((robot.marker(name) for name in moved_markers(robot, part)), key=lambda one: rank(one.link), default=None)
+    if marker is not None:
+        return Spot(marker.name, marker.link, marker.position)
+    link = min(links_moved(robot)[part], key=rank, default=0)
+    if link == 0:
+        return None
+    solids = [shape.position for shape in robot.shapes if shape.link == link]
+    return Spot(f"end of the {part}", link, np.mean(solids, axis=0) if solids else robot.joints[link - 1].point)
 
 
 def base_link(robot: Robot, part: str) -> int:
@@ -45,26 +63,24 @@ def base_link(robot: Robot, part: str) -> int:
     return min((robot.joints[index].parent for index in first), default=0)
 
 
-def places(space: Space, marker: str, q: Array) -> Array:
-    """Return the marker's place in each state, (S, 3) m in the frame of the link that the part is mounted on.
+def places(space: Space, spot: Spot, q: Array) -> Array:
+    """Return the place of a spot in each state, (S, 3) m in the frame of the link that the part is mounted on.
 
     `q`: (n,) rad, posture of the other parts.
     """
     robot, part = space.robot, space.robot.part(space.part)
-    base, found = base_link(robot, space.part), robot.marker(marker)
-    poses = np.tile(q, (len(space), 1))
-    for state in range(len(space)):
-        poses[state, part.slice] = space.target(state)
+    base, pose = base_link(robot, space.part), q.copy()
     where = np.empty((len(space), 3))
-    for state, pose in enumerate(poses):
+    for state in range(len(space)):
+        pose[part.slice] = space.target(state)
         transforms = link_transforms(robot, pose)
-        seen = transforms[found.link, :3, :3] @ found.position + transforms[found.link, :3, 3]
+        seen = transforms[spot.link, :3, :3] @ spot.position + transforms[spot.link, :3, 3]
         where[state] = transforms[base, :3, :3].T @ (seen - transforms[base, :3, 3])
     return where
 
 
-def _motors_before(robot: Robot, marker: str) -> list[int]:
-    link, chain = robot.marker(marker).link, list[int]()
+def _motors_before(robot: Robot, link: int) -> list[int]:
+    chain: list[int] = []
     while link > 0:
         chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()
         link = robot.joints[link - 1].parent

@@ -15,7 +15,7 @@ from mobee.learning.space import Space
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot
 from services.monitor.story.knowledge import Knowledge, knowledge_of
-from services.monitor.story.places import MAX_STATES, base_link, places, shown_marker, space_of
+from services.monitor.story.places import MAX_STATES, Spot, base_link, places, shown_spot, space_of
 from services.monitor.story.sentences import (
     STRATEGIES,
     expects_sentence,
@@ -41,7 +41,7 @@ class _Agent:
     space: Space | None = None
     settings: str = ""
     where: Array | None = None  # (S, 3) m, see places
-    marker: str | None = None
+    spot: Spot | None = None
     known: Knowledge | None = None
     first: float = 0.0  # nats: the largest information gain ever seen
     decision: Decision | None = None
@@ -131,9 +131,9 @@ class Teller:
         if agent.space is not None and agent.space.part != agent.part:
             agent.space = None
         if agent.space is not None and len(agent.space) <= MAX_STATES:
-            agent.marker = shown_marker(self._robot, agent.part)
-            if agent.marker is not None:
-                agent.where = places(agent.space, agent.marker, np.clip(self._robot.home, *self._robot.limits.T))
+            agent.spot = shown_spot(self._robot, agent.part)
+            if agent.spot is not None:
+                agent.where = places(agent.space, agent.spot, np.clip(self._robot.home, *self._robot.limits.T))
         self.changed.add("places")
 
     def _cards(self) -> list[dict[str, Any]]:
@@ -167,11 +167,11 @@ class Teller:
         return {
             part: {
                 "link": base_link(self._robot, part),
-                "marker": title_of(agent.marker or ""),
+                "marker": title_of(agent.spot.name),
                 "points": np.round(agent.where, 4).tolist(),
             }
             for part, agent in self._agents.items()
-            if agent.where is not None
+            if agent.where is not None and agent.spot is not None
         }
 
     def _left(self) -> dict[str, Any]:

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from mobee.arrays import Array
 from mobee.learning.space import Space
+from mobee.robot.robot import Robot
 from services.common.worlds import AT_TABLE
 
 ROOT_AXES = ("x", "y", "z")
@@ -23,13 +26,17 @@ def title_of(name: str) -> str:
     return name.replace("_", " ")
 
 
-def joint_words(name: str, part: str) -> str:
-    """Return the name of a motor without its part and side: l_shoulder_pitch of left_arm is "shoulder pitch"."""
-    for prefix in (f"{part}_", *SIDES):
-        if name.startswith(prefix) and len(name) > len(prefix):
+def joint_words(name: str, part: str, robot: Robot) -> str:
+    """Return the name of a motor without what says nothing: l_shoulder_pitch of left_arm is "shoulder pitch", panda_joint1 "joint 1".
+
+    It loses the part, the side, or the beginning that all motors of the robot share.
+    """
+    shared = os.path.commonprefix(robot.motors)
+    for prefix in (f"{part}_", *SIDES, shared[: shared.rfind("_") + 1]):
+        if prefix and name.startswith(prefix) and len(name) > len(prefix):
             name = name.removeprefix(prefix)
             break
-    return name.replace("_", " ")
+    return re.sub(r"(?<=[a-z])(?=\d+$)", " ", name.replace("_", " "))
 
 
 def ordinal(n: int) -> str:
@@ -69,7 +76,7 @@ def action_words(space: Space, state: int, goal: int) -> str:
     named = []
     for index in np.argsort(-np.abs(turns)).tolist():
         if abs(turns[index]) > 1e-6:
-            named.append(f"{joint_words(space.joints[index], space.part)} {_amount(space, index, float(turns[index]))}")
+            named.append(f"{joint_words(space.joints[index], space.part, space.robot)} {_amount(space, index, float(turns[index]))}")
     return ", ".join(named) or "stay in this pose"
 
 

@@ -29,7 +29,7 @@ class _Part:
 
     def __init__(self, recording_id: str) -> None:
         self.stream = rr.RecordingStream("mobee", recording_id=recording_id)
-        self._bytes = self.stream.binary_stream()
+        self._bytes = rr.binary_stream(self.stream)
         self.is_dirty = True
 
     def log(self, path: str | list[object], *what: Any, static: bool) -> None:

@@ -22,11 +22,11 @@ from services.monitor.config import Config
 from services.monitor.viewer.files import ViewerFiles
 from services.monitor.viewer.frames import Frames
 from services.monitor.web.board import Board
-from services.monitor.web.record import Record
+from services.monitor.web.record import STORY, Record
 from services.monitor.web.server import Controls, PageServer, Refused, Site
 
 HOST = "127.0.0.1"
-RECORDING, STORY, KEY = "recording.rrd", "story.jsonl", "page.key"  # in the folder of a run
+RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
 
 
 class NoControls:

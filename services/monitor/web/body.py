@@ -48,7 +48,8 @@ def _fewer(vertices: Array) -> Array:
     turn, height = np.pi * (1.0 + 5.0**0.5) * np.arange(MOST_VERTICES), 1.0 - (2.0 * np.arange(MOST_VERTICES) + 1.0) / MOST_VERTICES
     ring = np.sqrt(1.0 - height**2)
     directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    return vertices[np.unique((vertices @ directions.T).argmax(axis=0))]
+    kept: Array = vertices[np.unique((vertices @ directions.T).argmax(axis=0))]
+    return kept
 
 
 def look(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:

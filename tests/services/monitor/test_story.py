@@ -18,7 +18,7 @@ from mobee.rendering.palette import colors_of_all
 from services.agents.streams import surprises
 from services.monitor.status import Seen, banner
 from services.monitor.story.knowledge import knowledge_of
-from services.monitor.story.places import base_link, places, shown_marker
+from services.monitor.story.places import base_link, places, shown_spot
 from services.monitor.story.sentences import (
     expects_sentence,
     outcome_sentence,
@@ -54,9 +54,9 @@ def learned(model: TransitionModel, **changes: Any) -> Learned:
 
 def test_words() -> None:
     assert [ordinal(n) for n in (1, 2, 3, 4, 11, 12, 13, 21, 102, 111)] == "1st 2nd 3rd 4th 11th 12th 13th 21st 102nd 111th".split()
-    assert joint_words("l_shoulder_pitch", "left_arm") == "shoulder pitch"
-    assert joint_words("torso_yaw", "torso") == "yaw"
-    assert joint_words("panda_joint1", "arm") == "panda joint1"
+    assert joint_words("l_shoulder_pitch", "left_arm", ROBOT) == "shoulder pitch"
+    assert joint_words("torso_yaw", "torso", ROBOT) == "yaw"
+    assert joint_words("arm_0", "arm", load_robot("katana")) == "0"
     assert [listed(words) for words in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
     assert [percent(share) for share in (0.0, 0.001, 0.5, 0.999, 1.0)] == ["0 %", "under 1 %", "50 %", "over 99 %", "100 %"]
 
@@ -145,15 +145,26 @@ def test_what_is_known_and_what_is_left() -> None:
 
 
 def test_places_are_those_of_the_hand_and_move_with_the_body(rng: np.random.Generator) -> None:
-    assert shown_marker(ROBOT, "left_arm") == "left_palm"
-    assert shown_marker(ROBOT, "torso") == "head"
+    spots = {part: shown_spot(ROBOT, part) for part in ROBOT.parts}
+    assert {part: spot.name for part, spot in spots.items() if spot} == {
+        "torso": "head",
+        "head": "left_eye",
+        "left_arm": "left_palm",
+        "right_arm": "right_palm",
+    }
     q = rng.uniform(*ROBOT.limits.T)
-    where, base = places(SPACE, "left_palm", ROBOT.home), base_link(ROBOT, "left_arm")
+    where, base = places(SPACE, spots["left_arm"], ROBOT.home), base_link(ROBOT, "left_arm")
     q[ROBOT.part("left_arm").slice] = SPACE.target(17)
     transforms = link_transforms(ROBOT, q)
     palm = ROBOT.marker("left_palm")
     truly = transforms[palm.link, :3, :3] @ palm.position + transforms[palm.link, :3, 3]
     np.testing.assert_allclose(transforms[base, :3, :3] @ where[17] + transforms[base, :3, 3], truly, atol=1e-9)
+
+
+def test_a_part_without_markers_is_where_its_last_link_is() -> None:
+    spot = shown_spot(load_robot("katana"), "arm")
+    assert spot is not None
+    assert (spot.name, spot.link) == ("end of the arm", 6)
 
 
 def test_the_story_of_an_agent_from_its_messages() -> None:

@@ -24,9 +24,13 @@ export function drawCurves(canvas, curves, colors, waiting) {
     ink.fillText(waiting, 16, 30);
     return;
   }
-  const most = nice(Math.max(8, ...names.map((name) => curves[name].at(-1)[0])));
+  const newest = Math.max(8, ...names.map((name) => curves[name].at(-1)[0]));
+  const grows = newest - Math.min(...names.map((name) => curves[name][0][0]));
+  const most = grows > newest / 4 ? nice(newest) : newest + Math.max(2, Math.round(grows / 4));
   const top = Math.min(1, nice(100 * Math.max(0.05, ...names.map((name) => curves[name].at(-1)[1]))) / 100);
-  const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * n) / most;
+  const begun = Math.min(...names.map((name) => curves[name][0][0]));
+  const least = begun > most / 4 ? Math.floor(begun) : 0; // agents that go on after an earlier run
+  const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (n - least)) / (most - least);
   const y = (share) => height - MARGIN.bottom - ((height - MARGIN.top - MARGIN.bottom) * share) / top;
   ink.strokeStyle = "#262f3a";
   ink.fillStyle = "#98a5b3";
@@ -37,7 +41,8 @@ export function drawCurves(canvas, curves, colors, waiting) {
     ink.textAlign = "right";
     ink.fillText(`${+(100 * share).toFixed(1)} %`, MARGIN.left - 5, y(share) + 4);
     ink.textAlign = "center";
-    ink.fillText(`${Math.round((most * step) / 4)}`, x((most * step) / 4), height - MARGIN.bottom + 13);
+    const n = least + ((most - least) * step) / 4;
+    ink.fillText(`${Math.round(n)}`, x(n), height - MARGIN.bottom + 13);
   }
   ink.fillText("transitions that the agent has observed", (MARGIN.left + width) / 2, height - 4);
   for (const name of names) {

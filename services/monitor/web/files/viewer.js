@@ -3,7 +3,7 @@
 "use strict";
 
 const CHANNEL = "mobee";
-const SHOWN_PATIENCE = 4000; // ms after which the next frame is asked for, although the viewer has not said that it shows the last one
+const SHOWN_PATIENCE = 20000; // ms after which the next frame is asked for, although the viewer has not said that it shows the last one
 
 let shown = -1; // s of robot time that the viewer shows
 let shownChanged = () => {};
