@@ -12,8 +12,8 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT
 from services.monitor.film import film
 
-_NOTES = """The film takes 20 s: four stretches of the run, from its begin to its end, at twice
-the robot's speed, with the stories of up to three agents."""
+_NOTES = """The film takes 20 s: four stretches of the run, from its begin to its end, at
+twice the robot's speed, with the stories of up to three agents."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -28,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIELD=VALUE",
         help="change a setting, such as services.model.contact_forces=false",
     )
-    parser.add_argument("--headless", action="store_true", help="start without the monitor")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--headless", action="store_true", help="start without the page")
+    shown.add_argument("--page", action="store_true", help="start with the page, also if the scenario has none, as kinematic and lockstep")
     parser.add_argument("--duration", type=positive_number, metavar="S", help="end S seconds after all services are ready")
     parser.add_argument("--ticks", type=positive_whole, metavar="N", help="lockstep only (shared.mode=lock): end after N ticks")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
@@ -44,6 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
             scenario=arguments.scenario,
             settings=tuple(arguments.settings),
             headless=arguments.headless,
+            page=arguments.page,
             duration=arguments.duration,
             ticks=arguments.ticks,
             json=arguments.json,

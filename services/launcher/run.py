@@ -56,6 +56,7 @@ class Options:
     scenario: str = "default"
     settings: tuple[str, ...] = ()  # table.field=value
     headless: bool = False  # without the monitor
+    page: bool = False  # with the monitor, also if the scenario has none
     duration: float | None = None  # s after all services are ready; None: until a stop is requested
     ticks: int | None = None  # lockstep: number of ticks after which the run ends
     json: bool = False
@@ -73,7 +74,9 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     started, local = time.monotonic(), ""
     try:
         settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
-        scenario = read_scenario(options.scenario, settings, leave_out=["monitor"] if options.headless else [])
+        scenario = read_scenario(
+            options.scenario, settings, leave_out=["monitor"] if options.headless else [], with_also=["monitor"] if options.page else []
+        )
         library()  # if the core cannot be loaded: one error here instead of one from each service
         check_gains(scenario)
         check_lockstep(scenario)

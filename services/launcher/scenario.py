@@ -67,8 +67,12 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
 
 
-def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Sequence[str] = ()) -> Scenario:
+def read_scenario(
+    name_or_path: str, settings: Sequence[str] = (), leave_out: Sequence[str] = (), with_also: Sequence[str] = ()
+) -> Scenario:
     """Read the scenario with a shipped name or at a path; each of `settings`, "table.field=value", replaces a value of the file.
+
+    `leave_out`, `with_also`: services that are not started, and that are started if the file does not name them too.
 
     Raises ConfigError with one line: the place, the field, and the nearest valid name.
     """
@@ -83,6 +87,8 @@ def read_scenario(name_or_path: str, settings: Sequence[str] = (), leave_out: Se
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
     _place_files(data, path.parent)
+    for who in with_also if isinstance(data.get("services"), dict) else ():
+        data["services"].setdefault(who, {})
     origins = _override(data, settings)
 
     def place(field: str) -> str:

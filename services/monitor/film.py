@@ -15,7 +15,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, NotInstalled
 from mobee.model.model import Model
 from mobee.model.world import World
-from mobee.model.world_object import box, capsule, cylinder, sphere
+from mobee.model.world_object import Geometry
 from mobee.rendering.camera import Camera, camera_axes, framing
 from mobee.rendering.palette import Color
 from mobee.rendering.picture import draw
@@ -34,7 +34,6 @@ COLORS = 96  # of a GIF
 LEARNED, INK, QUIET = (196, 200, 206), (34, 38, 44), (110, 118, 128)  # colours of learned places, text and remarks
 MISSED, REACHED = (190, 110, 0), (24, 130, 60)
 FIRST_VIEW, OTHER_VIEW = (-32.0, 22.0), (148.0, 22.0)  # azimuth, elevation [degrees]: of robots that look along -x, and of the others
-SHAPES = {"sphere": sphere, "capsule": capsule, "cylinder": cylinder, "box": box}
 
 
 def film(run: Path, file: Path, tell: Callable[[float], None] = lambda share: None) -> Path:
@@ -115,7 +114,9 @@ class _Artist:
         for name in list(world.objects):
             world.remove(name)
         for one in values.get("objects", []):
-            world.add(one["name"], SHAPES[one["kind"]](*one["size"]), position=one["position"], rotation=one["rotation"], role=one["role"])
+            world.add(
+                one["name"], Geometry(one["kind"], tuple(one["size"])), position=one["position"], rotation=one["rotation"], role=one["role"]
+            )
 
     def _draw_places(self, ink: Any, values: dict[str, Any], transforms: Array) -> None:
         for part, where in values.get("places", {}).items():

@@ -76,7 +76,7 @@ def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
     `in_motion`: False for the tab of the robot alone.
     """
     eyes = [rrb.Horizontal(_eye("left"), _eye("right"), name="eyes")] if shown.has_eyes else []
-    others = [*eyes, _motion(shown.parts), _learning(), _spaces(shown.parts), _log()] if in_motion else []
+    others: list[rrb.Container | rrb.View] = [*eyes, _motion(shown.parts), _learning(), _spaces(shown.parts), _log()] if in_motion else []
     return rrb.Blueprint(
         rrb.Tabs(_scene(shown), *others, active_tab=0),
         rrb.BlueprintPanel(state="hidden"),

@@ -312,6 +312,13 @@ def test_where_pybullet_has_no_wheel_mujoco_is_offered(monkeypatch: pytest.Monke
     assert 'set backend = "mujoco"' in missing(monkeypatch, "pybullet", "services.robot_sim.backend=pybullet")
 
 
+def test_a_page_can_be_added_to_a_scenario_without_one() -> None:
+    assert "monitor" not in [part.who for part in read_scenario("kinematic").parts]
+    added = read_scenario("kinematic", ["services.monitor.web_port=9123"], with_also=["monitor"])
+    assert [part.config.web_port for part in added.parts if part.who == "monitor"] == [9123]
+    assert [part.who for part in read_scenario("reach", with_also=["monitor"]).parts].count("monitor") == 1
+
+
 @pytest.mark.parametrize("settings", [(), ("services.robot_sim.backend=auto",)])
 def test_a_robot_without_physics_needs_no_extra(monkeypatch: pytest.MonkeyPatch, settings: tuple[str, ...]) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
