@@ -117,7 +117,8 @@ def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
     """Start a system on free ports, yield the address of its page, and stop the system as by Ctrl-C."""
     router, web = free_ports(2)
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "mobee_system", "launch", scenario, "--endpoint", f"tcp/127.0.0.1:{router}", "--runs", folder]
+        command = [sys.executable, "-m", "mobee_system", "launch", scenario, "--page", "--runs", folder]
+        command += ["--endpoint", f"tcp/127.0.0.1:{router}"]
         for setting in (f"services.monitor.web_port={web}", *settings):
             command += ["--set", setting]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True) as launcher:

@@ -11,7 +11,7 @@ import numpy as np
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, Motion
-from bus_schema.rpc import Goal, Started, Take, Taken
+from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
 from tests.services.harness import Refusal, Rig
 
 
@@ -40,6 +40,7 @@ class FakeController:
         self._motion = rig.bus.publisher(Motion, part)
         rig.serve(keys.goal("*", "take"), Take, self._take)
         rig.serve(keys.goal("*", "goal"), Goal, self._goal)
+        rig.serve(keys.goal("*", "release"), WithEpoch, self._release)
         rig.token("controller", self.instance)
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -110,6 +111,12 @@ class FakeController:
                 raise Refusal("owned")
             self.owner, self.epoch, self.takes = request.instance, self.epoch + 1, self.takes + 1
             return Taken(v=VERSION, epoch=self.epoch)
+
+    def _release(self, request: WithEpoch, key: str) -> Done:
+        with self._lock:
+            self.epoch, self.owner, self.action_id = self.epoch + 1, "", ""
+            self._become("idle")
+            return Done(v=VERSION)
 
     def _goal(self, request: Goal, key: str) -> Started:
         with self._lock:

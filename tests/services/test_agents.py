@@ -356,3 +356,17 @@ def test_random_bytes_do_it_no_harm(stage: Stage, rng: np.random.Generator) -> N
     wait_for(are_refused, "the refusals")
     stage.made(len(stage.transitions) + 3)
     assert agent.is_running
+
+
+def test_an_agent_that_is_asked_to_rest_gives_its_goal_away_and_goes_on_later(stage: Stage) -> None:
+    agent = stage.agent()
+    n = len(stage.made(2))
+    stage.rig.call(keys.service_rpc("agent_torso", "rest"), Empty, Done)
+    assert stage.controller.owner == ""
+    before = len(stage.transitions)
+    time.sleep(1.0)
+    assert len(stage.transitions) == before
+    assert "agent rests" in stage.told("rests")[0]
+    stage.rig.call(keys.service_rpc("agent_torso", "go_on"), Empty, Done)
+    assert len(stage.made(before + 1)) > n
+    agent.stop()

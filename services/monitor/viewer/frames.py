@@ -30,7 +30,7 @@ class _Part:
     def __init__(self, recording_id: str) -> None:
         self.stream = rr.RecordingStream("mobee", recording_id=recording_id)
         self._bytes = rr.binary_stream(self.stream)
-        self.is_dirty = True
+        self.is_dirty = False
 
     def log(self, path: str | list[object], *what: Any, static: bool) -> None:
         self.stream.log(path, *what, static=static)
@@ -60,6 +60,7 @@ class Frames:
         self._file = file
         self._static, self._changes, self._look = (_Part(recording_id) for _ in range(3))
         self._static.stream.send_blueprint(layout)
+        self._static.is_dirty = True
         self._kept: list[tuple[int, bytes]] = []  # static pieces, by the number of the frame in which they came
         self._history: deque[tuple[int, bytes]] = deque()
         self._size = 0  # bytes of the history

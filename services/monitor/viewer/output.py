@@ -81,7 +81,8 @@ def open_output(config: Config, layout: rrb.Blueprint, now: Callable[[], float])
         identity = f"mobee-{secrets.token_hex(4)}"
         file = rr.RecordingStream("mobee", recording_id=identity) if folder else None
         if file is not None and folder is not None:
-            file.set_sinks(rr.FileSink(folder / RECORDING), default_blueprint=layout)
+            sink = rr.FileSink(folder / RECORDING, write_footer=False)  # a footer would keep data of every chunk in memory until the end
+            file.set_sinks(sink, default_blueprint=layout)
         frames = Frames(file, layout, identity)
         server, url = None, ""
         try:
@@ -94,11 +95,11 @@ def open_output(config: Config, layout: rrb.Blueprint, now: Callable[[], float])
         finally:
             if server is not None:
                 server.close()
+            if record is not None:
+                record.close()
             frames.close()
             if file is not None:
                 file.disconnect()
-            if record is not None:
-                record.close()
 
 
 def _key_of(folder: Path | None) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from bus_schema import keys
 from bus_schema.messages import Answer, Clock, Command, Commands, Event, Order, State, StepDone
-from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
+from bus_schema.rpc import Done, Driven, Empty, Pace, Take, Taken, WithEpoch
 from mobee import load_robot
 from tests.services.harness import Rig, rig, wait_for
 
@@ -112,6 +112,18 @@ def test_tick_0_is_repeated_until_answered_and_then_each_tick_waits(bench: Bench
     assert bench.k == 1
     bench.step()
     assert (bench.k, bench.clocks[-1].mode, bench.clocks[-1].t) == (2, "lock", 40_000_000)
+
+
+def test_a_pace_lets_each_tick_take_its_time_at_least(bench: Bench) -> None:
+    bench.rig.call(keys.sim("pace"), Pace, Done, speed=0.5)  # 40 ms a tick
+    try:
+        bench.begin()
+        begin = time.monotonic()
+        for _ in range(10):
+            bench.step()
+        assert time.monotonic() - begin > 0.3
+    finally:
+        bench.rig.call(keys.sim("pace"), Pace, Done, speed=0.0)
 
 
 def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> None:
