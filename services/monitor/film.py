@@ -47,7 +47,7 @@ def film(run: Path, file: Path, tell: Callable[[float], None] = lambda share: No
     pictures = []
     moments = scene_times(story.length)
     for number, moment in enumerate(moments):
-        values = story.at(moment)
+        values = story.at(moment) | {"q": story.pose(moment)}
         artist = artist or _Artist(story.robot, values)
         pictures.append(artist.picture(values, moment / story.length))
         tell((number + 1) / len(moments))
@@ -86,7 +86,7 @@ class _Artist:
         from PIL import Image, ImageDraw
 
         self._show_objects(values)
-        pose = self._model.evaluate(np.array(values["q"]))
+        pose = self._model.evaluate(values["q"])
         scene = [*robot_solids(pose), *object_solids(pose.objects)]
         robot = draw(scene, self._camera, self._floor, RAYS)
         frame = Image.new("RGB", (WIDTH, HEIGHT), "white")
@@ -99,7 +99,7 @@ class _Artist:
 
     def _framed(self, values: dict[str, Any]) -> tuple[Camera, float]:
         self._show_objects(values)
-        pose = self._model.evaluate(np.array(values["q"]))
+        pose = self._model.evaluate(values["q"])
         scene = [*robot_solids(pose), *object_solids(pose.objects)]
         points = [np.empty((0, 3)), *(_moved(pose.transforms, where) for where in values.get("places", {}).values())]
         axes = camera_axes(FIRST_VIEW if self._robot.name in AT_TABLE else OTHER_VIEW)

@@ -13,6 +13,7 @@ import numpy as np
 
 from bus_schema.messages import Geometry
 from bus_schema.rpc import ObjectState
+from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.robot.load import load_robot
@@ -62,6 +63,16 @@ class Story:
         """Return all values at a moment, s since the begin."""
         moment = self.begin + min(max(seconds, 0.0), self.length)
         return {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
+
+    def pose(self, seconds: float) -> Array:
+        """Return the motor positions (n,) at a moment, s since the begin, between two recorded ones on the straight line between them."""
+        track, moment = self.tracks["q"], self.begin + min(max(seconds, 0.0), self.length)
+        after = min(bisect_right(track.times, moment), len(track.times) - 1)
+        before = max(after - 1, 0)
+        span = track.times[after] - track.times[before]
+        share = min(max((moment - track.times[before]) / span, 0.0), 1.0) if span > 0.0 else 1.0
+        q: Array = (1.0 - share) * np.array(track.values[before]) + share * np.array(track.values[after])
+        return q
 
 
 def _tracks(found: Sequence[Entry]) -> dict[str, Track]:

@@ -10,6 +10,7 @@ import pytest
 
 from mobee_cli.__main__ import main
 from services.monitor import film
+from services.monitor.past import Story
 from tests.mobee_cli.test_replay import recorded
 
 Image = pytest.importorskip("PIL.Image")
@@ -56,6 +57,13 @@ def test_another_kind_of_file_is_refused(run: Path, capsys: pytest.CaptureFixtur
     assert main(["film", str(run), "--to", str(run / "film.avi")]) == 2
     assert ".gif or a .mp4" in capsys.readouterr().err
     assert main(["film", str(run / "none")]) == 2
+
+
+def test_between_two_recorded_poses_the_robot_moves_on_a_straight_line(run: Path) -> None:
+    story = Story(run)
+    assert story.pose(1.1).tolist() == pytest.approx([0.055, 0.5])
+    assert story.pose(-1.0).tolist() == [0.0, 0.5]
+    assert story.pose(99.0).tolist() == pytest.approx([0.5, 0.5])
 
 
 def test_the_scenes_are_spread_over_the_run() -> None:

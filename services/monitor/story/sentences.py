@@ -12,6 +12,7 @@ from mobee.learning.space import Space
 from services.monitor.story.words import action_words, displacement, listed, ordinal, percent
 
 LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
+UNSURE = 0.05  # an outcome that is likelier than the goal by less is not expected
 STRATEGIES = {
     "curious": "by curiosity: it goes where it expects to learn most",
     "random": "at random",
@@ -40,6 +41,8 @@ def expects_sentence(decision: Decision) -> str:
         return f"It cannot know what will happen; it gives getting there {percent(decision.reached)}."
     if decision.expected == decision.goal:
         return f"It expects to get there ({percent(decision.reached)})."
+    if decision.probability - decision.reached < UNSURE:
+        return f"It is not sure what will happen; it gives getting there {percent(decision.reached)}."
     where = "to stay where it is" if decision.expected == decision.s else "to end in another pose"
     return f"It expects {where} ({percent(decision.probability)}), not to get there ({percent(decision.reached)})."
 

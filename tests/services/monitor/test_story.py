@@ -83,6 +83,7 @@ def elbow() -> float:
 def test_what_it_expects() -> None:
     assert expects_sentence(decision()) == "It expects to get there (80 %)."
     assert expects_sentence(decision(tries=0, reached=0.5)) == "It cannot know what will happen; it gives getting there 50 %."
+    assert "not sure" in expects_sentence(decision(expected=5, probability=0.34, reached=0.33))
     stays = decision(expected=40, probability=0.7, reached=0.2)
     assert expects_sentence(stays) == "It expects to stay where it is (70 %), not to get there (20 %)."
     assert "to end in another pose" in expects_sentence(decision(expected=5, reached=0.1))
