@@ -90,6 +90,8 @@ RUN_ELSEWHERE = {
     r"mobee roadmap play palm.npz --to [-. 0-9]+ --live": "tests/system/test_reach.py",
     r"mobee roadmap (build own_task.py|show own_task.npz|build sweep.py|show sweep.npz).*": "tests/examples/test_documentation.py",
     r"mobee play.*": "tests/mobee_cli/test_play.py",
+    r"mobee replay .*": "tests/mobee_cli/test_replay.py",
+    r"mobee film .*": "tests/mobee_cli/test_film.py",
     r"mobee plan .*": "tests/mobee_cli/test_plan.py",
     r"mobee check .*": "tests/mobee_cli/test_check.py",
     r"mobee convert .*": "tests/mobee_cli/test_convert.py",
