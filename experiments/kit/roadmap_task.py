@@ -145,7 +145,7 @@ def left_aside(robot: Robot) -> Array:
 
 
 def elbows_out(q: Array, robot: Robot, sides: str = "lr") -> Array:
-    """Return a posture with the elbows at the sides, (n,) rad, around which the hands can turn far without a jump."""
+    """Return a posture with the elbows away from the body, (n,) rad, from which the hands can turn far while the joints move smoothly."""
     return changed(q, robot, _OUT, sides)
 
 

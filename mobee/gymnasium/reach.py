@@ -146,7 +146,7 @@ class ReachEnv(Env[Any, Any]):
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
     controller's own velocities [rad/s]; `achieved_goal` (3,): the marker's position, `desired_goal` (3,): its goal, in m in the
     root frame.  A goal is the marker's place in a random posture in which no force acts on the joints.  An episode never
-    terminates; an environment made by its id, `MoBeE/Reach-v0`, truncates it after 50 steps; `info["is_success"]` says whether the
+    terminates; if the environment is made by its id, it is truncated after 50 steps.  `info["is_success"]` says whether the
     marker is at the goal now.
 
     `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`.

@@ -210,7 +210,7 @@ class TransitionModel(Tabled):
 
     @property
     def totals(self) -> Array:
-        """N of the reward's closed form: the sum of its counts, shape (S, A), 0 where there is no action (read only)."""
+        """The sum N of the counts in the closed form of the reward, shape (S, A); 0 where there is no action (read only)."""
         return read_only(self._totals)
 
     @property

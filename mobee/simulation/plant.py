@@ -289,7 +289,7 @@ class OfflinePlant:
         return finished(self.advancing())
 
     def advancing(self) -> Work[list[tuple[str, Outcome]]]:
-        """Return the work of `advance` in steps, for a caller that runs several plants at once."""
+        """Return the computation of `advance` as a generator of its steps, for a caller that runs several plants at once."""
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")

@@ -51,7 +51,7 @@ class BulletBackend:
             self._find_contacts()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object somewhere, m; raises MobeeError."""
+        """Put a world object at a position, m; raises MobeeError."""
         self.world.move(name, position=position)
         self._scene.move(name, position)
 

@@ -156,16 +156,16 @@ class Recorded:
 
     @property
     def motors(self) -> Motors:
-        """See Backend."""
+        """The motors of the recorded back-end."""
         return self._inner.motors
 
     @property
     def world(self) -> World:
-        """See Backend."""
+        """The world of the recorded back-end."""
         return self._inner.world
 
     def step(self, dt: float) -> None:
-        """See Backend."""
+        """Advance the recorded back-end by a tick of dt [s]; write joint positions and contacts."""
         self._inner.step(dt)
         self._k += 1
         self._positions.write(self._inner.motors.q.tobytes())
@@ -173,24 +173,24 @@ class Recorded:
             self._contacts.write(f"{self._k},{pair},{depth:.6g}\n")
 
     def reset(self, seed: int) -> None:
-        """See Backend."""
+        """Reset the recorded back-end, and empty the records."""
         self._inner.reset(seed)
         self._begin()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """See Backend."""
+        """Put a world object of the recorded back-end at a position, m; raises MobeeError."""
         self._inner.place(name, position)
 
     def contact(self) -> SolidContact:
-        """See Backend."""
+        """The deepest solid contact of the last tick."""
         return self._inner.contact()
 
     def contacts(self) -> Mapping[str, float]:
-        """See Backend."""
+        """Depths of the solid contacts of the last tick, m, by pair."""
         return self._inner.contacts()
 
     def gap(self) -> float:
-        """See Backend."""
+        """Closest distance of hands and forearms to the obstacles, m; -1 when it is not measured."""
         return self._inner.gap()
 
     def _begin(self) -> None:
@@ -205,7 +205,7 @@ NOT_FINITE = 1  # fault bit
 
 
 class Watch:
-    """Measures the back-end after every step."""
+    """Counts gate states, contacts and stops in every tick, and publishes the true state of the simulated robot."""
 
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
         """`truth_period`: ticks between two messages of the truth."""

@@ -76,7 +76,10 @@ class PeerBelief:
         return poses
 
     def sound(self, q: Array, care: Care = "solids") -> NDArray[np.bool_]:
-        """Return which of the poses (P, d) rad are sound, (P,)."""
+        """Return which of the poses (P, d) rad are sound, (P,).
+
+        A sound pose is within the limits and away from blocked poses, violates no clause and has no contact that `care` forbids.
+        """
         self.checked += len(q)
         poses = self.whole(q)
         good = self._allowed(q, poses)
@@ -244,7 +247,10 @@ def rrt_connect(
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
-    """Return a path (k, d) shortened by sound shortcuts: first between random points on it, then from each waypoint as far as possible."""
+    """Return a path (k, d) rad shortened by straight motions that are sound.
+
+    They are tried between random points on the path, then from each waypoint as far as possible.  `care`: the contacts that are forbidden.
+    """
     found = _straightened(belief, list(path), care)
     for _ in range(SHORTCUTS if len(found) > 2 else 0):
         first, second = np.sort(rng.uniform(0.0, len(found) - 1, 2))
