@@ -14,8 +14,8 @@ import pytest
 from experiments.kit.live.launch import stop
 from experiments.live_picture import find_chromium
 
-SIZE = (800, 500)  # pixels
-SCENE = (slice(90, 300), slice(8, 425))  # rows and columns of the 3D view
+SIZE = (1000, 560)  # pixels
+SCENE = (slice(80, 330), slice(12, 530))  # rows and columns of the 3D view
 BACKGROUND = 40  # brighter than the empty view
 
 pytestmark = pytest.mark.system
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.system
 @pytest.mark.skipif(find_chromium() is None, reason="live picture: no Chromium")
 def test_the_page_shows_a_robot_that_moves(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "experiments.live_picture", "--scenario", str(Path(__file__).with_name("picture.toml"))]
-    command += ["--size", *map(str, SIZE), "--shots", "2", "--gap", "5", "--warm-up", "3", "--out", str(tmp_path)]
+    command += ["--size", *map(str, SIZE), "--shots", "2", "--gap", "8", "--warm-up", "8", "--out", str(tmp_path)]
     page = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, process_group=0)
     try:
         _, said = page.communicate(timeout=280)

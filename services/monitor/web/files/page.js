@@ -309,8 +309,8 @@ addEventListener("message", (event) => {
   const { kind, share: part, time, text } = event.data;
   if (kind === "loading") $("loading").textContent = `The 3D view loads: ${Math.round(100 * part)} %. The story beside it is live already.`;
   if (kind === "ready") $("loading").textContent = "The 3D view draws its first picture.";
+  if (kind === "shown") $("loading").hidden = true;
   if (kind === "time") {
-    $("loading").hidden = true;
     state.viewerTime = state.past ? null : time;
   }
   if (kind === "failed") {

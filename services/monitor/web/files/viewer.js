@@ -50,6 +50,7 @@ function hasShown(time) {
 
 async function follow(handle) {
   let after = 0;
+  let frames = 0;
   for (;;) {
     try {
       const answer = await fetch(`frame?after=${after}`);
@@ -62,6 +63,7 @@ async function follow(handle) {
         tell({ kind: "frame", number: after });
         await hasShown(frame.time);
         await new Promise((resolve) => requestAnimationFrame(resolve));
+        if (++frames === 2) tell({ kind: "shown" }); // with the first one the viewer may still read the meshes
       }
     } catch (error) {
       console.debug("no frame", error);
@@ -107,7 +109,7 @@ async function start() {
   if (recording) {
     const data = await (await fetch(recording)).arrayBuffer();
     handle.send_rrd_to_channel(CHANNEL, new Uint8Array(data));
-    tell({ kind: "frame", number: 1 });
+    tell({ kind: "shown" });
   } else {
     follow(handle);
   }
