@@ -93,6 +93,8 @@ RUN_ELSEWHERE = {
     r"mobee replay .*": "tests/mobee_cli/test_replay.py",
     r"mobee film .*": "tests/mobee_cli/test_film.py",
     r"mobee plan .*": "tests/mobee_cli/test_plan.py",
+    r"mobee router": "tests/mobee_cli/test_verbs.py",
+    r"(mobee conform|python examples/bus/own_robot.py) --robot my_arm.xml": "tests/mobee_cli/conform/test_conform.py",
     r"mobee check .*": "tests/mobee_cli/test_check.py",
     r"mobee convert .*": "tests/mobee_cli/test_convert.py",
     r"mobee bench against .*": "tests/experiments/bench/test_against.py",
