@@ -73,8 +73,8 @@ def _robot(arguments: argparse.Namespace) -> Robot | None:
 
 def _beside(store: Path) -> str | None:
     """Return the robot that `mobee learn` writes beside a file of transitions, under the same name; None if there is none."""
-    robot = store.with_suffix(".xml")
-    return str(robot) if robot.is_file() else None
+    robot = store.with_suffix(".xml") if store.is_file() else None
+    return str(robot) if robot is not None and robot.is_file() else None
 
 
 def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:

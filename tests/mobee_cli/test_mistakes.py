@@ -110,7 +110,7 @@ MISTAKES = (
     Mistake("launch kinematic --set shared.robot=mesh.urdf", ("no mesh 'package://my_arm/meshes/tip.stl'",)),
     Mistake("check empty.urdf", ("empty.urdf:1:", "The file ends too early")),
     Mistake("check truncated.xml", ("truncated.xml:4:", "The file ends too early")),
-    Mistake("check picture.png", ("picture.png:1: no XML file", "Give a robot or world file")),
+    Mistake("check picture.png", ("picture.png:1: not well-formed XML", "Give a robot, world or mesh file")),
     Mistake("check folder.urdf", ("folder.urdf: is a folder", "Give the path of a .xml or .urdf file in it")),
     Mistake("check nofile.urdf", ("nofile.urdf: no such file", "or a name: icub")),
     Mistake("check later.xml", ("later.xml:1:", "'9.0' is not known", "Valid: 0.1, 1.0, 2.0")),

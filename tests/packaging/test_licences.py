@@ -17,6 +17,8 @@ NAMED = re.compile(rb"SPDX-License-Identifier: ([\w.-]+)")
 CC = "CC-BY-SA-4.0"
 
 DERIVED_FROM_ICUB_MODELS = {
+    "docs/figures/film.gif",
+    "docs/figures/live.png",
     "experiments/bench/data/bench_model.json",
     "mobee/robot/robots/icub.xml",
     "mobee/robot/robots/icub_katana.xml",

@@ -18,7 +18,12 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-EXTRAS = {"live", "sim", "viz", "reference", "planning", "parquet", "cluster", "figures", "fuzz", "bench", "dev", "docs", "fcl"}
+EXTRAS = {"live", "sim", "viz", "reference", "planning", "parquet", "cluster", "figures", "fuzz", "bench", "dev", "docs", "fcl"} | {
+    "film",
+    "gym",
+    "menagerie",
+    "mjcf",
+}
 
 
 class Installed:

@@ -95,7 +95,7 @@ def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
         text = content.lstrip(BOM_AND_BLANKS)
         if text and not text.startswith(b"<"):
             raise RobotFileError(
-                f"{path}:1: no XML file: it does not begin with '<'. Give a robot or world file (.xml or .urdf)."
+                f"{path}:1: not well-formed XML: it does not begin with '<', so it is no XML file. Give a robot, world or mesh file."
             ) from error
         line, column, problem = error.getLineNumber() or 1, (error.getColumnNumber() or 0) + 1, error.getMessage()
         remedy = next((REMEDIES[key] for key in REMEDIES if key in problem), "Close every tag and quote every value")
