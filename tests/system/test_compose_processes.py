@@ -29,7 +29,7 @@ def composed(folder: Path, port: int) -> Iterator[dict[str, subprocess.Popen[byt
     try:
         for name, argv in as_processes(port).items():
             if name == "monitor":  # another system may be up on this machine
-                argv += ["--web-port", free_port(), "--grpc-port", free_port()]
+                argv += ["--web-port", free_port()]
             log = (folder / f"{name}.log").open("wb")
             processes[name] = subprocess.Popen(argv, cwd=folder, stdout=log, stderr=log, env=environment, start_new_session=True)
         yield processes
