@@ -23,8 +23,8 @@ from tests.system.live import AGENTS, PARTS, Launch, Watcher, launch, until
 
 pytestmark = pytest.mark.system
 
-SCHEDULES = int(os.environ.get("MOBEE_SCHEDULES", "2"))  # 500 for the whole campaign
-FIRST = int(os.environ.get("MOBEE_FIRST_SCHEDULE", "0"))
+SCHEDULES = int(os.environ.get("MOBEE_SCHEDULES", "1"))  # 500 for the whole campaign
+FIRST = int(os.environ.get("MOBEE_FIRST_SCHEDULE", "1"))
 BRAKING = 0.5  # s after the stop in which a part may still move
 RESTS = np.deg2rad(1.5)  # largest difference of two measured poses at rest: noise and backlash
 
