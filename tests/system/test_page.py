@@ -62,6 +62,7 @@ class Browser:
 
 
 CALM = "document.querySelector('#banner').hidden"
+TRIES = r"/Tries .*[+−]\d+°.* \d+(st|nd|rd|th) try from here/"  # absent between an outcome and the next decision
 TELLS = "document.querySelector('.card .now')"
 
 
@@ -90,8 +91,7 @@ def page(live: tuple[Launch, Watcher], browser: Any) -> Browser:
 def test_the_story_is_told_at_once_and_nothing_is_loaded_from_elsewhere(page: Browser) -> None:
     page.until(TELLS, "the story")
     page.until("document.querySelector('.card').textContent.includes('nats')", "the first outcome with its surprise")
-    told = page.page.inner_text("#cards")
-    assert re.search(r"Tries .*[+−]\d+°.* \d+(st|nd|rd|th) try from here", told)
+    page.until(f"{TRIES}.test(document.querySelector('#cards').innerText)", "the action that an agent tries")
     assert {urlsplit(address).netloc for address in page.requests} == {urlsplit(page.url).netloc}
 
 
