@@ -57,4 +57,4 @@ def _complete_files(parser: argparse.ArgumentParser, file: Any, folder: Any) -> 
         if action.choices is None and any(word in name.split("|")[-1].split(".") for word in ("FILE", "MAP", "IN", "OUT")):
             action.complete = file  # type: ignore[attr-defined]  # an attribute that shtab reads
         elif action.choices is None and name in ("RUN", "DIR", "FOLDER"):
-            action.complete = folder  # type: ignore[attr-defined]
+            action.complete = folder  # type: ignore[attr-defined]  # as above

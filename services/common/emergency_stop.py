@@ -17,6 +17,7 @@ from zenoh.handlers import Callback
 from bus_schema import Refused, decode
 from bus_schema.messages import EStop
 
+BY_LAUNCHER = "launcher"  # source of a stop because a vital service was given up; it ends with that launch
 FOLDER = "mobee/emergency-stop"  # in the user's folder of states
 
 
@@ -30,6 +31,11 @@ class Stop(Struct, frozen=True):
     def __str__(self) -> str:
         since = time.strftime(" since %Y-%m-%d %H:%M:%S", time.localtime(self.time)) if self.time else ""
         return f"emergency stop by {self.source}{since}: {self.reason}"
+
+
+def replaces(new: Stop, old: Stop | None) -> bool:
+    """Return whether a stop is kept in place of another: the stop of a launcher ends with it, that of any other client does not."""
+    return old is None or (old.source == BY_LAUNCHER and new.source != BY_LAUNCHER)
 
 
 class StopRecord:

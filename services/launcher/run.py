@@ -18,7 +18,7 @@ from bus_schema import keys
 from bus_schema.rpc import Done
 from mobee._core import CoreUnavailable, library
 from services.common.config import ConfigError, ServiceConfig
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import BY_LAUNCHER, StopRecord
 from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.rpc import CallFailed
@@ -227,7 +227,7 @@ class _Run:
     def _announce_stop(self) -> None:
         """Report the stop of an earlier run, or release it if an earlier launcher, which has ended, said it."""
         stop = self._record.read()
-        if stop is not None and stop.source == "launcher":
+        if stop is not None and stop.source == BY_LAUNCHER:
             self._record.release()
         elif stop is not None:
             self._announce(f"the robot is stopped, `mobee estop --reset` releases it: {stop}")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from bus_schema.messages import EStop
-from services.common.emergency_stop import Stop, StopRecord
+from services.common.emergency_stop import BY_LAUNCHER, Stop, StopRecord, replaces
 from services.common.inbox import CROWDED_WITH_STOPS
 from services.common.service import Service
 
@@ -36,19 +36,21 @@ class EmergencyStops:
 
     def stop(self, reason: str) -> None:
         """Stop the robot."""
-        self._keep(Stop("launcher", reason[:2000], time.time()))
+        self._keep(Stop(BY_LAUNCHER, reason[:2000], time.time()))
 
     def _note(self, message: EStop) -> None:
         if not message.set:
             return
         if message.src == "robot_sim":
             self._waiting = None
-        elif message.src != self._service.who and self._waiting is None and message.tw > self._record.released_at():
-            self._keep(Stop(message.source, message.reason, time.time()))
+        elif message.src != self._service.who and message.tw > self._record.released_at():
+            stop = Stop(message.source, message.reason, time.time())
+            if replaces(stop, self._waiting):
+                self._keep(stop)
 
     def _keep(self, stop: Stop) -> None:
         self._waiting = stop
-        if self._record.read() is None:
+        if replaces(stop, self._record.read()):
             try:
                 self._record.latch(stop)
             except OSError as error:

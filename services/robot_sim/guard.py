@@ -11,7 +11,7 @@ from bus_schema.messages import Answer, Command, Commands, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
-from services.common.emergency_stop import Stop, StopLine, StopRecord
+from services.common.emergency_stop import Stop, StopLine, StopRecord, replaces
 from services.common.service import CallRefused, Service
 from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, refused_as_call
 from services.robot_sim.kinematic import Backend
@@ -185,10 +185,14 @@ class Guard:
 
     def _check_stop(self) -> None:
         message = self._line.take()
-        if message is None or self._stop is not None:
+        if message is None:
             return
         stop = Stop(message.source, message.reason, time.time())
-        self._stop_all(stop)
+        if not replaces(stop, self._stop):
+            return
+        if self._stop is None:
+            self._stop_all(stop)
+        self._stop = stop
         if self._record is not None:
             try:
                 self._record.latch(stop)

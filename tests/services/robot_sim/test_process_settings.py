@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 from bus_schema import keys
+from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
+from services.common.emergency_stop import StopRecord
 from tests.services.harness import free_endpoint, rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
@@ -88,3 +90,23 @@ def test_a_typo_in_the_file_is_told_with_its_line(tmp_path: Path) -> None:
         program = bus.spawn("-m", "services.robot_sim", "--config", str(file))
         assert program.wait(10.0) == 2
         assert f"{file}:2: unknown field 'rat'. Did you mean 'rate'?" in program.says
+
+
+def test_a_stop_outlives_the_process_and_that_of_a_client_replaces_that_of_the_launcher(tmp_path: Path) -> None:
+    record = StopRecord(tmp_path / "stop.json")
+    record.create()
+    options = ("--backend", "kinematic", "--stop-record", str(record.path))
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, *options)
+        stops = bus.bus.publisher(EStop)
+        for source in ("launcher", "a_person", "launcher"):
+            stops.put(set=True, source=source, reason="test")
+            wait_for(lambda: bench.next_state("torso").gate == "estop", "the stop")
+        wait_for(lambda: (kept := record.read()) is not None and kept.source == "a_person", "the stop of the client in the record")
+        bench.program.stop(signal.SIGKILL)
+        bus.start("services.robot_sim", "robot_sim", *options)
+        bench.follow()
+        assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
+        bus.call(keys.ESTOP_RESET, Empty, Done)
+        assert record.read() is None
+        assert bench.next_state("torso").gate == "hold"
