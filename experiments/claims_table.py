@@ -6,11 +6,12 @@ from __future__ import annotations
 import json
 import textwrap
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from experiments.kit.experiment import MIN_SEEDS, Claim, open_with_few_seeds
+from experiments.kit.raw_records import keep_record, opened_record
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue
@@ -32,6 +33,9 @@ An experiment is one module in `claims/`, by chapter of the thesis: its docstrin
 `mobee experiment list` lists them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
 `mobee experiment run chapter7 --all` runs those of chapter 7. Numbers are interquartile means with 95 % bootstrap
 intervals, unless stated otherwise; the last column has the number of seeds.
+
+`records/` has the raw record of each run: the values of every seed, its settings and the commit. `mobee experiment claims --check` computes
+all numbers and verdicts of this page from them again, and `mobee experiment figure NAME --record` draws the figure.
 
 A sweep (`--seeds N`) uses all cores; each finished cell is written to disk, and `--resume` continues after Ctrl-C or a kill.
 `--engine ray` (`pip install "mobee[cluster]"`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
@@ -74,18 +78,30 @@ def found_in(folders: Sequence[Path]) -> Recorded:
     Raises InvalidValue for a folder without results.
     """
     found: Recorded = {}
+    for name, entry, versions in _finished_in(folders):
+        found = better(found, {name: _entry(entry, versions)})
+    return found
+
+
+def _entry(run: Path, versions: Path) -> dict[str, Any]:
+    options = read(run / CONFIG)["options"]
+    claims = open_with_few_seeds(read(run / RESULTS), options)["claims"]
+    return {"seeds": options.get("seeds"), "commit": read(versions).get("commit"), "claims": claims}
+
+
+def _finished_in(folders: Sequence[Path]) -> Iterator[tuple[str, Path, Path]]:
+    """Yield the runs that have measured claims: experiment, folder, and file with the versions.
+
+    The folder of a chapter's run has a folder for each of its experiments, and the versions for all of them.
+    """
     for folder in folders:
         entries = [path.parent for path in (folder / RESULTS, *sorted(folder.glob(f"*/{RESULTS}"))) if path.exists()]
         if not entries:
             raise InvalidValue(f"{folder} has no results: finish the run with `mobee experiment run NAME --resume {folder}`.")
         for entry in entries:
-            config = read(entry / CONFIG)
-            claims = open_with_few_seeds(read(entry / RESULTS), config["options"]).get("claims")
-            if claims:
-                run = folder if (folder / VERSIONS).exists() else folder.parent  # a part of chapter7 has it in the whole's folder
-                seeds, commit = config["options"].get("seeds"), read(run / VERSIONS).get("commit")
-                found = better(found, {current_name(config["experiment"]): {"seeds": seeds, "commit": commit, "claims": claims}})
-    return found
+            if read(entry / RESULTS).get("claims"):
+                run = folder if (folder / VERSIONS).exists() else folder.parent
+                yield current_name(read(entry / CONFIG)["experiment"]), entry, run / VERSIONS
 
 
 def better(before: Recorded, after: Recorded) -> Recorded:
@@ -103,6 +119,44 @@ def finished_runs(runs: Path) -> list[Path]:
 def _counts(run: Path) -> bool:
     is_finished = (run / RESULTS).exists() or any(run.glob(f"*/{RESULTS}"))
     return is_finished and not read(run / CONFIG)["options"].get("quick")
+
+
+def keep_records(folders: Sequence[Path], record: Recorded) -> None:
+    """Write the raw records of the runs whose numbers are in the record; raises InvalidValue for a run that is too large."""
+    for name, run, versions in _finished_in(folders):
+        if record.get(name) == _entry(run, versions):
+            keep_record(name, run, versions, load_experiment(name).method.kept)
+
+
+def recomputed(name: str) -> list[dict[str, str]]:
+    """Return the claims of an experiment, computed from its raw record; raises InvalidValue if there is none."""
+    with opened_record(name) as run:
+        claims: list[dict[str, str]] = open_with_few_seeds(load_experiment(name).method.results(run), read(run / CONFIG)["options"])[
+            "claims"
+        ]
+        return claims
+
+
+def differences(name: str, entry: Mapping[str, Any]) -> list[str]:
+    """Compare the raw record of an experiment with its entry in the table; returns a line for each difference."""
+    try:
+        found = {claim["text"]: claim for claim in recomputed(name)}
+        with opened_record(name) as run:
+            commit, seeds = read(run / VERSIONS).get("commit"), read(run / CONFIG)["options"].get("seeds")
+    except InvalidValue as error:
+        return [str(error)]
+    lines = [
+        f"{name}: the table has {key} {entry[key]}, the record {value}"
+        for key, value in (("commit", commit), ("seeds", seeds))
+        if value != entry[key]
+    ]
+    for claim in entry["claims"]:
+        own = found.get(claim["text"])
+        for key in ("ours", "verdict"):
+            if own is None or own[key] != claim[key]:
+                value = "no such claim" if own is None else own[key]
+                lines.append(f"{name}, {claim['text']!r}: the table has {key} {claim[key]!r}, the record gives {value!r}")
+    return lines
 
 
 def write_page(record: Recorded) -> None:

@@ -7,13 +7,15 @@ import argparse
 import json
 import shutil
 import textwrap
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.claims_table import better, claims_text, finished_runs, found_in, recorded, rows, write_page
+from experiments.claims_table import better, claims_text, differences, finished_runs, found_in, keep_records, recorded, rows, write_page
 from experiments.kit.experiment import Claim, Experiment, open_with_few_seeds
 from experiments.kit.plots import MatplotlibMissing
+from experiments.kit.raw_records import opened_record
 from experiments.kit.run_folder import (
     RESULTS,
     discard_unused,
@@ -52,12 +54,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     drawing = actions.add_parser("figure", help="draw the figure of a run", description="Draw the figure of a run.")
     drawing.add_argument("name", metavar="NAME|RUN", help="folder of a run, or the name of an experiment, for its newest run")
     drawing.add_argument("folder", nargs="?", type=Path, metavar="RUN", help="folder of the run, after the name of an experiment")
+    drawing.add_argument("--record", action="store_true", help="draw the raw record of the repository, into NAME.png here")
     drawing.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of the runs' folders (default: runs)")
     drawing.add_argument("--json", action="store_true", help="print as JSON")
     text = "Print the table of claims: published and measured numbers. Without RUN and --write it is the table of experiments/README.md."
     claiming = actions.add_parser("claims", help="print the table of claims", description=text)
     claiming.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, to use their numbers")
     claiming.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the runs with the most seeds")
+    text = "compute all verdicts and intervals from the raw records of the repository, and compare them with the table"
+    claiming.add_argument("--check", action="store_true", help=text)
     claiming.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of these runs' folders (default: runs)")
     claiming.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -161,11 +166,16 @@ def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) 
 
 
 def _claims(arguments: argparse.Namespace) -> int:
+    if arguments.check:
+        return _check(arguments)
     if arguments.folders or not arguments.write:
-        record = {**recorded(), **found_in(arguments.folders)}
+        folders = arguments.folders
+        record = {**recorded(), **found_in(folders)}
     else:
-        record = better(recorded(), found_in(finished_runs(arguments.runs)))
+        folders = finished_runs(arguments.runs)
+        record = better(recorded(), found_in(folders))
     if arguments.write:
+        keep_records(folders, record)
         write_page(record)
     table = rows(record)
     if arguments.json:
@@ -175,11 +185,37 @@ def _claims(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _check(arguments: argparse.Namespace) -> int:
+    """Compute the table from the raw records; the command fails if a number or a verdict differs."""
+    if arguments.folders or arguments.write:
+        raise InvalidValue("--check takes no RUN and no --write: it compares the raw records of the repository with the table.")
+    start, found = time.monotonic(), {name: differences(name, entry) for name, entry in recorded().items()}
+    lines = [line for differing in found.values() for line in differing]
+    if arguments.json:
+        print(json.dumps({"experiments": len(found), "differences": lines, "seconds": round(time.monotonic() - start, 1)}, indent=2))
+    else:
+        print("\n".join(lines + [f"{len(found)} experiments computed in {time.monotonic() - start:.0f} s: {len(lines)} differences"]))
+    return FAILED if lines else 0
+
+
 def _figure(arguments: argparse.Namespace) -> int:
     runs, name, folder = arguments.runs, arguments.name, arguments.folder
+    if arguments.record:
+        return _figure_of_record(arguments)
     if folder is None and current_name(name) not in EXPERIMENTS and Path(name).is_dir():
         name, folder = experiment_of(Path(name)), Path(name)
     experiment = load_experiment(name)
     path = experiment.method.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))
+    print(json.dumps({"figure": str(path)}) if arguments.json else path)
+    return 0
+
+
+def _figure_of_record(arguments: argparse.Namespace) -> int:
+    if arguments.folder is not None:
+        raise InvalidValue("--record takes the name of an experiment alone, and no RUN.")
+    experiment = load_experiment(arguments.name)
+    with opened_record(experiment.name) as run:
+        drawn = experiment.method.figure(run)
+        path = Path(shutil.copy(drawn, f"{experiment.name}{drawn.suffix}"))
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0

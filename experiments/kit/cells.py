@@ -62,6 +62,8 @@ class CellResult:
 
 
 FOLDER = "cells"
+CELL_FILES = (f"{FOLDER}/*.npz",)
+"""Glob patterns of the finished cells in the folder of a run."""
 _RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, and the prefix of the arrays
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
-from mobee.errors import UnknownName
+from mobee.errors import InvalidValue, UnknownName
 
 Verdict = Literal["confirmed", "refuted", "open"]
 Measured = tuple[str, bool | None]
@@ -84,11 +84,18 @@ class Method(Protocol):
     continues after them.  If its result `passed` is False, the command fails.
     """
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Glob patterns of the files from which `results` and `figure` compute: the record of a run (see experiments.kit.raw_records)."""
+
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the options of the experiment; `--seed`, `--runs`, `--resume` and `--json` exist already."""
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the experiment; returns its results as JSON values."""
+
+    def results(self, folder: Path) -> dict[str, Any]:
+        """Compute the results of a finished run from its `kept` files; raises InvalidValue if the experiment keeps none."""
 
     def figure(self, folder: Path) -> Path:
         """Draw the results in the folder of a run; returns the path of the picture."""
@@ -96,11 +103,22 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Steps:
-    """A method made of three functions, for an experiment that is not a sweep; see `Method`."""
+    """A method made of functions, for an experiment that is not a sweep; see `Method`.
+
+    `recomputed`: computes `results` from the files `kept`; None for an experiment without claims.
+    """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Path], dict[str, Any]]
     figure: Callable[[Path], Path]
+    recomputed: Callable[[Path], dict[str, Any]] | None = None
+    kept: tuple[str, ...] = ()
+
+    def results(self, folder: Path) -> dict[str, Any]:
+        """Compute the results from the `kept` files in the folder."""
+        if self.recomputed is None:
+            raise InvalidValue(f"{folder}: this experiment has no claims, and keeps no record from which its results are computed.")
+        return self.recomputed(folder)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from experiments.kit.cells import Cell, CellResult, Work, cell_path, load_cells, write_cell
+from experiments.kit.cells import CELL_FILES, Cell, CellResult, Work, cell_path, load_cells, write_cell
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.engines import Done, in_processes, on_ray
 from experiments.kit.plots import saved
@@ -74,6 +74,7 @@ class Sweep:
         seeds: default of --seeds.
         add_options: adds the options of the experiment.
         require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
+        kept: glob patterns of the files that are the record of a run.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -83,6 +84,7 @@ class Sweep:
     seeds: int = 10
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
     require: Callable[[], object] = no_requirement
+    kept: tuple[str, ...] = CELL_FILES
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the options of all sweeps and those of the experiment."""
@@ -100,6 +102,10 @@ class Sweep:
         """Run the cells that are not in the folder yet; returns the findings."""
         self.require()
         run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
+        return self.results(folder)
+
+    def results(self, folder: Path) -> dict[str, Any]:
+        """Compute the findings from the finished cells."""
         return self.findings(load_cells(folder))
 
     def figure(self, folder: Path) -> Path:

@@ -90,6 +90,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
                 measure(place)
                 for name in (POSITIONS, CONTACTS):
                     (place / name).unlink()
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the findings from the measured crossings."""
     return findings(_crossings(folder))
 
 
@@ -274,6 +279,6 @@ def plot_times(crossings: Sequence[Measures]) -> Any:
 EXPERIMENT = Experiment(
     claim="when a ball on the path becomes solid, the hand takes the path around it at once",
     source="thesis 4.3.2, fig. 4.7",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, (f"launch-*/{MEASURED}", f"launch-000/{POSES}")),
     claims=CLAIMS,
 )

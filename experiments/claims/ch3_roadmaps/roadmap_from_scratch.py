@@ -17,7 +17,7 @@ pairs are measured offline by the model, from the true joints every 0.1 s, and l
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.cells import load_cells
+from experiments.kit.cells import CELL_FILES, load_cells
 from experiments.kit.control.plant_runs import place
 from experiments.kit.control.safety import is_listed
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
@@ -204,7 +204,18 @@ def explore_live(folder: Path, seed: int, most: int | None) -> None:
     place.mkdir()
     write(place / JOB, {"seed": seed, "most": most, "store": str((folder / STORE).resolve())})
     summary = launch(place, PERFORM, title="Roadmap from scratch", world=str(TABLE), seed=seed, rate=RATE, speed=SPEED, seconds=MAX_SECONDS)
-    write(folder / DONE, {**read(place / DONE), "seed": seed, "repeatable": summary["lockstep"]["repeatable"]})
+    done = {**read(place / DONE), "seed": seed, "repeatable": summary["lockstep"]["repeatable"]}
+    write(folder / DONE, done | _touched(sorted(folder.glob("launch-*"))))
+
+
+def _touched(launches: Sequence[Path]) -> dict[str, Any]:
+    """Return the duration and the solid contacts of the launches from their recordings of every tick."""
+    row = 8 * len(robot().motors)
+    ticks = sum((place / POSITIONS).stat().st_size // row for place in launches if (place / POSITIONS).exists())
+    touches = [touch for place in launches if (place / CONTACTS).exists() for touch in read_touches(place / CONTACTS, 1.0 / RATE)]
+    worst = max(touches, key=lambda touch: touch.depth, default=None)
+    deepest, pair = (0.0, "") if worst is None else (worst.depth, worst.pair)
+    return {"hours": ticks / RATE / 3600.0, "touches": len(touches), "deepest": deepest, "pair": pair}
 
 
 def read_live(folder: Path) -> dict[str, Any] | None:
@@ -214,17 +225,7 @@ def read_live(folder: Path) -> dict[str, Any] | None:
     done = read(folder / DONE)
     with MapStore(folder / STORE, PART) as store:
         search = explorer(offline_plant(done["seed"]), done["seed"], store)
-    places = sorted(folder.glob("launch-*"))
-    row = 8 * len(robot().motors)
-    ticks = sum((place / POSITIONS).stat().st_size // row for place in places if (place / POSITIONS).exists())
-    touches = [touch for place in places if (place / CONTACTS).exists() for touch in read_touches(place / CONTACTS, 1.0 / RATE)]
-    worst = max(touches, key=lambda touch: touch.depth, default=None)
-    found = outcome(search.roadmap, done["repairs"]) | {
-        "finished": done["finished"],
-        "hours": ticks / RATE / 3600.0,
-        "touches": len(touches),
-    }
-    found |= {"deepest": 0.0 if worst is None else worst.depth, "pair": "" if worst is None else worst.pair}
+    found = outcome(search.roadmap, done["repairs"]) | {name: done[name] for name in ("finished", "hours", "touches", "deepest", "pair")}
     return found | {"agree": agreement(search.roadmap, done["seed"] + 1000), "edges": int(np.sum(search.roadmap.beliefs.tried > 0))}
 
 
@@ -365,6 +366,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     SWEEP.run(arguments, folder)
     if arguments.live:
         explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the findings from the finished cells, and from the live exploration if there is one."""
     return findings(load_cells(folder), read_live(folder / "live"))
 
 
@@ -379,6 +385,6 @@ def figure(folder: Path) -> Path:
 EXPERIMENT = Experiment(
     claim="the robot explores an unverified map until its feasible part is known, without harmful contacts",
     source="thesis 4.3.1, fig. 4.6",
-    method=Steps(SWEEP.add_arguments, run, figure),
+    method=Steps(SWEEP.add_arguments, run, figure, results, (*CELL_FILES, f"live/{DONE}", f"live/{STORE}")),
     claims=CLAIMS,
 )

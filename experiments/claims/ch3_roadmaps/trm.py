@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 import mobee
 from experiments.claims.ch3_roadmaps.trm_pictures import cloud_panel
 from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
-from experiments.kit.cells import Cell, CellResult, load_cells
+from experiments.kit.cells import CELL_FILES, Cell, CellResult, load_cells
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.roadmap_task import Example, Method, build
 from experiments.kit.statistics import estimate
@@ -184,6 +184,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Build the maps that are not in the folder yet."""
     importlib.import_module("mobee.model.fcl_engine")  # raises NotInstalled before anything is computed
     run_cells(work, cells(arguments), folder, arguments)
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the findings from the finished cells."""
     return findings(load_cells(folder))
 
 
@@ -328,6 +333,6 @@ def figure(folder: Path) -> Path:
 EXPERIMENT = Experiment(
     claim="maps for all tasks of thesis figures 3.1 to 3.11 and 4.8: their poses valid, their task spaces covered",
     source="thesis 3.3, 3.4, 4.3",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, CELL_FILES),
     claims=CLAIMS,
 )

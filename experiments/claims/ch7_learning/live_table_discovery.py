@@ -20,12 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.cells import Cell
+from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.learning.live import TASKS, Compared, compared, draw_distances, learn_live, learn_offline
 from experiments.kit.plots import saved
 from experiments.kit.sweep import run_cells, sweep_arguments
+from mobee.store import STORE
 
 TASK, ROBOT = "published", "kinematic"
 TRANSITIONS, FEW = 2000, 20  # per part
@@ -58,6 +59,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
         learn_live(TASK, ROBOT, LIVE_SEED, number, folder / TASK / ROBOT, report, PIECE)
     run_cells(learn_offline, cells(arguments), folder, arguments)
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the distances and the claim from the transitions in the folder."""
+    number = next(int(result.cell.settings["transitions"]) for result in load_cells(folder).values())
     found = compared(folder, TASK, MIN_TRIES)
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     return {
@@ -106,6 +113,6 @@ def _transitions(arguments: argparse.Namespace) -> int:
 EXPERIMENT = Experiment(
     claim="three live agents at the table, in lockstep, learn what the same agents learn on the offline plant",
     source="aim of this reproduction; thesis 7.4",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, (*CELL_FILES, f"{TASK}/{ROBOT}/{STORE}")),
     claims=(equal,),
 )

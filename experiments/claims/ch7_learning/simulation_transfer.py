@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from experiments.kit.cells import Cell, load_cells
+from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
 from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, draw_distances, learn_live, learn_offline
@@ -33,6 +33,7 @@ from experiments.kit.plots import saved
 from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
 from experiments.kit.sweep import run_cells, sweep_arguments
+from mobee.store import STORE
 
 MARGIN = 0.02  # of equivalence: the test must be able to detect a larger difference
 EQUAL_DISTANCE = 0.01  # distance below which models count as equal, independent of the spread
@@ -68,17 +69,29 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
         for task, robot in product(_tasks(arguments), ROBOTS):
             learn_live(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, report)
-    tasks = {task: compared(folder, task, arguments.least) for task in _tasks(arguments)}
     write(folder / LEAST_FILE, {"least": arguments.least})
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the distances and the claim from the transitions in the folder."""
+    tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
     return {"claims": judged((equal,), tasks), "distances": table}
 
 
 def figure(folder: Path) -> Path:
     """Draw distances from the offline seeds, and how often actions reach their goals."""
-    least = int(read(folder / LEAST_FILE)["least"])
+    return saved(draw_distances(_compared(folder), _least(folder)), folder, 130)
+
+
+def _least(folder: Path) -> int:
+    return int(read(folder / LEAST_FILE)["least"])
+
+
+def _compared(folder: Path) -> dict[str, Compared]:
     names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
-    return saved(draw_distances({task: compared(folder, task, least) for task in names}, least), folder, 130)
+    return {task: compared(folder, task, _least(folder)) for task in names}
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
@@ -146,6 +159,6 @@ def _transitions(arguments: argparse.Namespace) -> int:
 EXPERIMENT = Experiment(
     claim="the transition model learned on the offline plant, with identified motors, is that of PyBullet's robot",
     source="aim of this reproduction; paper 4.1",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, (*CELL_FILES, LEAST_FILE, f"*/*/{STORE}")),
     claims=(equal,),
 )

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.cells import Cell, CellResult, load_cells
+from experiments.kit.cells import CELL_FILES, Cell, CellResult, load_cells
 from experiments.kit.command_line import positive_number
 from experiments.kit.experiment import Claim, Experiment, Measured, Steps, claim, judged
 from experiments.kit.plots import new_figure, saved
@@ -123,6 +123,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     truth = truth_of({tuple(cell.settings["place"]): found[cell.name].values for cell in wanted})
     truth.save(folder / "truth.npz")
     run_cells(partial(trial, truth), cells(arguments), folder, arguments)
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the findings from the finished cells."""
     return findings(load_cells(folder))
 
 
@@ -252,6 +257,6 @@ def figure(folder: Path) -> Path:
 EXPERIMENT = Experiment(
     claim="after a few hundred tries, predictors that generalise over poses and targets score nearly as high as an oracle",
     source="aims of this reproduction, to thesis 8.5 and 9.4.4",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, CELL_FILES),
     claims=CLAIMS,
 )

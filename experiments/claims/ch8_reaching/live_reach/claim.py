@@ -117,6 +117,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
             for done, (name, job, rate) in enumerate(jobs):
                 progress.show((number + done / len(jobs)) / starts, f"start {number + 1} of {starts}: {name}")
                 _do(place / name, job, seed, rate, arguments.backend)
+    return results(folder)
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """Compute the claims and the tables from the finished blocks."""
     blocks, known = _blocks(folder), _touchable()
     targets = grid_targets()
     left = frozenset(number for number in known if _nearest(tuple(targets[number].position.tolist()))[0] <= SUCCESS_DISTANCE)
@@ -374,6 +379,6 @@ def figure(folder: Path) -> Path:
 EXPERIMENT = Experiment(
     claim="on the live robot the learned reacher brings the palm to the targets that can be reached, without other contacts",
     source="aim of this reproduction; thesis 8, 9.3",
-    method=Steps(add_arguments, run, figure),
+    method=Steps(add_arguments, run, figure, results, (f"start-*/*/{BLOCK}",)),
     claims=CLAIMS,
 )

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Raw records: the values of every seed of a run, with settings and commit, in one archive per experiment.
+
+The archives are part of the repository.  Anybody can compute all verdicts, intervals and figures from them again, without a new run.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from experiments.kit.run_folder import CONFIG, VERSIONS
+from mobee.errors import InvalidValue
+
+RECORDS = Path(__file__).parent.parent / "records"
+MAX_BYTES = 2_000_000  # of one archive
+_NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
+
+
+def record_path(name: str) -> Path:
+    """Return the archive of an experiment."""
+    return RECORDS / f"{name}.zip"
+
+
+def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str]) -> Path:
+    """Write the archive of a finished run, whole or not at all.
+
+    Args:
+        name: of the experiment.
+        run: folder of the run, with config.json.
+        versions: the versions.json of the run.
+        kept: glob patterns of files in the folder.
+
+    Raises:
+        InvalidValue: no file matches, or the archive would be larger than MAX_BYTES.
+    """
+    files = sorted({path for pattern in kept for path in run.glob(pattern)})
+    if not files:
+        raise InvalidValue(f"{run} has none of the files {', '.join(kept) or '(the experiment names none)'}: there is nothing to record.")
+    path, unfinished = record_path(name), record_path(name).with_suffix(".unfinished")
+    path.parent.mkdir(exist_ok=True)
+    with zipfile.ZipFile(unfinished, "w") as archive:
+        for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(run)), file) for file in files)]:
+            method = zipfile.ZIP_STORED if source.suffix == ".npz" else zipfile.ZIP_DEFLATED
+            archive.writestr(zipfile.ZipInfo(member, _NO_TIME), source.read_bytes(), method)
+    if (size := unfinished.stat().st_size) > MAX_BYTES:
+        unfinished.unlink()
+        raise InvalidValue(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: keep fewer values a cell.")
+    unfinished.replace(path)
+    return path
+
+
+@contextmanager
+def opened_record(name: str) -> Iterator[Path]:
+    """Extract the archive of an experiment; yields a folder like that of its run, and removes it afterwards.
+
+    Raises InvalidValue if there is none, or if it is damaged.
+    """
+    path = record_path(name)
+    if not path.exists():
+        raise InvalidValue(f"there is no record of {name!r} in {path.parent}: run the experiment, then `mobee experiment claims --write`.")
+    with tempfile.TemporaryDirectory(prefix="mobee-record-") as folder:
+        try:
+            with zipfile.ZipFile(path) as archive:
+                archive.extractall(folder)
+        except (zipfile.BadZipFile, OSError) as error:
+            raise InvalidValue(f"{path} is damaged ({error}): restore it with git, or write it anew.") from None
+        yield Path(folder)

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from experiments import claims_table
+from experiments.kit import raw_records
+from experiments.kit.cells import CELL_FILES, Cell, load_cells, write_cell
+from experiments.kit.raw_records import keep_record, opened_record, record_path
+from experiments.kit.run_folder import new_run
+from mobee.errors import InvalidValue
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.setattr(raw_records, "RECORDS", tmp_path / "records")
+    folder = new_run(tmp_path / "runs", "reward-decay", {"seeds": 2})
+    for seed in range(2):
+        write_cell(folder, Cell(f"curious-s{seed}", seed, {"explorer": "curious"}), {"tries": seed}, 1.0)
+    (folder / "figure.png").write_bytes(b"a picture")
+    return folder
+
+
+def test_a_record_holds_settings_commit_and_the_values_of_every_seed_and_is_the_same_when_written_again(run):
+    path = keep_record("reward-decay", run, run / "versions.json", CELL_FILES)
+    first = path.read_bytes()
+    assert keep_record("reward-decay", run, run / "versions.json", CELL_FILES).read_bytes() == first
+    with opened_record("reward-decay") as folder:
+        assert [cell.values["tries"] for cell in load_cells(folder).values()] == [0, 1]
+        assert json.loads((folder / "config.json").read_text())["options"] == {"seeds": 2}
+        assert "commit" in json.loads((folder / "versions.json").read_text())
+        assert not (folder / "figure.png").exists()
+    assert not folder.exists()
+
+
+def test_a_record_that_is_empty_too_large_absent_or_damaged_is_refused(run, monkeypatch):
+    with pytest.raises(InvalidValue, match="has none of the files"):
+        keep_record("reward-decay", run, run / "versions.json", ("*.sqlite",))
+    with pytest.raises(InvalidValue, match="there is no record of 'reward-decay'"), opened_record("reward-decay"):
+        pass
+    monkeypatch.setattr(raw_records, "MAX_BYTES", 100)
+    with pytest.raises(InvalidValue, match="keep fewer values"):
+        keep_record("reward-decay", run, run / "versions.json", CELL_FILES)
+    assert list(raw_records.RECORDS.iterdir()) == []
+    record_path("reward-decay").write_bytes(b"PK no archive")
+    with pytest.raises(InvalidValue, match="is damaged"), opened_record("reward-decay"):
+        pass
+
+
+def test_the_table_is_what_the_raw_records_give():
+    table = claims_table.recorded()
+    names = sorted(path.stem for path in raw_records.RECORDS.glob("*.zip"))
+    assert [line for name in names for line in claims_table.differences(name, table[name])] == []
