@@ -111,6 +111,7 @@ def test_the_task_file_to_copy_builds_a_map(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None:
     blocks("docs/robots.md", tmp_path)
     launcher = launch(tmp_path, "pointer.toml", f"tcp/127.0.0.1:{free_port}", "--duration", "5")
@@ -123,6 +124,7 @@ def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_the_readers_own_agent_moves_the_free_arm(tmp_path: Path, free_port: int) -> None:
     blocks("docs/agents.md", tmp_path)
     endpoint = f"tcp/127.0.0.1:{free_port}"

@@ -103,6 +103,7 @@ def test_07_counts_every_arrival(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_08_sees_the_left_arm_move_and_leaves_nothing_running(tmp_path: Path) -> None:
     text = printed("08", tmp_path)
     assert "agent_left_arm" in text and "robot_sim" in text

@@ -109,6 +109,7 @@ def test_the_code_of_the_readme_runs_with_the_library_of_the_wheel(installed: In
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_a_system_starts_and_ends_in_a_folder_that_has_its_own_services(installed: Installed, crowded: Path, free_port: int) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port}"
     done = installed.run(crowded, "mobee", "launch", "kinematic", "--headless", "--duration", "3", "--json", "--endpoint", endpoint)

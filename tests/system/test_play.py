@@ -16,6 +16,7 @@ from tests.mobee_cli.test_learn import ARM
 
 
 @pytest.mark.system
+@pytest.mark.untimed
 def test_a_robot_goes_on_live_with_what_it_learned_offline(tmp_path: Path) -> None:
     arm = tmp_path / "arm.urdf"
     arm.write_text(ARM)
