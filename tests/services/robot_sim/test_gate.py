@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from bus_schema import Refused
 from mobee.simulation.motors import MotorParameters
-from services.robot_sim.gate import MAX_START, POSITION_MARGIN, Admission, Gate, Order
+from services.robot_sim.gate import LOCKED_TTL, MAX_AGE, MAX_START, MAX_STEP, MAX_TTL, POSITION_MARGIN, Admission, Gate, Order
 from tests.services.robot_sim.gated import LIMITS, PART, ROBOT, WHERE, Gated, N
 
 VELOCITY, ACCELERATION = LIMITS.velocity[0], LIMITS.acceleration[0]
@@ -67,6 +67,101 @@ def test_a_wrong_command_is_refused_with_its_reason_and_moves_nothing(reason: st
     gated.tick()
     assert gated.drive.mode == "hold"
     assert not gated.velocity.any()
+
+
+def test_the_bounds_of_admission_are_those_of_the_contract() -> None:
+    assert (MAX_AGE, MAX_TTL, MAX_STEP, LOCKED_TTL) == (0.1, 1000, 2.0, 3)
+    assert (POSITION_MARGIN, MAX_START) == (math.radians(1.0), math.radians(2.0))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ref": VELOCITY},
+        {"ref": -VELOCITY},
+        {"mode": "torque", "ref": LIMITS.torque[0]},
+        {"mode": "torque", "ref": -LIMITS.torque[0]},
+        {"ttl": 1},
+        {"ttl": MAX_TTL},
+        {"re_k": 20},
+    ],
+)
+def test_a_command_at_a_bound_is_admitted(changes: dict[str, object]) -> None:
+    gated = Gated().owned()
+    for _ in range(20):
+        gated.tick()
+    gated.command(**changes)
+
+
+@pytest.mark.parametrize(
+    ("mode", "ref", "text"),
+    [
+        ("velocity", -VELOCITY - 0.25, "0.250 rad/s beyond the limit"),
+        ("torque", LIMITS.torque[0] + 0.5, "0.500 N m beyond the limit"),
+        ("position", LIMITS.upper.max() + 0.125, f"{LIMITS.upper.max() - LIMITS.upper.min() + 0.125:.3f} rad beyond a limit"),
+        ("position", LIMITS.lower.min() - 0.125, f"{LIMITS.lower.max() - LIMITS.lower.min() + 0.125:.3f} rad beyond a limit"),
+        ("velocity", [0.0, math.nan, 0.0], "NaN or infinity"),
+        ("velocity", [0.0, VELOCITY + 0.5, 0.0], "0.500 rad/s beyond the limit"),
+    ],
+)
+def test_a_refusal_says_by_how_much_a_reference_is_beyond_its_limit(mode: str, ref: object, text: str) -> None:
+    gated = Gated().owned()
+    with pytest.raises(Refused, match=text):
+        gated.command(mode, ref)
+
+
+def test_after_a_silence_a_position_may_not_be_farther_than_after_100_ms() -> None:
+    admission, q = Admission(PART, LIMITS, 0.01, None), np.zeros(N)
+    most = 10 * MAX_STEP * LIMITS.velocity * 0.01
+    admission.check_step(0.999 * most, q, 1000, q)
+    with pytest.raises(Refused, match=f"a jump of {1.001 * most.max():.3f} rad, allowed {most.max():.3f}"):
+        admission.check_step(1.001 * most, q, 1000, q)
+    one = np.zeros(N)
+    one[1] = 1.001 * most[1]
+    with pytest.raises(Refused, match="a jump of"):
+        admission.check_step(one, q, 1000, q)
+
+
+@pytest.mark.parametrize("ticks", [0, 1])
+def test_two_positions_of_one_tick_may_be_as_far_apart_as_those_of_two(ticks: int) -> None:
+    admission, q = Admission(PART, LIMITS, 0.01, None), np.zeros(N)
+    stride = MAX_STEP * LIMITS.velocity * 0.01
+    admission.check_step(0.999 * stride, q, ticks, q)
+    with pytest.raises(Refused, match="a jump of"):
+        admission.check_step(1.001 * stride, q, ticks, q)
+
+
+def test_in_lockstep_a_silence_counts_as_the_most_ticks_that_a_command_may_be_old() -> None:
+    admission, q = Admission(PART, LIMITS, 0.05, 3), np.zeros(N)
+    most = 3 * MAX_STEP * LIMITS.velocity * 0.05
+    admission.check_step(0.999 * most, q, 1000, q)
+    with pytest.raises(Refused, match="a jump of"):
+        admission.check_step(1.001 * most, q, 1000, q)
+
+
+def test_after_a_velocity_a_position_is_compared_with_the_measured_one() -> None:
+    gated = Gated().owned()
+    gated.command("position", 0.02)
+    for _ in range(5):
+        gated.tick()
+    for _ in range(30):
+        gated.command(ref=0.5 * VELOCITY)
+        gated.tick()
+    assert refusal(gated, "position", 0.02) == "step"
+    gated.command("position", gated.q + 0.9 * MAX_START)
+
+
+def test_a_moving_part_goes_on_smoothly_in_position_mode() -> None:
+    gated = Gated().owned()
+    for _ in range(30):
+        gated.command(ref=0.5 * VELOCITY)
+        gated.tick()
+    speed = gated.velocity.copy()
+    gated.command("position", gated.q + 0.9 * MAX_START)
+    change = gated.tick()
+    assert speed == pytest.approx(0.5 * VELOCITY)
+    assert (np.abs(change) <= 1.001 * LIMITS.acceleration * gated.dt).all()
+    assert (gated.velocity > 0.8 * speed).all()
 
 
 def test_a_refused_command_leaves_the_last_valid_one_in_force() -> None:
@@ -342,18 +437,20 @@ def test_in_lockstep_an_age_is_counted_in_ticks_however_long_these_are() -> None
 FINE = np.full(N, 0.01)
 
 
-def order(position: float) -> Order:
-    reference = LIMITS.upper.copy()
-    reference[0] += position
+def order(side: float, beyond: float) -> Order:
+    """A position that is beyond the upper (side 1) or lower limit (side -1)."""
+    reference = (LIMITS.upper if side > 0 else LIMITS.lower).copy()
+    reference[0] += side * beyond
     return Order("controller", 1, 1, 1, "position", reference, 100)
 
 
 @pytest.mark.parametrize("fine", [np.ones(N), FINE])
 def test_a_position_may_be_beyond_its_limit_by_as_much_as_the_motor_is_exact(fine: np.ndarray) -> None:
     admission = Admission("torso", replace(LIMITS, fine=fine), 0.01, None)
-    admission.check(order(0.9 * POSITION_MARGIN * fine[0]), 1)
-    with pytest.raises(Refused, match="rad beyond a limit"):
-        admission.check(order(1.1 * POSITION_MARGIN * fine[0]), 1)
+    for side in (1.0, -1.0):
+        admission.check(order(side, 0.9 * POSITION_MARGIN * fine[0]), 1)
+        with pytest.raises(Refused, match="rad beyond a limit"):
+            admission.check(order(side, 1.1 * POSITION_MARGIN * fine[0]), 1)
 
 
 @pytest.mark.parametrize("fine", [np.ones(N), FINE])
