@@ -21,7 +21,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -47,6 +46,7 @@ from experiments.kit.experiment import Experiment, Measured, Steps, claim, judge
 from experiments.kit.live.launch import PHYSICS, add_backend, launch, read_done, write_job
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from experiments.kit.plots import finish, new_figure
+from experiments.kit.structs import decoded, encoded
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.motion import Motion
@@ -135,13 +135,13 @@ def measure(folder: Path) -> list[Measures]:
         first, last = crossing.motions[0].asked, crossing.motions[-1].ended
         deep = [touch.depth for touch in touches if first <= touch.begin <= last]
         found.append(_measured(crossing, q, max(deep, default=0.0)))
-    (folder / MEASURED).write_bytes(msgspec.json.format(msgspec.json.encode(found), indent=1))
+    (folder / MEASURED).write_text(encoded(found, indent=1))
     return found
 
 
 def read_measured(folder: Path) -> list[Measures]:
     """Read the measures written by `measure`."""
-    return msgspec.json.decode((folder / MEASURED).read_bytes(), type=list[Measures])
+    return decoded((folder / MEASURED).read_text(), list[Measures])
 
 
 def keep_poses(folder: Path) -> None:

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, TextIO
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
 from experiments.kit.live.launch import PHYSICS, TABLE, summary_of
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
+from experiments.kit.structs import decoded, encoded
 from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
@@ -82,13 +82,13 @@ class CommandLog:
 
     def note(self, commanded: Commanded) -> None:
         """Append a command that has ended."""
-        self._file.write(msgspec.json.encode(commanded).decode() + "\n")
+        self._file.write(encoded(commanded) + "\n")
 
 
 def read_commands(path: Path) -> list[Commanded]:
     """Read all commands that have ended; an incomplete last line is ignored."""
     *whole, _ = path.read_text().split("\n")
-    return [msgspec.json.decode(line, type=Commanded) for line in whole]
+    return [decoded(line, Commanded) for line in whole]
 
 
 MODES = ("off", "one", "two")
@@ -185,7 +185,7 @@ def run_trial(
             raise TrialFailed(f"{mode}: no tick for {TICK_TIMEOUT:g} s; see {folder / 'launch'}")
 
     summary = summary_of(str(file), ticks=ticks, runs=folder / "launch", watch=watch)
-    (folder / SUMMARY).write_bytes(msgspec.json.encode(summary))
+    (folder / SUMMARY).write_text(encoded(summary))
     if _size(folder / POSITIONS) != due:
         raise TrialFailed(f"{mode}: the system ended before its time; see {folder / 'launch'}")
 
@@ -252,7 +252,7 @@ def measure(folder: Path, robot: Robot, dt: float) -> Trial:
         jerk_squared=float((third**2).mean()),
         jerk_max=float(np.abs(third).max()),
         path=path_length(q),
-        lockstep=msgspec.json.decode((folder / SUMMARY).read_bytes(), type=_Summary).lockstep,
+        lockstep=decoded((folder / SUMMARY).read_text(), _Summary).lockstep,
     )
 
 
@@ -284,13 +284,13 @@ def _outcome(left: float, gone: float) -> Outcome:
 def write_trial(path: Path, trial: Trial) -> None:
     """Write a trial, whole or not at all."""
     new = path.with_suffix(".new")
-    new.write_bytes(msgspec.json.format(msgspec.json.encode(trial), indent=1))
+    new.write_text(encoded(trial, indent=1))
     new.replace(path)
 
 
 def read_trial(path: Path) -> Trial:
     """Read a trial written by `write_trial`."""
-    return msgspec.json.decode(path.read_bytes(), type=Trial)
+    return decoded(path.read_text(), Trial)
 
 
 def beyond_limits(q: Array, limits: Array) -> Array:

@@ -17,9 +17,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgspec
 from msgspec import Struct
 
+from experiments.kit.structs import decoded, encoded
 from mobee.errors import MobeeError
 
 _START_TIMEOUT, _END_TIMEOUT = 120.0, 30.0  # s
@@ -109,24 +109,24 @@ def write_job(folder: Path, job: Struct) -> None:
     """Make the folder and write the job into it; results of an interrupted launch are removed."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / DONE).unlink(missing_ok=True)
-    (folder / JOB).write_bytes(msgspec.json.encode(job))
+    (folder / JOB).write_text(encoded(job))
 
 
 def read_job(folder: Path, kind: type[T]) -> T:
     """Read the job written by `write_job`."""
-    return msgspec.json.decode((folder / JOB).read_bytes(), type=kind)
+    return decoded((folder / JOB).read_text(), kind)
 
 
 def append_done(folder: Path, record: Struct) -> None:
     """Append a result to the file; it is on disk when this returns."""
-    with (folder / DONE).open("ab") as file:
-        file.write(msgspec.json.encode(record) + b"\n")
+    with (folder / DONE).open("a") as file:
+        file.write(encoded(record) + "\n")
 
 
 def read_done(folder: Path, kind: type[T]) -> list[T]:
     """Read all results of a launch; [] if there is no file."""
     path = folder / DONE
-    return [msgspec.json.decode(line, type=kind) for line in path.read_bytes().splitlines()] if path.exists() else []
+    return [decoded(line, kind) for line in path.read_text().splitlines()] if path.exists() else []
 
 
 PHYSICS = ("pybullet", "mujoco")  # back-ends of robot_sim; the published numbers are of the first

@@ -12,7 +12,6 @@ import sys
 from pathlib import Path
 from typing import Literal
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -31,6 +30,7 @@ from experiments.kit.control.plant_runs import place
 from experiments.kit.live.launch import read_done
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_touches
 from experiments.kit.reaching.arm import MARKER, PART
+from experiments.kit.structs import decoded, encoded
 from mobee import Model, OfflinePlant
 from mobee.arrays import Array
 from mobee.reach import RADIUS, ReachTarget
@@ -151,13 +151,13 @@ def _first_motion(q: Array, asked: int) -> int:
 def write_block(folder: Path, block: Block) -> None:
     """Write a block to its folder, completely or not at all."""
     new = (folder / BLOCK).with_suffix(".new")
-    new.write_bytes(msgspec.json.format(msgspec.json.encode(block), indent=1))
+    new.write_text(encoded(block, indent=1))
     new.replace(folder / BLOCK)
 
 
 def read_block(folder: Path) -> Block:
     """Read a block written by `write_block`."""
-    return msgspec.json.decode((folder / BLOCK).read_bytes(), type=Block)
+    return decoded((folder / BLOCK).read_text(), Block)
 
 
 def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, MARKER, PART, Problem, robot
-from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure
+from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure, read_block, write_block
 from experiments.kit.live.launch import append_done
 from experiments.kit.live.recordings import CONTACTS, POSITIONS
 from mobee import Model
@@ -54,6 +54,13 @@ def test_success_is_the_palm_within_two_centimetres_of_the_surface_when_the_forc
     assert near.seconds == pytest.approx((END - 11) / RATE) and near.reaches == 2
     assert not far.success and far.off == pytest.approx(0.021)
     assert not none.success and none.off == np.inf
+
+
+def test_a_try_that_was_interrupted_before_its_first_posture_is_kept(folder: Path) -> None:
+    append_done(folder, tried(0, [], off=np.inf, believed=np.inf, why="held"))
+    block = measure(folder, Job("learner", 0, "", [problem(0, 0.0)]), RATE, True)
+    write_block(folder, block)
+    assert read_block(folder) == block and block.tries[0].off == block.tries[0].begun_off == np.inf
 
 
 def test_the_pose_of_a_tick_is_that_which_its_encoders_measured(folder: Path) -> None:
