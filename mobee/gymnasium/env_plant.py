@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.discrete import DiscreteSpace
+from mobee.learning.instant import InstantPlant
 from mobee.plant import Outcome
 
 
-class EnvPlant:
+class EnvPlant(InstantPlant):
     """A discrete Gymnasium environment as a plant: observations are states, a step of the environment is an action.
 
     Use:  `plant = EnvPlant(env); agent = mobee.CuriousAgent(plant.space, plant, beliefs="debiased"); agent.run(1000)`
@@ -35,13 +36,13 @@ class EnvPlant:
         InvalidValue: spaces that are not Discrete.
     """
 
+    space: DiscreteSpace
+
     def __init__(self, env: Env[Any, Any], seed: int = 0, goals: ArrayLike | None = None) -> None:
         self._first_state, states = _counted(env.observation_space, "observations")
         self._first_action, actions = _counted(env.action_space, "actions")
         self.env = env
-        self.space = DiscreteSpace(states, actions, goals)
-        """The states and actions of the environment."""
-        self.robot = self.space.robot
+        super().__init__(DiscreteSpace(states, actions, goals))
         self.rewards: Array = np.zeros((states, actions))
         """The mean of the environment's rewards for each state and action so far, 0 before the first, shape (S, A)."""
         self.returns: list[float] = []
@@ -49,7 +50,6 @@ class EnvPlant:
         self.info: dict[str, Any] = {}
         """The environment's info of the last step or reset."""
         self._tries = np.zeros((states, actions), dtype=np.intp)
-        self._under_way: Array | None = None
         self._return = 0.0
         self._terminated = self._truncated = False
         self._state = self._reset(seed)
@@ -72,7 +72,7 @@ class EnvPlant:
 
     def measure(self, part: str) -> Array:
         """Return the number of the state in the form of motor positions, shape (2,)."""
-        self.robot.part(part)
+        self._check_part(part)
         return self.q
 
     def act(self, part: str, target: Array) -> Outcome:
@@ -80,7 +80,7 @@ class EnvPlant:
 
         Raises ActionInterrupted where the last step truncated the episode: a new episode has begun.
         """
-        self.robot.part(part)
+        self._check_part(part)
         action = self.space.action_of(target)
         if self._truncated and not self._terminated:
             self._state = self._reset()
@@ -90,19 +90,6 @@ class EnvPlant:
         else:
             self._state = self._step(action)
         return Outcome(self.q, settled=True, duration=1.0)
-
-    def begin(self, part: str, target: Array) -> None:
-        """Start an action; `advance` does it."""
-        if self._under_way is not None:
-            raise InvalidValue(f"{part} has an action under way: wait for it with advance().")
-        self._under_way = target
-
-    def advance(self) -> list[tuple[str, Outcome]]:
-        """Do the action that was begun."""
-        if self._under_way is None:
-            raise InvalidValue("no action is under way: begin one first.")
-        target, self._under_way = self._under_way, None
-        return [(self.space.part, self.act(self.space.part, target))]
 
     def _step(self, action: int) -> int:
         state = self._state

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.discrete import DiscreteSpace
+from mobee.learning.instant import InstantPlant
 from mobee.learning.lattice import Lattice
 from mobee.learning.neighbours import NO_ACTION, lattice_strides
 from mobee.learning.space import Space
@@ -25,7 +26,7 @@ DRAWS = 4096  # random numbers made at a time
 NEGLIGIBLE = 1e-4  # a probability
 
 
-class TabularPlant:
+class TabularPlant(InstantPlant):
     """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
 
     It is an OutcomeModel too: the ground truth of the model that an agent learns on it.  The draw of action number n depends on the
@@ -44,7 +45,8 @@ class TabularPlant:
     """
 
     def __init__(self, space: Space, outcomes: ArrayLike, probabilities: ArrayLike, seed: int = 0, start: int = 0) -> None:
-        self.robot, self.space, self.seed = space.robot, space, seed
+        super().__init__(space)
+        self.seed = seed
         self._outcomes, self._probabilities = _checked(space, outcomes, probabilities)
         self._cumulative: Array = np.cumsum(self._probabilities, axis=-1)
         self._cumulative /= np.maximum(self._cumulative[:, :, -1:], NEGLIGIBLE)
@@ -55,7 +57,6 @@ class TabularPlant:
         """The state of the part."""
         self.actions = 0
         """Number of actions that have ended."""
-        self._under_way: Array | None = None
         self._block, self._uniform = -1, np.empty(0)
 
     @property
@@ -83,12 +84,12 @@ class TabularPlant:
 
     def measure(self, part: str) -> Array:
         """Return the sample of the part's state, shape (n_part,), in [rad]."""
-        self._checked_part(part)
+        self._check_part(part)
         return self.space.target(self.state)
 
     def act(self, part: str, target: Array) -> Outcome:
         """Draw the outcome of the action from the part's state towards `target` (n_part,) rad; each takes 1 s."""
-        self._checked_part(part)
+        self._check_part(part)
         action = self._action_to(target)
         chosen = self._cumulative[self.state, action].searchsorted(self._draw(), side="right")
         self.state = self._outcomes.item(self.state, action, chosen)
@@ -107,29 +108,11 @@ class TabularPlant:
             )
         return action
 
-    def begin(self, part: str, target: Array) -> None:
-        """Start an action of the part; target (n_part,) rad."""
-        self._checked_part(part)
-        if self._under_way is not None:
-            raise InvalidValue(f"{part} has an action under way: wait for it with advance().")
-        self._under_way = target
-
-    def advance(self) -> list[tuple[str, Outcome]]:
-        """End the action under way."""
-        if self._under_way is None:
-            raise InvalidValue("no action is under way: begin one first.")
-        target, self._under_way = self._under_way, None
-        return [(self.space.part, self.act(self.space.part, target))]
-
     def _draw(self) -> float:
         block, index = divmod(self.actions, DRAWS)
         if block != self._block:
             self._block, self._uniform = block, np.random.default_rng([self.seed, block]).random(DRAWS)
         return self._uniform.item(index)
-
-    def _checked_part(self, part: str) -> None:
-        if part != self.space.part:
-            raise InvalidValue(f"this plant has no part {part!r}: valid is {self.space.part!r}.")
 
 
 def ideal(space: Space) -> tuple[Ints, Array]:

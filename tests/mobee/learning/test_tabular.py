@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.agent import CuriousAgent, run
 from mobee.learning.tabular import TabularPlant, half_space, ideal
 from tests.mobee.learning.toys import arm, torso
@@ -98,7 +98,7 @@ def test_a_target_that_is_no_neighbour_and_a_part_that_is_not_there_are_refused(
     with pytest.raises(InvalidValue, match="no action to 26"):
         plant.act("torso", plant.space.target(26))
     for call in (lambda: plant.measure("head"), lambda: plant.act("head", np.zeros(3)), lambda: plant.begin("head", np.zeros(3))):
-        with pytest.raises(InvalidValue, match="valid is 'torso'"):
+        with pytest.raises(UnknownName, match="Valid: torso"):
             call()
     with pytest.raises(InvalidValue, match="begin one first"):
         plant.advance()
