@@ -49,7 +49,8 @@ struct Plant {
     double* torque = nullptr;  // (n,), the sum of J^T (depth * normal) at q
     double* total = nullptr;   // (n,), the right-hand side of eq. 5.7
     double* record = nullptr;  // (max_ticks, 3 n + record_depths), a row for each tick; null: no record
-    std::int64_t ticks = 0;    // number of ticks before this run
+    double* deepest = nullptr;  // (record_depths,), raised to the depths of the contacts of every tick; null: not wanted
+    std::int64_t ticks = 0;    // number of ticks so far
     std::int64_t max_ticks = 0;     // number of ticks to run
     std::int64_t ticks_run = 0;     // number of ticks of this run so far
     std::int64_t end = all_ticks_done;
@@ -123,6 +124,14 @@ bool check_actions(Plant& plant, double sampled) {
     return ended;
 }
 
+// Raise the deepest contact of each kind to those of the last tick.
+void raise_depths(const Plant& plant, std::int64_t contacts, double* deepest) {
+    for (std::int64_t c = 0; c < contacts; ++c) {
+        const Contact& contact_k = contact(*plant.neighbours, c);
+        deepest[contact_k.kind] = std::max(deepest[contact_k.kind], contact_k.depth);
+    }
+}
+
 void write_record(const Plant& plant, std::int64_t contacts, double* row) {
     const std::int64_t n = plant.law->motors.size;
     for (std::int64_t i = 0; i < n; ++i) {
@@ -130,12 +139,8 @@ void write_record(const Plant& plant, std::int64_t contacts, double* row) {
         row[n + i] = plant.motors->state[i].q;
         row[2 * n + i] = plant.law_state[i].velocity;
     }
-    double* deepest = row + 3 * n;
-    std::fill_n(deepest, record_depths, 0.0);
-    for (std::int64_t c = 0; c < contacts; ++c) {
-        const Contact& contact_k = contact(*plant.neighbours, c);
-        deepest[contact_k.kind] = std::max(deepest[contact_k.kind], contact_k.depth);
-    }
+    std::fill_n(row + 3 * n, record_depths, 0.0);
+    raise_depths(plant, contacts, row + 3 * n);
 }
 
 }  // namespace plant
@@ -144,8 +149,8 @@ void write_record(const Plant& plant, std::int64_t contacts, double* row) {
 void run(Plant& plant) {
     const std::int64_t width = 3 * plant.law->motors.size + record_depths;
     plant.end = all_ticks_done;
-    for (plant.ticks_run = 0; plant.ticks_run < plant.max_ticks; ++plant.ticks_run) {
-        const std::int64_t tick = plant.ticks + plant.ticks_run + 1;
+    for (plant.ticks_run = 0; plant.ticks_run < plant.max_ticks;) {
+        const std::int64_t tick = plant.ticks + 1;
         plant::apply_command(plant, tick);
         if (!plant::measure(plant, tick)) {
             plant.end = state_lost;
@@ -155,9 +160,11 @@ void run(Plant& plant) {
         plant::compute_command(plant, tick, contacts > 0);
         move(*plant.motors, plant.substeps, plant.dt / static_cast<double>(plant.substeps));
         if (plant.record != nullptr) plant::write_record(plant, contacts, plant.record + plant.ticks_run * width);
+        if (plant.deepest != nullptr) plant::raise_depths(plant, contacts, plant.deepest);
+        plant.ticks = tick;
+        ++plant.ticks_run;
         const double sampled = static_cast<double>(tick) * plant.dt - plant.dt;
         if (plant::check_actions(plant, sampled)) {
-            ++plant.ticks_run;
             plant.end = action_ended;
             return;
         }
@@ -169,6 +176,40 @@ MOBEE_CALL void mobee_plant_run(Plant* plant) { run(*plant); }
 // Run distinct plants as `mobee_plant_run` does, in `threads` threads.
 MOBEE_CALL void mobee_plants_run(Plant* const* plants, std::int64_t count, std::int64_t threads) {
     share(count, 1, std::min(threads, count), [&](std::int64_t, std::int64_t which, std::int64_t) { run(*plants[which]); });
+}
+
+// Run distinct plants for `ticks` ticks each, also if actions end before, in `threads` threads.  Return the number of plants whose state is
+// lost.
+MOBEE_CALL std::int64_t mobee_plants_run_for(Plant* const* plants, std::int64_t count, std::int64_t ticks, std::int64_t threads) {
+    share(count, 1, std::min(threads, count), [&](std::int64_t, std::int64_t which, std::int64_t) {
+        Plant& plant = *plants[which];
+        plant.max_ticks = ticks;
+        do {
+            run(plant);
+            plant.max_ticks -= plant.ticks_run;
+        } while (plant.end == action_ended && plant.max_ticks > 0);
+    });
+    return std::count_if(plants, plants + count, [](const Plant* plant) { return plant->end == state_lost; });
+}
+
+// Fill the encoders, attractors and velocities of all motors of several plants, (plants, 3, motors).
+MOBEE_CALL void mobee_plants_read(const Plant* const* plants, std::int64_t count, double* out) {
+    for (const Plant* const* plant = plants; plant != plants + count; ++plant) {
+        const std::int64_t n = (*plant)->law->motors.size;
+        std::copy_n((*plant)->q, n, out);
+        std::copy_n((*plant)->attractor, n, out + n);
+        for (std::int64_t i = 0; i < n; ++i) out[2 * n + i] = (*plant)->law_state[i].velocity;
+        out += 3 * n;
+    }
+}
+
+// Set the attractors of several plants, (plants, motors).
+MOBEE_CALL void mobee_plants_aim(Plant* const* plants, std::int64_t count, const double* attractors) {
+    for (Plant* const* plant = plants; plant != plants + count; ++plant) {
+        const std::int64_t n = (*plant)->law->motors.size;
+        std::copy_n(attractors, n, (*plant)->attractor);
+        attractors += n;
+    }
 }
 
 // Fill the size in bytes of each structure that Python declares too, in the order of `STRUCTURES` in mobee/_core/plant.py.

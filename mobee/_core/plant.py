@@ -60,7 +60,7 @@ class Plant(ctypes.Structure):
         ("rows", INTEGER), ("reaches", View),
         ("motors", ADDRESS), ("commands", ADDRESS), ("command_age", INTEGER), ("substeps", INTEGER), ("dt", REAL),
         ("noise", ADDRESS), ("parts", View),
-        *((name, ADDRESS) for name in ("q", "torque", "total", "record")),
+        *((name, ADDRESS) for name in ("q", "torque", "total", "record", "deepest")),
         *((name, INTEGER) for name in ("ticks", "max_ticks", "ticks_run", "end")),
     )  # fmt: skip
 
@@ -86,6 +86,9 @@ class Calls:
         self.runs_out = function("braking_runs_out", ADDRESS, ADDRESS, ADDRESS, result=ctypes.c_bool)
         self.run = function("plant_run", ADDRESS)
         self.run_many = function("plants_run", BYTES, INTEGER, INTEGER)
+        self.run_for = function("plants_run_for", BYTES, INTEGER, INTEGER, INTEGER, result=INTEGER)
+        self.read_many = function("plants_read", BYTES, INTEGER, ADDRESS)
+        self.aim_many = function("plants_aim", BYTES, INTEGER, BYTES)
         self.sizes = function("plant_sizes", ADDRESS)
 
 

@@ -131,13 +131,11 @@ class Controller:
     def last_forces(self) -> Forces:
         """The constraint forces of the last step."""
         known = self._last_forces
-        if not isinstance(known, Forces):
-            known = self._last_forces = Forces(**dict(zip(self.force_names, known, strict=True)))
-        return known
+        return known if isinstance(known, Forces) else Forces(**dict(zip(self.force_names, known.copy(), strict=True)))
 
     def note_forces(self, forces: Array) -> None:
-        """Set `last_forces` from rows (forces, n) in the order of `force_names`; they are copied."""
-        self._last_forces = forces.copy()
+        """Take `last_forces` from rows (forces, n) in the order of `force_names`, as they are when it is read."""
+        self._last_forces = forces
 
     @property
     def pushed(self) -> bool:

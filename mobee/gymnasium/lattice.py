@@ -10,14 +10,13 @@ from typing import Any, Literal
 import numpy as np
 from gymnasium import Env
 from gymnasium.spaces import Discrete
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.gymnasium.registration import LATTICE_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings, renewed
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings
+from mobee.gymnasium.vector import RobotVectorEnv
 from mobee.learning.goal import target_states
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
@@ -191,7 +190,7 @@ class LatticeEnv(Env[Any, Any]):
         return self._portrait.picture(self._lattice.model.evaluate(self.plant.q), [self._lattice.part])
 
 
-class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
+class LatticeVectorEnv(RobotVectorEnv):
     """Several robots on one lattice, whose actions are simulated together; results are bit-equal to those of separate `LatticeEnv`s.
 
     An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
@@ -203,8 +202,6 @@ class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
         settings: None: the defaults.
         **changes: fields of `LatticeTask` by keyword.
     """
-
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     @accepts(LatticeTask)
     def __init__(
@@ -218,30 +215,23 @@ class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
         **changes: Any,
     ) -> None:
         self.task = LatticeTask.made(settings, changes)
-        self._lattice = _Lattice(self.task)
-        self.num_envs, self.render_mode, self._most, self._threads = num_envs, render_mode, max_episode_steps, threads
-        self.single_observation_space, self.single_action_space = self._lattice.observations, self._lattice.actions
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._lattice, self._threads = _Lattice(self.task), threads
+        super().__init__(num_envs, max_episode_steps, self._lattice.observations, self._lattice.actions)
         self._arms = [_Arm(self._lattice) for _ in range(num_envs)]
-        self._rngs = [np.random.default_rng(number) for number in range(num_envs)]
-        self._steps = np.zeros(num_envs, dtype=np.intp)
-        self._over = np.zeros(num_envs, dtype=bool)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Ints, dict[str, Any]]:
         """Put all robots at home; `seed`: one for each, or the first of consecutive ones."""
-        self._rngs = renewed(self._rngs, seed)
+        self._restart_all(seed)
         infos: dict[str, Any] = {}
         for number, (arm, rng) in enumerate(zip(self._arms, self._rngs, strict=True)):
             infos = self._add_info(infos, arm.restart(rng, options), number)
-        self._steps[:], self._over[:] = 0, False
         return self._states(), infos
 
     def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Do a whole action of each robot whose episode has not ended; the others begin a new episode."""
-        chosen, over = np.asarray(actions).tolist(), self._over.copy()
+        chosen, over = np.asarray(actions).tolist(), self._over
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
         plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]
         outcomes = iter(advance_together(plants, self._threads) if plants else [])
@@ -254,9 +244,7 @@ class LatticeVectorEnv(VectorEnv[Any, Any, Any]):
                 outcome = next(outcomes)[0][1] if moving[number] else None
                 _, rewards[number], terminated[number], info = arm.end(chosen[number], outcome)
             infos = self._add_info(infos, info, number)
-        self._steps = np.where(over, 0, self._steps + 1)
-        truncated = self._steps >= self._most
-        self._over = terminated | truncated
+        truncated = self._count_steps(terminated)
         return self._states(), rewards, terminated, truncated, infos
 
     def _states(self) -> Ints:

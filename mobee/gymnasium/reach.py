@@ -10,25 +10,25 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from gymnasium import Env
 from gymnasium.spaces import Box, Dict
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.gymnasium.registration import REACH_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, guarded, model_of, plant_settings, renewed
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, guarded, model_of, plant_settings
+from mobee.gymnasium.vector import RobotVectorEnv
 from mobee.learning.space import checked_joints
 from mobee.model.model import Model
 from mobee.rendering.picture import Picture
 from mobee.rendering.solid import ball
 from mobee.robot.robot import Robot
 from mobee.settings import Range, Settings, accepts
-from mobee.simulation import OfflinePlant, PlantSettings, Trace, run_together
+from mobee.simulation import OfflinePlant, PlantBatch, PlantSettings
 
 GOAL_DRAWS = 2000  # postures that are drawn for a goal before it is given up
 NOISE = 0.1  # rad, by which encoders may read more than the limits
 GOAL_COLOR = (0.86, 0.20, 0.16)
+_ONLY: Ints = np.array([0])  # the number of the robot of an environment that is alone
 
 Observation = dict[str, Array]
 
@@ -98,19 +98,27 @@ class _Reaching:
     def _pushed(self, forces: Array) -> bool:
         return bool(forces[:, self.joints].any())
 
-    def aim(self, plants: Sequence[OfflinePlant], actions: Array) -> None:
-        """Move the attractors of several robots by actions (k, d), within the joints' limits."""
-        attractors = [plant.controller.goal for plant in plants]
-        moved = np.array([attractor[self.joints] for attractor in attractors]) + self.step * np.clip(actions, -1.0, 1.0)
-        for attractor, row in zip(attractors, np.clip(moved, self.low, self.high), strict=True):
-            attractor[self.joints] = row
+    def robots(self, count: int, threads: int = 1) -> PlantBatch:
+        """Return new robots, simulated in `threads` threads."""
+        return PlantBatch(self.model, count, self.plant_settings, threads)
 
-    def observe(self, plants: Sequence[OfflinePlant], goals: Array) -> Observation:
-        """Return the observations of several robots with goals (k, 3) m: each entry is (k, ...)."""
-        q = np.array([plant.q for plant in plants])
-        own = [(plant.controller.goal[self.joints], plant.controller.state["velocity"][self.joints]) for plant in plants]
-        seen = np.concatenate([q[:, self.joints], np.array(own).reshape(len(plants), -1)], axis=1)
-        return {"observation": seen, "achieved_goal": self.model.evaluate(q).position(self.marker), "desired_goal": goals.copy()}
+    def move(self, robots: PlantBatch, which: Ints, actions: Array) -> Array:
+        """Move the attractors of robots by actions (k, d), within the joints' limits, and simulate a step.
+
+        Returns the deepest contacts of the step, of solids and of fields, (k, 2) m.
+        """
+        attractors = robots.state()[which, 1]
+        moved = attractors[:, self.joints] + self.step * np.clip(actions, -1.0, 1.0)
+        attractors[:, self.joints] = np.clip(moved, self.low, self.high)
+        robots.aim(which, attractors)
+        return robots.run(which, self.ticks)
+
+    def observe(self, robots: PlantBatch, goals: Array) -> Observation:
+        """Return the observations of all robots, with goals (count, 3) m: each entry is (count, ...)."""
+        state = robots.state()
+        seen = state[:, :, self.joints].reshape(len(goals), -1)
+        achieved = self.model.evaluate(state[:, 0]).position(self.marker)
+        return {"observation": seen, "achieved_goal": achieved, "desired_goal": goals.copy()}
 
     def judge(self, achieved: Array, desired: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return rewards (...) and whether the goals are reached (...) for places (..., 3) m."""
@@ -128,11 +136,6 @@ def extent(robot: Robot, marker: str) -> float:
         total += float(np.abs(joint.limits).max()) if joint.kind == "prismatic" else 0.0
         point, link = joint.point, joint.parent
     return total + float(np.linalg.norm(point))
-
-
-def _contacts(trace: Trace) -> dict[str, float]:
-    """Return the deepest contacts of a step, in m: of solids, which would be collisions, and of the fields around them."""
-    return {"solid_depth": float(trace.solid.max()), "field_depth": float(trace.field.max())}
 
 
 class ReachEnv(Env[Any, Any]):
@@ -165,10 +168,14 @@ class ReachEnv(Env[Any, Any]):
         self.render_mode = render_mode
         self._reaching = _Reaching(self.task)
         self.observation_space, self.action_space = self._reaching.observations, self._reaching.actions
-        self.plant = OfflinePlant(self._reaching.model, settings=self._reaching.plant_settings)
-        """The simulated robot."""
+        self._robots = self._reaching.robots(1)
         self._goal: Array = np.zeros(3)
         self._portrait: Portrait | None = None
+
+    @property
+    def plant(self) -> OfflinePlant:
+        """The simulated robot."""
+        return self._robots.plants[0]
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
         """Put the robot at home and draw a goal; `seed` determines the noise and the goals of this and all later episodes."""
@@ -182,11 +189,10 @@ class ReachEnv(Env[Any, Any]):
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move the attractor by an action (d,), and simulate `period` seconds."""
-        self._reaching.aim([self.plant], np.asarray(action, dtype=np.float64)[None])
-        trace = self.plant.run(self._reaching.ticks)
+        ((solid, field),) = self._reaching.move(self._robots, _ONLY, np.asarray(action, dtype=np.float64)[None])
         seen = self._observed()
         reward, reached = self._reaching.judge(seen["achieved_goal"], self._goal)
-        return seen, float(reward), False, False, {"is_success": bool(reached), **_contacts(trace)}
+        return seen, float(reward), False, False, {"is_success": bool(reached), "solid_depth": float(solid), "field_depth": float(field)}
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Any:
         """Return the rewards (...) of achieved and desired places (..., 3) m, as hindsight experience replay needs them."""
@@ -202,10 +208,10 @@ class ReachEnv(Env[Any, Any]):
         return self._portrait.picture(pose, [self._reaching.part], [ball(self._goal, self.task.tolerance / 2.0, GOAL_COLOR, veiled=0.3)])
 
     def _observed(self) -> Observation:
-        return {name: rows[0] for name, rows in self._reaching.observe([self.plant], self._goal[None]).items()}
+        return {name: rows[0] for name, rows in self._reaching.observe(self._robots, self._goal[None]).items()}
 
 
-class ReachVectorEnv(VectorEnv[Any, Any, Any]):
+class ReachVectorEnv(RobotVectorEnv):
     """Several robots that reach, simulated together; the results of each are bit-equal to those of a separate `ReachEnv`.
 
     An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
@@ -217,8 +223,6 @@ class ReachVectorEnv(VectorEnv[Any, Any, Any]):
         settings: None: the defaults.
         **changes: fields of `ReachTask` by keyword.
     """
-
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     @accepts(ReachTask)
     def __init__(
@@ -233,52 +237,43 @@ class ReachVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> None:
         self.task = ReachTask.made(settings, changes)
         self._reaching = _Reaching(self.task)
-        self.num_envs, self.render_mode, self._most, self._threads = num_envs, render_mode, max_episode_steps, threads
-        self.single_observation_space, self.single_action_space = self._reaching.observations, self._reaching.actions
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.plants = [OfflinePlant(self._reaching.model, settings=self._reaching.plant_settings) for _ in range(num_envs)]
-        """The simulated robots."""
-        self._rngs = [np.random.default_rng(number) for number in range(num_envs)]
+        super().__init__(num_envs, max_episode_steps, self._reaching.observations, self._reaching.actions)
+        self._robots = self._reaching.robots(num_envs, threads)
         self._goals = np.zeros((num_envs, 3))
-        self._steps = np.zeros(num_envs, dtype=np.intp)
+
+    @property
+    def plants(self) -> list[OfflinePlant]:
+        """The simulated robots."""
+        return self._robots.plants
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Put all robots at home and draw a goal for each; `seed`: one for each, or the first of consecutive ones."""
-        self._rngs = renewed(self._rngs, seed)
+        self._restart_all(seed)
         for number in range(self.num_envs):
             self._begin(number)
-        seen = self._reaching.observe(self.plants, self._goals)
+        seen = self._reaching.observe(self._robots, self._goals)
         return seen, self._infos(self._reaching.judge(seen["achieved_goal"], self._goals)[1])
 
     def step(self, actions: Array) -> tuple[Observation, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Move the attractors by actions (num_envs, d), and simulate `period` seconds; an episode that was over begins again."""
-        going = np.flatnonzero(self._steps < self._most)
-        plants = [self.plants[number] for number in going.tolist()]
-        traces: list[Trace] = []
-        if plants:
-            self._reaching.aim(plants, np.asarray(actions, dtype=np.float64)[going])
-            traces = run_together(plants, self._reaching.ticks, self._threads)
-        for number in np.flatnonzero(self._steps >= self._most).tolist():
+        begun, depths = self._over, np.zeros((self.num_envs, 2))
+        going = np.flatnonzero(~begun)
+        depths[going] = self._reaching.move(self._robots, going, np.asarray(actions, dtype=np.float64)[going])
+        for number in np.flatnonzero(begun).tolist():
             self._begin(number)
-        self._steps[going] += 1
-        seen = self._reaching.observe(self.plants, self._goals)
+        seen = self._reaching.observe(self._robots, self._goals)
         rewards, reached = self._reaching.judge(seen["achieved_goal"], self._goals)
-        begun = np.ones(self.num_envs, dtype=bool)
-        begun[going] = False
         infos = self._infos(reached)
-        depths = np.zeros((2, self.num_envs))
-        depths[:, going] = np.array([(trace.solid.max(), trace.field.max()) for trace in traces]).reshape(-1, 2).T
-        infos |= {"solid_depth": depths[0], "_solid_depth": ~begun, "field_depth": depths[1], "_field_depth": ~begun}
-        return seen, np.where(begun, 0.0, rewards), np.zeros(self.num_envs, dtype=bool), self._steps >= self._most, infos
+        infos |= {"solid_depth": depths[:, 0], "_solid_depth": ~begun, "field_depth": depths[:, 1], "_field_depth": ~begun}
+        terminated = np.zeros(self.num_envs, dtype=bool)
+        return seen, np.where(begun, 0.0, rewards), terminated, self._count_steps(terminated), infos
 
     def _begin(self, number: int) -> None:
         plant, rng = self.plants[number], self._rngs[number]
         plant.restart(int(rng.integers(SEEDS)))
         self._goals[number] = self._reaching.draw_goal(rng, plant)
-        self._steps[number] = 0
 
     def _infos(self, reached: NDArray[np.bool_]) -> dict[str, Any]:
         return {"is_success": reached, "_is_success": np.ones(self.num_envs, dtype=bool)}

@@ -9,7 +9,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from gymnasium.utils.seeding import np_random
 
 from mobee.model.model import Model
 from mobee.model.pose import Pose
@@ -85,9 +84,3 @@ class Portrait:
     def picture(self, pose: Pose, bright: Sequence[str], added: Sequence[Solid] = ()) -> Picture:
         """Return the picture (H, W, 3) of a pose, in which the parts that are not `bright` are pale; `added`: further solids."""
         return draw([*robot_solids(pose, bright), *object_solids(pose.objects), *added], self._camera, self._floor, RAYS)
-
-
-def renewed(rngs: Sequence[np.random.Generator], seed: int | Sequence[int | None] | None) -> list[np.random.Generator]:
-    """Return the random generators of a vector after `reset(seed=seed)`: those with a seed are new, as in separate environments."""
-    seeds = [seed + number for number in range(len(rngs))] if isinstance(seed, int) else seed or [None] * len(rngs)
-    return [rng if one is None else np_random(one)[0] for rng, one in zip(rngs, seeds, strict=True)]

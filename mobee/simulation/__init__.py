@@ -8,4 +8,5 @@ from mobee.simulation.motors import MotorParameters as MotorParameters
 from mobee.simulation.motors import Motors as Motors
 from mobee.simulation.plant import OfflinePlant as OfflinePlant
 from mobee.simulation.plant import PlantSettings as PlantSettings
+from mobee.simulation.plant_batch import PlantBatch as PlantBatch
 from mobee.simulation.runner import Trace as Trace

@@ -19,6 +19,7 @@ from mobee.control.terms import Term
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.model.contact import links_moved, touched_in
 from mobee.model.model import engine_of
+from mobee.model.snapshot import Snapshot
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.settings import Settings, accepts
@@ -124,8 +125,6 @@ class OfflinePlant:
         self._touching, self._moved = engine_of(without_pairs(self.robot)), links_moved(self.robot)
         self._runner = Runner(self._controller, self.motors, alive, dt, chosen.command_age, self._actions.parts)
         self._alive = alive
-        self._ticks = 0
-        self._q = self.motors.q  # tick 0, in which nothing moves, is read without noise
         self._pose: Pose | None = None
         self._hashed = chosen.hashed
         self._digest = hashlib.sha256() if chosen.hashed else None
@@ -153,7 +152,7 @@ class OfflinePlant:
         self._controller.clear()
         self._controller.reset(start)
         self._runner.restart(start)
-        self._ticks, self._q, self._pose = 0, start, None
+        self._pose = None
         self._digest = hashlib.sha256() if self._hashed else None
 
     def _checked_start(self, q: ArrayLike | None) -> Array:
@@ -180,13 +179,13 @@ class OfflinePlant:
     @property
     def time(self) -> float:
         """The plant's clock: simulated time since its creation, s."""
-        return self._ticks * self.dt
+        return self._runner.ticks * self.dt
 
     @property
     def pose(self) -> Pose | None:
         """The model's pose at the last tick, in the current world; None before the first tick."""
-        if self._pose is None and self._ticks:
-            self._pose = self.model.evaluate(self._q, reaching=self.reaching)
+        if self._pose is None and self._runner.ticks:
+            self._pose = self.model.evaluate(self.q, reaching=self.reaching)
         return self._pose
 
     @property
@@ -219,12 +218,12 @@ class OfflinePlant:
 
     @property
     def q(self) -> Array:
-        """The encoder values of all motors at the last tick, shape (n,), in [rad]."""
-        return self._q.copy()
+        """The encoder values of all motors at the last tick, shape (n,), in [rad]; tick 0, in which nothing moves, has no noise."""
+        return self._runner.q.copy()
 
     def measure(self, part: str) -> Array:
         """Return the encoder values of the part's motors at the last tick, shape (n_part,), in [rad]."""
-        return self._q[self.robot.part(part).slice].copy()
+        return self._runner.q[self.robot.part(part).slice].copy()
 
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, and run until this part has settled or timed out.
@@ -273,7 +272,7 @@ class OfflinePlant:
 
     def follow(self) -> None:
         """Pass the pose of the last tick to the world, which needs it to attach and detach objects; called at the end of every action."""
-        self.model.world.follow(self.model.evaluate(self._q))
+        self.model.world.follow(self.model.evaluate(self.q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
         """Call `callback` with the plant's time [s] every `ticks` ticks; it may edit the world.  None: stop calling."""
@@ -319,26 +318,44 @@ class OfflinePlant:
             left -= len(rows[-1])
         return Trace.of(np.concatenate(rows))
 
+    @property
+    def address(self) -> int:
+        """The address of the structure that the core runs, see `stand_by`."""
+        return self._runner.address
+
+    def stand_by(self, snapshot: Snapshot, deepest: Array) -> bool:
+        """Prepare runs of the core alone in this world; returns False if Python must take part in the ticks.
+
+        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m].  After each run call `conclude`.
+        """
+        runner = self._runner
+        if self._digest is not None or self._callback is not None or self._reaches.exempt or runner.needs_python:
+            return False
+        if runner.standing_by is not snapshot:
+            runner.stand_by(deepest)
+        return True
+
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
         """Run up to `most` ticks, until an action ends; return the record (ticks, 3 n + 2), which is empty unless `traced` or hashed."""
         if self._callback is not None:
-            most = min(most, self._period - self._ticks % self._period)
-        address = self._runner.prepare(self._ticks, most, traced or self._digest is not None, traced, self.reaching)
+            most = min(most, self._period - self._runner.ticks % self._period)
+        address = self._runner.prepare(most, traced or self._digest is not None, traced, self.reaching)
         try:
             yield address
         finally:  # also what was run before a Ctrl-C
-            rows = self._conclude()
+            rows = self.conclude()
         return rows
 
-    def _conclude(self) -> Array:
-        """Update the plant after ticks of the core; returns their record (ticks, 3 n + 2), empty if none was made."""
+    def conclude(self) -> Array:
+        """Update the plant after ticks of the core; returns their record (ticks, 3 n + 2), empty if none was made.
+
+        Raises ActionInterrupted if the motors' state is no longer finite.
+        """
         rows, done, lost = self._runner.results()
         if done:
             self._pose = None
-            self._ticks += done
-            self._q = self._runner.q.copy()
             if self._digest is not None:
-                self._digest.update(np.ascontiguousarray(rows[:, : len(self._q)]).astype("<f8").tobytes())
+                self._digest.update(np.ascontiguousarray(rows[:, : len(self.robot.motors)]).astype("<f8").tobytes())
         if lost:
             self._actions.end_all()
             for part in self._reaches.running:
@@ -346,7 +363,7 @@ class OfflinePlant:
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
         if self._reaches.running:
             self._let_go()
-        if self._callback is not None and self._ticks % self._period == 0:
+        if self._callback is not None and self._runner.ticks % self._period == 0:
             self._callback(self.time)
         return rows
 
@@ -354,7 +371,7 @@ class OfflinePlant:
         """End the force on parts whose reach has settled or timed out, so that their attractors draw them back."""
         for part in self._reaches.running:
             if part not in self._actions.under_way:
-                if self._reaches.ended(part, self._outcome(part), self.model.evaluate(self._q)):
+                if self._reaches.ended(part, self._outcome(part), self.model.evaluate(self.q)):
                     self._test(part)
 
     def _test(self, part: str) -> None:
@@ -367,7 +384,7 @@ class OfflinePlant:
 
     def _outcome(self, part: str) -> Outcome:
         self.follow()
-        return self._actions.outcome(part, self._q, self.time - self.dt, self._touched(part))
+        return self._actions.outcome(part, self._runner.q, self.time - self.dt, self._touched(part))
 
     def _touched(self, part: str) -> tuple[str, ...]:
         """Return what `touched_by` returns for the part in the present pose, without computing self-contacts."""
@@ -375,5 +392,5 @@ class OfflinePlant:
         if not snapshot.names:
             return ()
         return touched_in(
-            self._touching.contacts_of_one(self._q.tobytes(), snapshot, self.model.hands(self.reaching))[0], self._moved[part]
+            self._touching.contacts_of_one(self._runner.q.tobytes(), snapshot, self.model.hands(self.reaching))[0], self._moved[part]
         )

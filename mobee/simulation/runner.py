@@ -19,7 +19,7 @@ from mobee.arrays import Array
 from mobee.control import Controller
 from mobee.model.masses import gravity_torque
 from mobee.model.model import engine_of
-from mobee.model.snapshot import Hand, Hands
+from mobee.model.snapshot import Hand, Hands, Snapshot
 from mobee.model.track import Neighbours
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
@@ -89,29 +89,41 @@ class Runner:
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
+        self.standing_by: Snapshot | None = None
+        """The world for which `stand_by` has prepared it, if nothing else was prepared since."""
         self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
-        self._address = ctypes.addressof(self._struct)
+        self.address = ctypes.addressof(self._struct)
+        """The address of the structure that the core runs."""
         self.restart(self.q)
 
     def restart(self, q: Array) -> None:
         """Start again from rest at q (n,) rad, without commands and forces under way."""
         self.q[:] = q
+        self._struct.ticks = 0
         self._commands[:] = self._controller.state["reference"] if self._controller.modality == "position" else 0.0
         for forces in (self._client, self._torque, self._total, self._forces):
             forces[:] = 0.0
 
-    def prepare(self, ticks: int, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
-        """Prepare up to `most` ticks after `ticks` ticks; returns the address of the structure that the core runs.
+    @property
+    def ticks(self) -> int:
+        """Number of ticks since the start."""
+        ticks: int = self._struct.ticks
+        return ticks
+
+    def prepare(self, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
+        """Prepare up to `most` ticks; returns the address of the structure that the core runs.
 
         `kept`: the ticks are recorded; `solids`: contacts of solids are computed too, for the record;
         `reaching`: the markers whose hands ignore the targets.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
+        if self.standing_by is not None:
+            self.standing_by, struct.deepest = None, None
         motors.begin_substeps(self._substep)
         if controller.modality == "torque" or controller.pushed or controller.terms:  # forces that Python computes for each pose
             most, self._clients_act = 1, True
-            self._client[:] = self._pose_forces(motors.encoders(ticks + 1, self._dt), reaching)
+            self._client[:] = self._pose_forces(motors.encoders(struct.ticks + 1, self._dt), reaching)
         elif controller.forced or self._clients_act:
             self._clients_act = controller.forced
             self._client[:] = controller.client_force(self.q)
@@ -124,8 +136,19 @@ class Runner:
         if listed != self._listed:
             struct.reaches, self._listed = View(*listed), listed
         struct.neighbours = self._near(solids, reaching) if controller.contact_forces or solids else None
-        struct.ticks, struct.max_ticks, struct.ticks_run = ticks, most, 0
-        return self._address
+        struct.max_ticks, struct.ticks_run = most, 0
+        return self.address
+
+    @property
+    def needs_python(self) -> bool:
+        """Whether Python computes forces for each pose, or clients or reaches exert some: then only `prepare` prepares ticks."""
+        controller = self._controller
+        return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
+
+    def stand_by(self, deepest: Array) -> None:
+        """Prepare runs of the core alone, in the present world; their deepest contacts of solids and fields go to `deepest` (2,)."""
+        self.prepare(0, False, True)
+        self._struct.deepest, self.standing_by = address(deepest), self._controller.model.world.snapshot
 
     def results(self) -> tuple[Array, int, bool]:
         """Return the record (ticks, 3 n + 2), the number of ticks run, and whether the motors' state is no longer finite."""

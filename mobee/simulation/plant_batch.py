@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plants of one model as rows of arrays, which one call of the core reads, aims or runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee._core import address
+from mobee._core import plant as core
+from mobee.arrays import Array, Ints, checked_threads
+from mobee.errors import ActionInterrupted, BatchInterrupted
+from mobee.model.model import Model
+from mobee.simulation.batch import run_together
+from mobee.simulation.plant import OfflinePlant, PlantSettings
+
+
+class PlantBatch:
+    """Several plants of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
+
+    `which`, in all calls: the numbers of the plants concerned, each once.
+
+    Args:
+        model: the robot in its world.
+        count: number of plants.
+        settings: of the plants; None: the defaults.
+        threads: of the simulation.
+    """
+
+    def __init__(self, model: Model, count: int, settings: PlantSettings | None = None, threads: int = 1) -> None:
+        self.plants = [OfflinePlant(model, settings=settings) for _ in range(count)]
+        """The plants; each may be used by itself between two calls."""
+        self._model, self._threads, self._core = model, checked_threads(threads), core.calls()
+        self._addresses: Ints = np.array([plant.address for plant in self.plants], dtype=np.int64)
+        self._deepest = np.zeros((count, core.RECORD_DEPTHS))
+
+    def state(self) -> Array:
+        """Return encoders and attractors [rad], and the controllers' velocities [rad/s] of all plants, (count, 3, n)."""
+        state = np.empty((len(self.plants), 3, len(self._model.robot.motors)))
+        self._core.read_many(self._addresses.tobytes(), len(self.plants), address(state))
+        return state
+
+    def aim(self, which: Ints, attractors: Array) -> None:
+        """Set the attractors of plants to `attractors` (k, n) rad; no action begins."""
+        self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
+
+    def run(self, which: Ints, ticks: int) -> Array:
+        """Run `ticks` ticks of plants, also if actions end before; returns their deepest contacts (k, 2) of solids and of fields, m.
+
+        Raises BatchInterrupted as `run_together` does; its results are then the rows of this array.
+        """
+        snapshot, chosen = self._model.world.snapshot, [self.plants[number] for number in which.tolist()]
+        if not all([plant.stand_by(snapshot, self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):
+            traces = run_together(chosen, ticks, self._threads)
+            return np.array([(trace.solid.max(), trace.field.max()) for trace in traces])
+        self._deepest[which] = 0.0
+        self._core.run_for(self._addresses[which].tobytes(), len(which), ticks, self._threads)
+        deepest, lost = self._deepest[which], dict[int, ActionInterrupted]()
+        for row, plant in enumerate(chosen):
+            try:
+                plant.conclude()
+            except ActionInterrupted as error:
+                lost[row] = error
+        if lost:
+            raise BatchInterrupted([lost.get(row, depths) for row, depths in enumerate(deepest)]) from lost[min(lost)]
+        return deepest

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A batch of plants as rows of arrays gives what separate plants give, to the last bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mobee import BatchInterrupted, OfflinePlant, PlantSettings, load_robot, load_world
+from mobee.errors import ActionInterrupted
+from mobee.model.model import Model
+from mobee.simulation import PlantBatch
+
+ICUB = load_robot("icub")
+SETTINGS = PlantSettings(dt=0.02, active=["left_arm"])
+COUNT, TICKS = 4, 15
+
+
+def low_arm(rng: np.random.Generator) -> np.ndarray:
+    """Attractors of all robots, at and in the table."""
+    goals = np.tile(ICUB.home, (COUNT, 1))
+    arm = ICUB.parts["left_arm"].slice
+    goals[:, arm] = rng.uniform(*ICUB.limits[arm].T, size=(COUNT, arm.stop - arm.start))
+    return goals
+
+
+def disturb(step: int, plants: list[OfflinePlant]) -> None:
+    """What a user may do with a plant between two runs."""
+    if step == 2:
+        plants[0].controller.force(np.full(41, 0.5))
+    if step == 3:
+        plants[0].controller.force(np.zeros(41))
+        plants[1].controller.push("left_palm", np.array([0.0, 0.0, 3.0]))
+    if step == 4:
+        plants[1].controller.clear()
+        plants[2].run(3)
+    if step == 5:
+        plants[2].begin("left_arm", plants[2].measure("left_arm"))
+    if step == 6:
+        plants[3].restart(9)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_each_plant_moves_as_if_it_were_alone(threads: int) -> None:
+    rng, every = np.random.default_rng(0), np.arange(COUNT)
+    model, apart = Model(ICUB, load_world("table")), Model(ICUB, load_world("table"))
+    batch, alone = PlantBatch(model, COUNT, SETTINGS, threads), [OfflinePlant(apart, settings=SETTINGS) for _ in range(COUNT)]
+    for plants in (batch.plants, alone):
+        for seed, plant in enumerate(plants):
+            plant.restart(seed)
+    for step in range(8):
+        which = every if step != 1 else np.array([3, 1])
+        goals = low_arm(rng)[which]
+        for plants in (batch.plants, alone):
+            disturb(step, plants)
+        if step == 6:
+            for one in (model, apart):
+                one.world.move("ball", position=(-0.3, -0.2, 0.0))
+        batch.aim(which, goals)
+        depths = batch.run(which, TICKS)
+        for row, number in enumerate(which.tolist()):
+            plant = alone[number]
+            plant.controller.attractor = goals[row]
+            trace = plant.run(TICKS)
+            assert depths[row].tolist() == [trace.solid.max(), trace.field.max()]
+        for found, plant, twin in zip(batch.state(), alone, batch.plants, strict=True):
+            assert np.array_equal(found, [plant.q, plant.controller.attractor, plant.controller.velocity])
+            assert twin.time == plant.time and twin.acting == plant.acting
+            assert np.array_equal(twin.controller.last_forces.total, plant.controller.last_forces.total)
+            assert twin.pose is not None and twin.pose.count == plant.pose.count
+    assert depths[:, 1].max() > 0.0
+
+
+def test_a_plant_that_is_lost_takes_nothing_from_the_others() -> None:
+    batch = PlantBatch(Model(ICUB), 3, SETTINGS)
+    batch.run(np.arange(3), 2)
+    batch.plants[1].motors.state["q"][:] = np.nan
+    with pytest.raises(BatchInterrupted, match=r"1 of 3 plants were interrupted, the first plants\[1\]") as caught:
+        batch.run(np.arange(3), 5)
+    results: list[Any] = caught.value.results
+    assert isinstance(results[1], ActionInterrupted) and results[0].tolist() == results[2].tolist() == [0.0, 0.0]
+    assert [plant.time for plant in batch.plants] == pytest.approx([0.14, 0.04, 0.14])
+    assert batch.run(np.array([], dtype=np.intp), 5).shape == (0, 2)
