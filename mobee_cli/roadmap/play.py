@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.command_line import positive_number
 from mobee import constraint_forces
 from mobee.control.gains import Gains
 from mobee.roadmap.playback import SPEED, Played, play
@@ -27,12 +28,14 @@ NOTES = (
     + """
 With --live the path begins where the robot is, and no agent may own a part that
 moves. Ctrl-C ends the motion: the robot stays where it is.
+It has arrived when it is at rest and the marker of the map is within the
+tolerance of its place on the path's last pose.
 Exit code: 0 arrived, 1 not arrived, or the path has contacts, 2 bad input, 3 no
 system is running."""
 )
 MIN_FORCE = 0.5  # rad/s^2: a weaker force moves a motor by less than a quarter of a degree
 MIN_ERROR = 0.02  # rad: smaller errors are not explained
-MAX_ERROR = 0.1  # rad: a motor that ends farther from its goal has not arrived
+TOLERANCE = 10.0  # mm: a marker that ends farther from its goal has not arrived
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="share of the highest speed (default: %(default)g)",
     )
+    text = f"largest remaining error of an arrival (default: {TOLERANCE:g})"
+    parser.add_argument("--tolerance", type=positive_number, default=TOLERANCE, metavar="MM", help=text)
     parser.add_argument("--gains", default="default", metavar="NAME", help="gains of the control law, offline: default or published_2014")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the encoders' noise, offline (default: 0)")
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the motion as a filmstrip")
@@ -76,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arguments: argparse.Namespace) -> int:
     """Print the result, draw the motion if requested, and return the exit code."""
-    found = result_of(trm, path, played) | held_off(trm, path, played, gains)
+    found = result_of(trm, path, played, arguments.tolerance) | held_off(trm, path, played, gains)
     if arguments.picture is not None:
         found["picture"] = str(_filmstrip(trm, played, arguments.picture))
     print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(trm, found)))
@@ -89,13 +94,16 @@ def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
         raise UserError(f"the path has contacts: {path['why']} --anyway moves along the shortest path nevertheless", FAILED)
 
 
-def result_of(trm: Roadmap, path: dict[str, Any], played: Played) -> dict[str, Any]:
-    """Return the result of a motion as plain JSON values."""
+def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: float) -> dict[str, Any]:
+    """Return the result of a motion as plain JSON values; `tolerance`: mm."""
     pose = trm.model.evaluate(np.array([played.q[-1], path["poses"][-1]]))
     markers = {name: float(np.linalg.norm(np.diff(pose.position(name), axis=0))) for name in trm.model.robot.markers}
+    error = markers[marker_of(trm)]
     return {
         "place": path["place"],
-        "arrived": played.rested and played.missing <= MAX_ERROR,
+        "arrived": played.rested and 1e3 * error <= tolerance,
+        "remaining_error": error,
+        "tolerance": tolerance / 1e3,
         "seconds": float(played.times[-1]),
         "rested": played.rested,
         "lag": played.lag,
@@ -124,8 +132,10 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     verdict = "Arrived" if found["arrived"] else "Did not arrive"
     moving = "" if found["rested"] else ", still moving"
     held = f", held off by {found['held_by']}" if found["held_by"] and found["missing"] > MIN_ERROR else ""
-    away = f"{marker} {1e3 * found['markers'][marker]:.0f} mm from it, {found['farthest']} {found['missing']:.3f} rad from its goal{held}"
+    error, tolerance = 1e3 * found["remaining_error"], 1e3 * found["tolerance"]
+    away = f"the remaining error of {marker} is {error:.1f} mm (tolerance {tolerance:g} mm)"
     lines = wrapped(f"{verdict} at {trm.format_coordinates(np.array(found['place']))} after {found['seconds']:.1f} s{moving}: {away}.")
+    lines += wrapped(f"The motor farthest from its goal is {found['farthest']}, by {found['missing']:.3f} rad{held}.")
     off, lag = found["off"], found["lag"]
     lines += wrapped(f"Largest distance of a motor from the path: {off:.3f} rad; from its planned position at the time: {lag:.3f} rad.")
     if found["solid"] > 0.0:

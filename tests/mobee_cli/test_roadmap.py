@@ -144,6 +144,14 @@ def test_play_arrives_offline(say: Say, free: Path, tmp_path: Path, monkeypatch:
     assert f"Filmstrip: {tmp_path}" in _flat(out) and drawn[0].motion.moved() == ("right_arm",)
     found = json.loads(say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--json")[1])
     assert found["arrived"] and found["missing"] < 0.05 and found["solid"] == 0.0
+    error = 1e3 * found["remaining_error"]
+    assert f"the remaining error of right_palm is {error:.1f} mm (tolerance 10 mm)" in _flat(out)
+
+
+def test_a_remaining_error_beyond_the_tolerance_is_no_arrival(say: Say, free: Path) -> None:
+    code, out, _ = say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--tolerance", 0.1)
+    assert code == 1
+    assert out.startswith("Did not arrive at yaw 0.4, elbow 0.2 after ") and "(tolerance 0.1 mm)" in _flat(out)
 
 
 @pytest.mark.parametrize(
