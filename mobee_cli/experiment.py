@@ -9,6 +9,7 @@ import shutil
 import textwrap
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ from experiments.kit.run_folder import (
     write,
 )
 from experiments.kit.sweep import CellsFailed
+from experiments.kit.track import FOLDER as TRACK
+from experiments.kit.track import add_track, require_tracker, track_stores, tracked
 from experiments.registry import EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue, MobeeError, NotInstalled
 from mobee_cli.errors import UserError
@@ -37,7 +40,7 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPT
 
 RUNS = Path("runs")
 _NEWEST = Path()  # --resume without the name of a run
-_NOT_OPTIONS = ("json", "runs", "resume")  # of the experiment: they may differ when it is resumed
+_NOT_OPTIONS = ("json", "runs", "resume", "track")  # of the experiment: they may differ when it is resumed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -109,7 +112,9 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of the run's folder (default: runs)")
     parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="resume a run, or the newest one")
     parser.add_argument("--json", action="store_true", help="print the results as JSON")
+    add_track(parser)
     options = parser.parse_args(given)
+    require_tracker(options.track)
     if options.resume is None:
         return options
     run = newest_run(options.runs, experiment.name) if options.resume == _NEWEST else options.resume
@@ -149,6 +154,8 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
         print(json.dumps({"run": str(folder), **results}, indent=2))
     else:
         print(f"run: {folder}")
+        if options.track:
+            print(f"curves: tensorboard --logdir {folder / TRACK}")
         claims = [(experiment.name, Claim(**claim)) for claim in results.pop("claims", [])]
         print(results_text(results, shutil.get_terminal_size().columns))  # 80 in a pipe
         if claims:
@@ -158,7 +165,11 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 
 def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     try:
-        return open_with_few_seeds(experiment.method.run(options, folder), vars(options))
+        with tracked(folder / TRACK) if options.track else nullcontext():
+            results = experiment.method.run(options, folder)
+        if options.track:
+            track_stores(folder)
+        return open_with_few_seeds(results, vars(options))
     except MobeeError:
         if options.resume is None:
             discard_unused(folder)

@@ -5,22 +5,25 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 from experiments.kit.command_line import positive_whole
-from mobee.errors import MobeeError
+from experiments.kit.track import add_track, require_tracker, tracked
+from mobee.errors import MobeeError, NotInstalled
 from mobee.robot.load import load_robot
 from mobee_cli.errors import UserError
 from mobee_cli.playing.files import Files, write_files
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import add_setup_options, setup_of
 from mobee_cli.robot_options import DEFAULT, add_robot, add_world
-from services.common.exit_codes import BAD_INPUT
+from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 
 _NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the
 robot (docs/play.md). Every transition is on disk before the next action: the
 same command continues the file, also after Ctrl-C. Beside FILE.sqlite are
-written the robot, FILE.xml, and a scenario that goes on live, FILE.toml."""
+written the robot, FILE.xml, and a scenario that goes on live, FILE.toml; with
+--track the curves of all agents, into the folder FILE-tensorboard."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,26 +34,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--transitions", type=positive_whole, required=True, metavar="N", help="number of transitions in all, of all parts")
     parser.add_argument("--store", type=Path, required=True, metavar="FILE", help="file of the transitions, FILE.sqlite")
     add_setup_options(parser)
+    add_track(parser)
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Derive, learn, and print what was learned."""
+    curves = arguments.store.with_name(f"{arguments.store.stem}-tensorboard")
     if arguments.store.suffix != ".sqlite":
         raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)
     files = Files(arguments.store)
     lines: list[str] = []
     say = lines.append if arguments.json else print
     try:
+        require_tracker(arguments.track)
         setup = setup_of(arguments, arguments.robot or DEFAULT)
         write_files(setup, files)
         for line in setup.lines:
             say(line)
         robot = load_robot(setup.shipped or files.robot)
-        with opened(setup, robot, files.store) as learning:
+        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot, files.store) as learning:
             learn(learning, None, arguments.transitions, say)
             numbers, summary = learning.numbers(), learning.summary()
             say(learning.report())
+    except NotInstalled as error:
+        raise UserError(str(error), ENVIRONMENT) from None
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     if arguments.json:
@@ -58,4 +66,6 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     print(summary)
     print(f"Kept in {files.store}. Plan with it: mobee plan --run {files.store}; go on live: mobee launch {files.scenario}")
+    if arguments.track:
+        print(f"Curves: tensorboard --logdir {curves}")
     return 0

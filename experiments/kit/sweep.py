@@ -18,6 +18,8 @@ from experiments.kit.cells import CELL_FILES, Cell, CellResult, Work, cell_path,
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.engines import Done, in_processes, on_ray
 from experiments.kit.plots import saved
+from experiments.kit.track import FOLDER as TRACK
+from experiments.kit.track import track_values, tracked
 from mobee.errors import InvalidValue, MobeeError
 
 Engine = Callable[[Work, Sequence[Cell], int | None], Iterator[Done]]
@@ -101,7 +103,8 @@ class Sweep:
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the cells that are not in the folder yet; returns the findings."""
         self.require()
-        run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
+        tracker = folder / TRACK if getattr(arguments, "track", None) else None
+        run_cells(partial(_run_trial, self.trial, tracker), self.cells(arguments), folder, arguments)
         return self.results(folder)
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -116,8 +119,14 @@ class Sweep:
         return saved(self.plot(found), folder)
 
 
-def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
-    return trial(cell.settings, cell.seed)
+def _run_trial(trial: Trial, tracker: Path | None, cell: Cell) -> dict[str, Any]:
+    """Run a trial; with a folder as tracker, what is learned in it is written there."""
+    if tracker is None:
+        return trial(cell.settings, cell.seed)
+    with tracked(tracker / cell.name):
+        values = trial(cell.settings, cell.seed)
+    track_values(values, tracker / cell.name)
+    return values
 
 
 def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[dict[str, Any]]]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -50,6 +51,10 @@ class CuriousSettings(Settings):
     beliefs: Literal["counts", "debiased"] = "counts"
     goal: Goal | None = None
     goal_weight: float | None = None
+
+
+WATCHERS: list[Callable[[CuriousLearner, Transition], None]] = []
+"""Functions that are called after each transition of every learner of this process, also when it is read from a store."""
 
 
 class _Made(NamedTuple):
@@ -179,6 +184,8 @@ class CuriousLearner:
         """Update the learner for a transition that the model has already observed."""
         self.transitions, self.last = transition.n, transition
         self._plans.keep()
+        for watch in WATCHERS:
+            watch(self, transition)
 
     def _replay(self, transitions: list[Transition]) -> None:
         """Learn from recorded transitions; each decision is repeated, so that the next plan starts from the same values as before."""

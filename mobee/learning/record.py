@@ -46,6 +46,11 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     return space
 
 
+def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:
+    """Return a model without observations, with the settings of a `CuriousLearner`."""
+    return TransitionModel(space, **{key: settings[key] for key in ("initial", "divergence", "forgetting") if key in settings})
+
+
 @dataclass(frozen=True, slots=True)
 class Learned:
     """The space and model of an agent, rebuilt from its transitions."""
@@ -87,8 +92,7 @@ def load_learned(file: str | Path, part: str | None = None, robot: Robot | None 
     if "space" not in settings:
         raise MobeeError(f"{file}: {name} has no space on record: the file was not written by a curious agent.")
     space = space_from(settings["space"], robot if robot is not None else load_robot(settings["space"]["robot"]))
-    known = {key: settings[key] for key in ("initial", "divergence", "forgetting") if key in settings}
-    model = TransitionModel(space, **known)
+    model = model_from(space, settings)
     for transition in made:
         model.observe(transition.s, transition.a, transition.s_next)
     return Learned(name, space, model, len(made), made[-1].s_next)

@@ -13,6 +13,7 @@ from bus_schema.messages import Decision, Learned, Surprise
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import CuriousAgent, ReachTarget, TransitionModel
 from mobee.arrays import Array
+from mobee.learning.beliefs import probability_of
 from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.tries import Step
@@ -49,11 +50,6 @@ def publish_transition(
         duration=made.duration,
         touched=list(made.touched),
     )
-
-
-def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
-    """Return the believed probability of an outcome; 0 for one that was never observed."""
-    return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
 
 
 def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: int, action: int) -> None:

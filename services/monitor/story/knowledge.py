@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 from bus_schema.messages import Learned
 from mobee.arrays import Array, Ints
+from mobee.learning.beliefs import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
-
-PREDICTABLE_TRIES = 2
-PREDICTABLE_SHARE = 0.8
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from bus_schema.messages import Decision, Reach, Transition
 from mobee.arrays import Array
+from mobee.learning.beliefs import LEAST_PROBABILITY, surprise_of
 from mobee.learning.space import Space
 from services.monitor.story.words import action_words, displacement, listed, ordinal, percent
 
-LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
 UNSURE = 0.05  # an outcome that is likelier than the goal by less is not expected
 STRATEGIES = {
     "curious": "by curiosity: it goes where it expects to learn most",
@@ -22,11 +21,6 @@ STRATEGIES = {
     "posterior_sampling": "by curiosity under a drawn model",
     "depleting": "by curiosity that plans for what will be left",
 }
-
-
-def surprise_of(probability: float) -> float:
-    """Return −ln p of an outcome, nats."""
-    return -math.log(max(probability, LEAST_PROBABILITY))
 
 
 def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from bus_schema.messages import Decision, Learned, Reach, Transition
 from mobee.arrays import Array
+from mobee.learning.beliefs import surprise_of
 from mobee.learning.space import Space
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot
@@ -21,7 +22,6 @@ from services.monitor.story.sentences import (
     expects_sentence,
     outcome_sentence,
     reach_sentence,
-    surprise_of,
     surprise_sentence,
     tries_sentence,
     wants_sentence,

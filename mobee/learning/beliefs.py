@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a learner believes of the outcomes of its actions, and how far it can predict them."""
+
+from __future__ import annotations
+
+import math
+
+from mobee.learning.value_iteration import OutcomeModel
+
+LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
+PREDICTABLE_TRIES = 2
+PREDICTABLE_SHARE = 0.8
+"""A state-action is predictable when it was tried at least PREDICTABLE_TRIES times and this share of its tries ended alike."""
+
+
+def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
+    """Return the believed probability of an outcome; 0 for one that was never observed."""
+    return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
+
+
+def surprise_of(probability: float) -> float:
+    """Return the surprise −ln p of an outcome, nats."""
+    return -math.log(max(probability, LEAST_PROBABILITY))
