@@ -144,6 +144,8 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
                 keep_options(folder, experiment.name, own)
             results = _results(experiment, options, folder)
             write(folder / RESULTS, results)
+            if options.track:
+                track_stores(folder)
     except OSError as error:
         raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
     except CellsFailed as error:
@@ -166,10 +168,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     try:
         with tracked(folder / TRACK) if options.track else nullcontext():
-            results = experiment.method.run(options, folder)
-        if options.track:
-            track_stores(folder)
-        return open_with_few_seeds(results, vars(options))
+            return open_with_few_seeds(experiment.method.run(options, folder), vars(options))
     except MobeeError:
         if options.resume is None:
             discard_unused(folder)
