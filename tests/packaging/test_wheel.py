@@ -23,6 +23,7 @@ EXTRAS = {"live", "sim", "viz", "reference", "planning", "parquet", "cluster", "
     "gym",
     "menagerie",
     "mjcf",
+    "track",
 }
 
 
