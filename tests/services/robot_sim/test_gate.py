@@ -102,6 +102,7 @@ def test_a_command_at_a_bound_is_admitted(changes: dict[str, object]) -> None:
         ("position", LIMITS.lower.min() - 0.125, f"{LIMITS.lower.max() - LIMITS.lower.min() + 0.125:.3f} rad beyond a limit"),
         ("velocity", [0.0, math.nan, 0.0], "NaN or infinity"),
         ("velocity", [0.0, VELOCITY + 0.5, 0.0], "0.500 rad/s beyond the limit"),
+        ("torque", [0.0, -LIMITS.torque[1] - 0.5, 0.0], "0.500 N m beyond the limit"),
     ],
 )
 def test_a_refusal_says_by_how_much_a_reference_is_beyond_its_limit(mode: str, ref: object, text: str) -> None:
@@ -149,6 +150,61 @@ def test_after_a_velocity_a_position_is_compared_with_the_measured_one() -> None
         gated.tick()
     assert refusal(gated, "position", 0.02) == "step"
     gated.command("position", gated.q + 0.9 * MAX_START)
+
+
+def test_after_a_hold_a_velocity_begins_from_rest() -> None:
+    gated = Gated().owned()
+    for _ in range(30):
+        gated.command(ref=0.5 * VELOCITY)
+        gated.tick()
+    gated.gate.hold(gated.gate.epoch)
+    for _ in range(30):
+        gated.tick()
+    gated.gate.arm(gated.gate.epoch)
+    gated.command(ref=0.0)
+    gated.tick()
+    assert gated.drive.reference == pytest.approx(0.0, abs=1e-9)
+    gated.command(ref=VELOCITY)
+    assert gated.tick() == pytest.approx(ACCELERATION * gated.dt)
+
+
+def test_the_gate_says_what_the_motors_do() -> None:
+    gated = Gated()
+    gate = gated.gate
+    assert (gate.mode, gate.seq, gate.age, gate.faults, gate.owner) == ("hold", -1, -1, 0, None)
+    gated.owned().command(ref=0.05, seq=7)
+    gated.tick()
+    assert (gate.mode, gate.seq, gate.age) == ("velocity", 7, 1)
+    gate.hold(gate.epoch)
+    gated.tick()
+    assert (gate.state, gate.mode, gate.seq, gate.age) == ("hold", "hold", -1, -1)
+    assert gated.told == [("hold", f"{PART}: requested by its owner")]
+
+
+def test_each_owner_has_the_next_epoch_and_a_released_part_none() -> None:
+    gated = Gated().owned()
+    epoch = gated.gate.epoch
+    assert gated.gate.take("other", "o1") == epoch + 1
+    gated.gate.release(epoch + 1)
+    assert gated.gate.owner is None
+    with pytest.raises(Refused, match="no client does"):
+        gated.gate.arm(epoch + 1)
+
+
+@pytest.mark.parametrize(("late", "state"), [(0, "armed"), (1, "hold")])
+def test_a_command_is_in_force_until_its_ttl_and_not_a_nanosecond_longer(late: int, state: str) -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05, ttl=100)
+    gated.gate.tick(1, 100_000_000 + late, gated.q, gated.velocity)
+    assert gated.gate.state == state
+
+
+def test_references_exactly_at_the_bounds_are_admitted() -> None:
+    admission, q = Admission(PART, LIMITS, 0.01, None), np.zeros(N)
+    admission.check_step(q + MAX_START * LIMITS.fine, None, 1, q)
+    margin = POSITION_MARGIN * LIMITS.fine
+    for reference in (LIMITS.upper + margin, LIMITS.lower - margin):
+        admission.check(Order("controller", 1, 1, 1, "position", reference, 100), 1)
 
 
 def test_a_moving_part_goes_on_smoothly_in_position_mode() -> None:
@@ -259,6 +315,7 @@ def test_the_loss_of_the_owner_holds_and_its_epoch_is_worth_nothing() -> None:
     gated.gate.lose_owner()
     gated.tick()
     assert gated.drive.mode == "hold"
+    assert gated.told == [("hold", f"{PART}: its owner controller is gone")]
     with pytest.raises(Refused, match="no client does"):
         gated.gate.arm(gated.gate.epoch)
 
