@@ -77,6 +77,14 @@ BENCHES = {
         "import, first pose, and start of the whole system: time and memory",
         quick="5 processes of each, one start of the system (default: 15 and 3)",
     ),
+    "play": Bench(
+        "`mobee play` in a home without files: from the command to the first curious action that a browser shows",
+        quick="one start of each robot (default: 3)",
+        options={
+            "--robots": {"nargs": "+", "metavar": "ROBOT", "help": "names or files of robots (default: icub)"},
+            "--python": {"metavar": "PYTHON", "help": "interpreter whose MoBeE is measured (default: this one)"},
+        },
+    ),
     "live": Bench(
         "the live system in real time: jitter of the controller's period and age of the command in force, at several rates",
         options={

@@ -16,18 +16,17 @@ Ctrl-C ends all processes, a second Ctrl-C kills them. The summary goes to
 standard output, everything else to standard error."""
 
 
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add the option --set."""
+    text = "change a setting, such as services.model.contact_forces=false"
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="FIELD=VALUE", help=text)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the scenario and the options."""
     parser.epilog = _NOTES.format(scenarios=", ".join(shipped()))
     parser.add_argument("scenario", nargs="?", default="default", help="shipped scenario, or path of a .toml file (default: default)")
-    parser.add_argument(
-        "--set",
-        dest="settings",
-        action="append",
-        default=[],
-        metavar="FIELD=VALUE",
-        help="change a setting, such as services.model.contact_forces=false",
-    )
+    add_settings(parser)
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--headless", action="store_true", help="start without the page")
     shown.add_argument("--page", action="store_true", help="start with the page, also if the scenario has none, as kinematic and lockstep")

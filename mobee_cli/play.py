@@ -14,6 +14,7 @@ from experiments.kit.command_line import positive_number, positive_whole
 from mobee.errors import MobeeError
 from mobee.robot.load import load_robot
 from mobee_cli.errors import UserError
+from mobee_cli.launch import add_settings
 from mobee_cli.playing.files import Files, free_folder, write_files, write_readme
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--save", type=Path, metavar="DIR", help="write the robot, the scenario and a README to edit into DIR")
     parser.add_argument("--learned", type=Path, metavar="FILE.sqlite", help="go live with what `mobee learn` has learned")
     parser.add_argument("--offline-only", action="store_true", help="end after learning offline")
+    add_settings(parser)
     parser.add_argument("--headless", action="store_true", help="without the live page")
     parser.add_argument("--duration", type=positive_number, metavar="S", help="end S seconds after all services are ready")
     parser.add_argument("--endpoint", metavar="ADDRESS", help="address of the router (default: tcp/127.0.0.1:7447)")
@@ -99,6 +101,7 @@ def _live(arguments: argparse.Namespace, files: Files) -> int:
     return launch(
         Options(
             scenario=str(files.scenario),
+            settings=tuple(arguments.settings),
             headless=arguments.headless,
             duration=arguments.duration,
             json=arguments.json,

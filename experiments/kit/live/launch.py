@@ -94,11 +94,16 @@ def stop(process: subprocess.Popen[Any]) -> int:
     return int(process.returncode)
 
 
-def free_endpoint() -> str:
-    """Return the address of a free TCP port on the loopback interface."""
+def free_port() -> int:
+    """Return a TCP port of the loopback interface that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return int(probe.getsockname()[1])
+
+
+def free_endpoint() -> str:
+    """Return the address of a free TCP port on the loopback interface."""
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 T = TypeVar("T", bound=Struct)

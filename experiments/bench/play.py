@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, in a home without files.
+
+Claim: a robot is curious on the page at most 20 s after the command, 5 s of which are learning offline.
+Each start is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its
+address is printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time
+besides the learning is judged in time of the standard machine, by the calibration loop in two processes at once.  At the end the system is
+stopped as by Ctrl-C.  Run time: 25 s per robot.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from experiments.bench.calibration import Calibration, Crew
+from experiments.bench.peers import import_peer
+from experiments.bench.verdicts import Requirement, report_text, verdict
+from experiments.kit.command_line import Progress
+from experiments.kit.live.launch import LaunchFailed, free_endpoint, free_port, stop
+from experiments.live_picture import find_chromium
+from mobee.errors import NotInstalled
+
+LEARNING = 5.0  # s of real time, fixed
+TIMEOUT = 180.0  # s for one start
+REQUIREMENTS = (
+    Requirement("slowest robot on the page, s", ("slowest_standard_s",), at_most=20.0),
+    Requirement("ends after Ctrl-C that leave a process or a trace of an error", ("unclean_ends",), at_most=0.0),
+)
+WITHOUT_DRAWING = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
+TRIES = "Boolean(document.querySelector('.card .now'))"
+STEPS = {  # by what the command prints
+    "derived": r"learns|torso, left_arm and right_arm learn",
+    "learned offline": r"Goes on live",
+    "page served": r"monitor is ready after .*: http://",
+    "all services ready": r"all ready after",
+}
+SHOWN = "first action on the page"
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings: the robots, as for `mobee play`; the interpreter whose MoBeE is measured, by default this one; starts of each robot."""
+
+    robots: Sequence[str] = field(default=("icub",))
+    python: str = sys.executable
+    rounds: int = 3
+
+
+QUICK = Settings(rounds=1)
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """Measure, and return all numbers and the verdict; raises NotInstalled and LaunchFailed."""
+    chromium = find_chromium()
+    if chromium is None:
+        raise NotInstalled("Chromium is not installed: apt-get install chromium")
+    playwright = import_peer("playwright.sync_api", "Playwright", "dev")
+    starts: list[dict[str, Any]] = []
+    todo = [robot for _ in range(settings.rounds) for robot in settings.robots]
+    with Progress() as progress, Crew(2) as crew, playwright.sync_playwright() as playing:
+        browser = playing.chromium.launch(executable_path=chromium, args=list(WITHOUT_DRAWING))
+        speeds = Calibration(crew.loops)
+        for number, robot in enumerate(todo):
+            progress.show(number / len(todo), robot)
+            start, speed = speeds.around(lambda robot=robot: _start(robot, settings.python, browser))  # type: ignore[misc]
+            learning = start["steps"]["learned offline"] - start["steps"]["derived"]
+            standard = LEARNING + (start["steps"][SHOWN] - min(learning, LEARNING)) * speed
+            starts.append(start | {"robot": robot, "speed": speed, "standard_s": standard, "load": os.getloadavg()[0]})
+        browser.close()
+    result: dict[str, Any] = {"python": _version(settings.python), "starts": starts, "speed": speeds.median}
+    result["slowest_standard_s"] = max(_median(starts, robot)["standard_s"] for robot in settings.robots)
+    result["unclean_ends"] = sum(not start["clean"] for start in starts)
+    return result | verdict(result, REQUIREMENTS)
+
+
+def _start(robot: str, python: str, browser: Any) -> dict[str, Any]:
+    """Start once, wait for the first action on the page, and end; returns the time of each step [s]."""
+    given = str(Path(robot).resolve()) if Path(robot).exists() else robot
+    with tempfile.TemporaryDirectory() as home:
+        port = free_port()
+        command = [python, "-m", "mobee_system", "play", given, "--endpoint", free_endpoint(), "--set", f"services.monitor.web_port={port}"]
+        said = Path(home) / "said.txt"
+        with said.open("wb") as output:
+            begin = time.monotonic()
+            process = subprocess.Popen(command, cwd=home, env=_environment(home, python), stdout=output, stderr=output, process_group=0)
+        try:
+            steps = dict(_steps(process, said, browser, begin))
+        except TimeoutError as error:
+            raise LaunchFailed(f"mobee play {robot}: {error}; it said: {said.read_text()[-500:]}") from None
+        finally:
+            ending = time.monotonic()
+            code = stop(process)
+        clean = code == 0 and "Traceback" not in said.read_text() and not _left(process.pid)
+        return {"steps": steps, "ending_s": time.monotonic() - ending, "clean": clean}
+
+
+def _environment(home: str, python: str) -> dict[str, str]:
+    """Return an environment with an empty home; a checkout of this program stays importable for this interpreter."""
+    kept = {name: os.environ[name] for name in ("PATH", "LANG", "LC_ALL", "TERM") if name in os.environ}
+    if python == sys.executable and "PYTHONPATH" in os.environ:
+        kept["PYTHONPATH"] = os.environ["PYTHONPATH"]
+    return kept | {"HOME": home}
+
+
+def _steps(process: subprocess.Popen[bytes], said: Path, browser: Any, begin: float) -> Iterator[tuple[str, float]]:
+    """Yield each step with its time [s] as it happens; raises TimeoutError."""
+    text, page, left = "", None, dict(STEPS)
+    while True:
+        if process.poll() is not None or time.monotonic() - begin > TIMEOUT:
+            raise TimeoutError("it ended" if process.poll() is not None else f"no action after {TIMEOUT:g} s")
+        text = said.read_text()
+        for name in [name for name, pattern in left.items() if re.search(pattern, text)]:
+            del left[name]
+            yield name, time.monotonic() - begin
+        if page is None and "page served" not in left:
+            page = browser.new_page()
+            page.route("**/viewer.html*", lambda route: route.abort())
+            page.goto(re.findall(r"http://\S+", text)[0])
+        if page is not None and "all services ready" not in left and page.evaluate(TRIES):
+            yield SHOWN, time.monotonic() - begin
+            page.close()
+            return
+        time.sleep(0.02)
+
+
+def _left(group: int) -> list[int]:
+    """Return the processes that the command has started and not ended, on Linux."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            if int(stat.read_text().rpartition(")")[2].split()[2]) == group:
+                found.append(int(stat.parent.name))
+    return found
+
+
+def _version(python: str) -> str:
+    return subprocess.run([python, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def _median(starts: Sequence[dict[str, Any]], robot: str) -> dict[str, Any]:
+    """Return the start of a robot with the median time."""
+    own = sorted((start for start in starts if start["robot"] == robot), key=lambda start: start["standard_s"])
+    return own[len(own) // 2]
+
+
+def report(result: dict[str, Any]) -> str:
+    """Format the measurements."""
+    robots = list(dict.fromkeys(start["robot"] for start in result["starts"]))
+    lines = [f"{result['python']}; seconds after the command, of the start with the median time:"]
+    for robot in robots:
+        start = _median(result["starts"], robot)
+        lines.append(f"{Path(robot).name}, load {start['load']:.1f}:")
+        lines += [f"  {name:<28}{seconds:>7.1f}" for name, seconds in start["steps"].items()]
+        lines.append(f"  {'the same in standard time':<28}{start['standard_s']:>7.1f}")
+        lines.append(f"  ended {start['ending_s']:.1f} s after Ctrl-C")
+    return report_text(lines, result, result["speed"])
