@@ -32,6 +32,7 @@ class Listener:
         bus.control = "STEP" if locked else "LATEST"
         self._kept: list[Any] = []  # handles of tokens and subscriptions, which end with them
         self._on_run: list[Callable[[], None]] = []
+        self._early: list[Callable[[], None]] = []  # handlers of past messages that came before the first clock message
 
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
         """Handle the newest message of a stream; older ones that wait are overwritten.
@@ -58,16 +59,22 @@ class Listener:
             cls: the message.
             handler: called in the main thread.
             name: the variable in the message's key, such as the part; by default any.
-            history: also messages from before this service joined.
+            history: also messages from before this service joined; they are handled when the run is known.
             any_run: also messages of another run of robot_sim.
             crowd: number of waiting handlers at which messages of this stream are dropped.
             later: do not wake the main thread; they are handled just before the next message of another stream.
         """
         key, part = cls.stream.keys(name), part_of(cls, name)
 
+        def deliver(sample: zenoh.Sample) -> None:
+            if history and not any_run and self.bus.run == NO_RUN:
+                self._early.append(lambda: self._deliver(cls, sample, handler, part))
+            else:
+                self._deliver(cls, sample, handler, part, any_run)
+
         def enqueue(sample: zenoh.Sample) -> None:
             offer = self.inbox.offer_later if later else self.inbox.offer
-            offer(lambda: self._deliver(cls, sample, handler, part, any_run), crowd)
+            offer(lambda: deliver(sample), crowd)
 
         if history:
             settings = zenoh.ext.HistoryConfig(detect_late_publishers=True)
@@ -123,6 +130,9 @@ class Listener:
                     self.bus.event("warning", "new_run", f"robot_sim started run {time.run} after {known}")
                 for announce in self._on_run:
                     announce()
+                early, self._early = self._early, []
+                for handle_early in early:
+                    handle_early()
             self.bus.guarded(cls.__name__, lambda: handler(time))
 
         self._subscribe(cls.stream.keys(name), self._newest(handle))

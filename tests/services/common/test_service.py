@@ -17,11 +17,13 @@ import pytest
 import zenoh
 
 from bus_schema import VERSION, decode, encode, encoding_of, keys
-from bus_schema.messages import Clock, Event, Forces, Geometry, WorldObject
+from bus_schema.messages import Clock, Decision, Event, Forces, Geometry, WorldObject
 from bus_schema.rpc import Config, Done, Empty, Failure, Stat, Take, Taken
 from services.common import rpc
-from services.common.bus import Bus
+from services.common.bus import NO_RUN, Bus
+from services.common.config import ServiceConfig
 from services.common.rpc import CallFailed
+from services.common.service import Service
 from tests.services.harness import QUICK_END, Program, Rig, free_endpoint, rig, wait_for
 
 PROBE = ("-m", "tests.services.common.probe")
@@ -221,6 +223,22 @@ def test_a_new_run_is_announced_once_and_its_messages_are_heard(bus: Rig, clock:
     ball(bus.bus.publisher(WorldObject, "ball"))
     wait_for(lambda: numbers(bus)["objects"] == before["objects"] + 1, "the object of the new run")
     assert "r1" in wait_for(lambda: [e.text for e in events if e.code == "new_run"], "the event")[0]
+
+
+def test_past_messages_that_come_before_the_first_tick_are_heard_after_it(bus: Rig) -> None:
+    decision = bus.bus.publisher(Decision, "left_arm")
+    fields = {"agent": "left_arm", "n": 3, "s": 1, "a": 2, "goal": 4, "tries": 0, "reached": 0.5, "expected": 4, "probability": 0.5}
+    decision.put(**fields, reward=0.1, explorer="curious", plan=[4])
+    seen: list[Decision] = []
+    with Service("late", ServiceConfig(endpoint=bus.endpoint), bus.robot) as service:
+        service.on_each(Decision, seen.append, history=True)
+        heard: list[int] = []
+        service.on_clock(lambda clock: heard.append(clock.k))
+        service.spin(time.monotonic() + 0.5)
+        assert not seen and not heard and service.bus.run == NO_RUN
+        bus.bus.publisher(Clock).put(dt=10_000_000, mode="free", rate=1.0)
+        service.spin(time.monotonic() + 10.0, lambda: bool(seen))
+    assert [one.n for one in seen] == [3] and heard
 
 
 def test_a_refusal_is_reported_on_the_bus_at_most_once_per_second(bus: Rig, clock: Any) -> None:
