@@ -28,7 +28,7 @@ from scipy.special import stdtrit
 from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
-from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, draw_distances, learn_live, learn_offline
+from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, contacts, draw_distances, learn_live, learn_offline
 from experiments.kit.plots import saved
 from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
@@ -43,12 +43,14 @@ TRANSITIONS, MIN_TRIES = 800, 2  # per part; of a state-action that is compared
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, --transitions, --least and --table."""
+    """Add the options of a sweep, --transitions, --least, --table and --only-table."""
     sweep_arguments(parser, seeds=5)
     parser.add_argument("--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"per part (default: {TRANSITIONS})")
     text = f"tries from which a state-action is compared (default: {MIN_TRIES})"
     parser.add_argument("--least", type=positive_whole, default=MIN_TRIES, metavar="N", help=text)
-    parser.add_argument("--table", action="store_true", help="also torso and arms at the table")
+    tables = parser.add_mutually_exclusive_group()
+    tables.add_argument("--table", action="store_true", help="also torso and arms at the table")
+    tables.add_argument("--only-table", action="store_true", help="torso and arms at the table alone")
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
@@ -77,7 +79,7 @@ def results(folder: Path) -> dict[str, Any]:
     """Compute the distances and the claim from the transitions in the folder."""
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
-    return {"claims": judged((equal,), tasks), "distances": table}
+    return {"claims": judged((equal,), tasks), "distances": table} | _at_the_table(arguments, folder)
 
 
 def figure(folder: Path) -> Path:
@@ -92,6 +94,24 @@ def _least(folder: Path) -> int:
 def _compared(folder: Path) -> dict[str, Compared]:
     names = sorted({str(result.cell.settings["task"]) for result in load_cells(folder).values()})
     return {task: compared(folder, task, _least(folder)) for task in names}
+
+
+def _at_the_table(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """Return how the actions of each part at the table ended, on each robot; nothing without --table."""
+    if "table" not in _tasks(arguments):
+        return {}
+    return {
+        "at the table": {
+            f"{robot}, {part}": {
+                "actions": one.actions,
+                "missed their goals": one.missed,
+                "ended in contact with table or ball": one.touching,
+                "both": one.both,
+            }
+            for robot, parts in contacts(folder, "table").items()
+            for part, one in parts.items()
+        }
+    }
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
@@ -149,7 +169,7 @@ def prediction_bound(values: Sequence[float]) -> float:
 
 
 def _tasks(arguments: argparse.Namespace) -> list[str]:
-    return ["arms", "table"] if arguments.table else ["arms"]
+    return ["table"] if arguments.only_table else ["arms", "table"] if arguments.table else ["arms"]
 
 
 def _transitions(arguments: argparse.Namespace) -> int:

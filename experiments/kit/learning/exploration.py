@@ -65,6 +65,7 @@ class Log:
     settled: list[bool] = field(default_factory=list)
     durations: list[float] = field(default_factory=list)  # s
     ends: list[float] = field(default_factory=list)  # s of plant time
+    touched: list[tuple[str, ...]] = field(default_factory=list)  # world objects in contact at the end
     poses: list[Array] = field(default_factory=list)
 
     def arrays(self, part: str, count: int) -> dict[str, Any]:
@@ -93,6 +94,7 @@ def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transi
             log.settled.append(outcome.settled)
             log.durations.append(outcome.duration)
             log.ends.append(plant.time)
+            log.touched.append(outcome.touched)
             log.poses.append(plant.q)
             waiting.append(agent)
     return logs

@@ -7,11 +7,12 @@ Finished transitions are on disk.  A distance is the total variation of the outc
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.kit.cells import Cell, load_cells
 from experiments.kit.learning.arm import LEFT, RIGHT, TORSO
@@ -105,7 +106,8 @@ def learn_offline(cell: Cell) -> dict[str, Any]:
     task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
     plant = offline_plant(task, cell.seed)
     logs = explore_together(agents(task, plant, cell.seed), plant, number)
-    return {f"seen_{part}": np.array(log.seen[:number], dtype=np.int32) for part, log in logs.items()}
+    seen = {f"seen_{part}": np.array(log.seen[:number], dtype=np.int32) for part, log in logs.items()}
+    return seen | {f"touched_{part}": np.array(list(map(bool, log.touched[:number]))) for part, log in logs.items()}
 
 
 def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path, report: Callable[[int], None], piece: int = PIECE) -> None:
@@ -242,6 +244,43 @@ def compared(folder: Path, task: str, least: int) -> Compared:
             counts[name] = {part: counts_of(rows[part][: results[0].cell.settings["transitions"]], spaces[part]) for part in parts}
     live = {name: mean([distance(counts[name], others, least) for others in without]) for name in counts if name in ROBOTS}
     return Compared(live, offline, counts)
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """How many actions of a part missed their goals, ended in contact with an object, and both, of how many."""
+
+    missed: int
+    touching: int
+    both: int
+    actions: int
+
+    @classmethod
+    def of(cls, space: Lattice, seen: Ints, touched: NDArray[np.bool_]) -> Contacts:
+        """Count in transitions (T, 3), with `touched` (T,): whether each ended in contact."""
+        missed = seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]
+        return cls(int(missed.sum()), int(touched.sum()), int((missed & touched).sum()), len(seen))
+
+    def __add__(self, other: Contacts) -> Contacts:
+        """Return the sums of both."""
+        return Contacts(*(mine + others for mine, others in zip(astuple(self), astuple(other), strict=True)))
+
+
+def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
+    """Return by robot and part, with "offline" for all offline seeds together, how actions of a task ended in the run of a folder."""
+    robot, found = load_robot(ROBOT), dict[str, dict[str, Contacts]]()
+    results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
+    for part in TASKS[task].parts:
+        own, every = space(robot, TASKS[task], part), Contacts(0, 0, 0, 0)
+        for result in results:
+            every += Contacts.of(own, result.values[f"seen_{part}"], result.values[f"touched_{part}"])
+        found.setdefault("offline", {})[part] = every
+        for name in (name for name in ROBOTS if (folder / task / name / STORE).exists()):
+            with TransitionStore(folder / task / name / STORE, part, read_only=True) as store:
+                made = store.load()
+            seen, touched = np.array([(one.s, one.a, one.s_next) for one in made]), np.array([bool(one.touched) for one in made])
+            found.setdefault(name, {})[part] = Contacts.of(own, seen, touched)
+    return found
 
 
 COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
