@@ -20,7 +20,7 @@ from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
 from mobee_cli.robot_options import add_urdf_options, add_world
 from services.common.exit_codes import BAD_INPUT
-from services.launcher.run import Options, launch
+from services.launcher.run import Options, launch, refused_now
 
 SECONDS = 5.0  # s of real time in which it learns offline
 _NOTES = """ROBOT: a shipped robot, a URDF, MJCF or zero-position XML file, or with the
@@ -64,6 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
             say(line)
         write_files(setup, files)
         write_readme(setup, files)
+        if not arguments.offline_only and (code := refused_now(_options(arguments, files))):  # before it learns for seconds
+            return code
         numbers = _offline(arguments, setup, files, say)
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
@@ -98,16 +100,18 @@ def _offline(arguments: argparse.Namespace, setup: Setup, files: Files, say: Any
 
 
 def _live(arguments: argparse.Namespace, files: Files) -> int:
-    return launch(
-        Options(
-            scenario=str(files.scenario),
-            settings=tuple(arguments.settings),
-            headless=arguments.headless,
-            duration=arguments.duration,
-            json=arguments.json,
-            endpoint=arguments.endpoint,
-            runs=arguments.runs,
-        )
+    return launch(_options(arguments, files))
+
+
+def _options(arguments: argparse.Namespace, files: Files) -> Options:
+    return Options(
+        scenario=str(files.scenario),
+        settings=tuple(arguments.settings),
+        headless=arguments.headless,
+        duration=arguments.duration,
+        json=arguments.json,
+        endpoint=arguments.endpoint,
+        runs=arguments.runs,
     )
 
 

@@ -70,13 +70,33 @@ def launch(options: Options) -> int:
         return _launch(options, open_meanwhile)
 
 
+def refused_now(options: Options) -> int:
+    """Print why the scenario cannot be started beside what runs now, and return the exit code; 0 if it can."""
+    try:
+        scenario = _read(options)
+        check_ports(scenario, _endpoint(options, scenario))
+    except ConfigError as error:
+        return _refuse(str(error), BAD_INPUT)
+    except (PortInUse, SystemRuns) as error:
+        return _refuse(str(error), ENVIRONMENT)
+    return OK
+
+
+def _read(options: Options) -> Scenario:
+    settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
+    return read_scenario(
+        options.scenario, settings, leave_out=["monitor"] if options.headless else [], with_also=["monitor"] if options.page else []
+    )
+
+
+def _endpoint(options: Options, scenario: Scenario) -> str:
+    return options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+
+
 def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     started, local = time.monotonic(), ""
     try:
-        settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
-        scenario = read_scenario(
-            options.scenario, settings, leave_out=["monitor"] if options.headless else [], with_also=["monitor"] if options.page else []
-        )
+        scenario = _read(options)
         library()  # if the core cannot be loaded: one error here instead of one from each service
         check_gains(scenario)
         check_lockstep(scenario)
@@ -84,7 +104,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         check_services(scenario, robots)
         check_rate(scenario, robots)
         check_extras(scenario)
-        endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+        endpoint = _endpoint(options, scenario)
         check_ports(scenario, endpoint)
         lease = LEASE
         if scenario.is_locked:

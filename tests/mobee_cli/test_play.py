@@ -2,10 +2,12 @@
 from __future__ import annotations
 
 import json
+import socket
 from pathlib import Path
 
 import pytest
 
+from experiments.kit.live.launch import free_endpoint
 from mobee_cli.__main__ import main
 from mobee_cli.playing.files import Files
 from mobee_cli.playing.setup import PUBLISHED
@@ -35,6 +37,18 @@ def test_what_it_saves_is_not_overwritten(tmp_path: Path, capsys: pytest.Capture
     capsys.readouterr()
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 2
     assert "tiny_arm.toml exists: run it with `mobee launch" in capsys.readouterr().err
+
+
+def test_a_port_in_use_is_said_before_it_learns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        command = ["play", "katana", "--runs", str(tmp_path), "--endpoint", free_endpoint(), "--set", f"services.monitor.web_port={port}"]
+        assert main(command) == 3
+    printed = capsys.readouterr()
+    assert f"port {port} of monitor is in use: choose another with --set services.monitor.web_port=" in printed.err
+    assert "actions tried" not in printed.out and not list(tmp_path.rglob("*.sqlite"))
 
 
 def test_a_file_that_mobee_learn_did_not_write_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
