@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from mobee.errors import MobeeError
+from mobee.errors import MobeeError, NoRoom
 
 SCHEMA = 1
 APPLICATION_ID = 0x4D6F4265  # "MoBe": marks the file as ours
@@ -20,6 +22,8 @@ CREATE TABLE transitions (
     agent TEXT NOT NULL, n INTEGER NOT NULL, s INTEGER NOT NULL, a INTEGER NOT NULL, s_next INTEGER NOT NULL, reward REAL NOT NULL,
     settled INTEGER NOT NULL, duration REAL NOT NULL, q TEXT NOT NULL, touched TEXT NOT NULL, t REAL NOT NULL, PRIMARY KEY (agent, n));
 """
+DAMAGED = "it is damaged; nothing was written to it. Restore it from a copy, or give another path"
+NO_ROOM = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQLITE_IOERR_TRUNCATE", "SQLITE_IOERR_SHM")
 REMEDIES = {
     "SQLITE_FULL": "the disk is full; make room and start again, all that was committed is safe",
     "SQLITE_IOERR": "the disk refused the write (full, over quota or failing); all that was committed is safe",
@@ -27,13 +31,13 @@ REMEDIES = {
     "SQLITE_READONLY": "it may not be written; check its permissions and those of its folder",
     "SQLITE_CANTOPEN": "it cannot be opened; check that its folder exists and may be written",
     "SQLITE_NOTADB": "it is not a database; give another path",
-    "SQLITE_CORRUPT": "it is damaged; restore it from a copy",
+    "SQLITE_CORRUPT": DAMAGED,
     "SQLITE_CONSTRAINT": "another process writes transitions of the same agent; run one process an agent",
 }
 
 
 def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connection:
-    """Open the file, and create its tables if it is new; a file of another program or schema is refused and not changed.
+    """Open the file, and create its tables if it is new; a damaged file, or one of another program or schema, is refused and not changed.
 
     `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too. `durable`: a commit
     waits for the disk, and survives a power cut; else it survives the end of the process only.
@@ -49,6 +53,7 @@ def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connect
                     raise MobeeError(f"{path} holds no transitions yet: it is empty.")
             else:
                 _prepare(path, database, durable)
+            _check(path, database)
         except BaseException:
             database.close()
             raise
@@ -72,10 +77,38 @@ def explained(path: Path) -> Iterator[None]:
     """Convert SQLite's errors into one line with the file and the remedy."""
     try:
         yield
+    except UnicodeDecodeError as error:
+        raise damaged(path, "a text in it is no UTF-8") from error
     except sqlite3.Error as error:
         name = getattr(error, "sqlite_errorname", "")
         remedy = next((text for key, text in REMEDIES.items() if name.startswith(key)), "")
-        raise MobeeError(f"{path}: {remedy or 'SQLite failed'} ({error}).") from error
+        kind = NoRoom if name.startswith(NO_ROOM) else MobeeError
+        raise kind(f"{path}: {remedy or 'SQLite failed'} ({' '.join(str(error).split())[:200]}).") from error
+
+
+def damaged(path: Path, what: str) -> MobeeError:
+    """Return the error for a file whose content was changed by something else."""
+    return MobeeError(f"{path}: {what}: {DAMAGED}.")
+
+
+def json_of(path: Path, what: str, text: object) -> Any:
+    """Return the value of a JSON text in the file; raises MobeeError, naming `what` it is, if it is none."""
+    try:
+        if isinstance(text, str):
+            return json.loads(text)
+    except (ValueError, RecursionError):
+        pass
+    raise damaged(path, f"{what} is not what MoBeE writes")
+
+
+def _check(path: Path, database: sqlite3.Connection) -> None:
+    """Raise MobeeError if pages or indices of the file are damaged, or a table of ours is none; it reads the whole file."""
+    (found,) = database.execute("PRAGMA integrity_check(1)").fetchone()
+    if found != "ok":
+        raise damaged(path, " ".join(str(found).split())[:200])
+    kinds = dict(database.execute("SELECT name, type FROM sqlite_master WHERE name IN ('meta', 'transitions')"))
+    if kinds != {"meta": "table", "transitions": "table"}:
+        raise damaged(path, "the tables meta and transitions are not both there")
 
 
 def _address(path: Path) -> str:
@@ -101,6 +134,8 @@ def _is_ours(path: Path, database: sqlite3.Connection) -> bool:
     application, version = (database.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
     tables = database.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     if not tables and not application and not version:
+        if path.stat().st_size:
+            raise MobeeError(f"{path}: a database without tables, which is damaged or of another program. Give another path.")
         return False
     if application != APPLICATION_ID:
         raise MobeeError(f"{path}: a database of another program. Give another path.")

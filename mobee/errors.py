@@ -44,6 +44,14 @@ class NotInstalled(MobeeError):
     """Raised if a package or the native core is not installed, or was built for another machine; the message gives the remedy."""
 
 
+class NoRoom(MobeeError):
+    """Raised if the disk refuses a write, because it is full or over quota; the same call succeeds when there is room."""
+
+
+class InUse(MobeeError):
+    """Raised if another process writes the data of the same agent in the same file."""
+
+
 class ActionInterrupted(MobeeError):
     """Raised if an action ends without an outcome (hold, fault, or a new run of the robot); agents do not learn from it."""
 

@@ -6,19 +6,22 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from mobee.database import explained, opened, transaction
+from mobee.claims import claim, release
+from mobee.database import damaged, explained, json_of, opened, transaction
 from mobee.errors import MobeeError
 
 
 class AgentFile:
     """The data of one agent in the file of a run; the processes of several agents may share the file.
 
-    Write-ahead log with full synchronisation: what was written survives a kill and a power cut.
+    Write-ahead log with full synchronisation: what was written survives a kill and a power cut. One process at a time may write the data
+    of an agent.
 
     Args:
         path: the SQLite file; made if missing, its folder must exist.
@@ -27,12 +30,20 @@ class AgentFile:
         durable: False: a commit does not wait for the disk, so that it survives a kill but not a power cut; for learning offline.
 
     Raises:
-        MobeeError: from every method, in one line with the file and what to do.
+        MobeeError: from every method, in one line with the file and what to do; InUse: another process writes this agent's data; NoRoom:
+            the disk is full, and the same call succeeds when there is room.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
         self.path, self.agent = Path(path), agent
         self._db: sqlite3.Connection = opened(self.path, read_only, durable)
+        if not read_only:
+            try:
+                claim(self.path, agent)
+            except BaseException:
+                self._db.close()
+                raise
+            self._release = weakref.finalize(self, release, self.path, agent)
 
     def bind(self, settings: dict[str, Any]) -> None:
         """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
@@ -58,7 +69,7 @@ class AgentFile:
             )
         for key in sorted(known):
             if known[key] != given.get(key):
-                then, now = _differing(json.loads(known[key]), json.loads(given.get(key, "null")))
+                then, now = _differing(json_of(path, key, known[key]), json.loads(given.get(key, "null")))
                 raise MobeeError(
                     f"{path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
                     "A run goes on only with the settings it began with: use those, or another file."
@@ -68,11 +79,13 @@ class AgentFile:
         """Return the recorded settings of this agent, or of another one in the file; empty if there are none."""
         with explained(self.path):
             rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self._named(agent),)).fetchall()
-        return {key: json.loads(value) for key, value in rows}
+        return {key: json_of(self.path, f"the setting {key}", value) for key, value in rows}
 
     def close(self) -> None:
         """Close the file."""
         self._db.close()
+        if hasattr(self, "_release"):
+            self._release()
 
     def __enter__(self) -> Self:
         return self
@@ -90,6 +103,10 @@ def _differing(then: Any, now: Any) -> tuple[Any, Any]:
         return then, now
     pairs = {key: _differing(then[key], now[key]) for key in sorted(then) if then[key] != now[key]}
     return {key: pair[0] for key, pair in pairs.items()}, {key: pair[1] for key, pair in pairs.items()}
+
+
+def _is_list(value: Any, kinds: tuple[type, ...]) -> bool:
+    return isinstance(value, list) and all(type(item) in kinds for item in value)
 
 
 def _texts(settings: dict[str, Any]) -> dict[str, str]:
@@ -189,10 +206,22 @@ class TransitionStore(AgentFile):
         for expected, row in enumerate(rows, start=1):
             if row[0] != expected:
                 raise MobeeError(f"{self.path}: transition {expected} of {name} is missing; the file was edited. Restore it from a copy.")
-        return [
-            Transition(n, s, a, s_next, reward, bool(settled), duration, tuple(json.loads(q)), tuple(json.loads(touched)))
-            for n, s, a, s_next, reward, settled, duration, q, touched in rows
-        ]
+        return [self._transition(name, *row) for row in rows]
+
+    def _transition(self, agent: str, n: int, *row: Any) -> Transition:
+        """Return the transition of a row; raises MobeeError if the row has other types than `append` writes."""
+        *numbers, q, touched = row
+        what = f"transition {n} of {agent}"
+        pose, names = (json_of(self.path, what, text) for text in (q, touched))
+        if (
+            list(map(type, numbers)) != [int, int, int, float, int, float]
+            or not _is_list(pose, (int, float))
+            or not _is_list(names, (str,))
+            or min(numbers[:3]) < 0
+        ):
+            raise damaged(self.path, f"{what} is not what MoBeE writes")
+        s, a, s_next, reward, settled, duration = numbers
+        return Transition(n, s, a, s_next, reward, bool(settled), duration, tuple(pose), tuple(names))
 
     def times(self, agent: str | None = None) -> list[float]:
         """Return the time at which each transition of this agent, or of another one in the file, was committed: s since 1970, in order."""

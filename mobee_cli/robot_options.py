@@ -78,7 +78,7 @@ def robot_of_run(run: Path) -> str | None:
         services = tomllib.loads(file.read_text()).get("services")
     except FileNotFoundError:
         return None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise UserError(f"{file}: the settings of the run cannot be read ({error}): name its robot with --robot FILE", BAD_INPUT) from None
     tables = services.values() if isinstance(services, dict) else ()
     named = [table["robot"] for table in tables if isinstance(table, dict) and isinstance(table.get("robot"), str)]

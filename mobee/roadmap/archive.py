@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import zipfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -143,6 +144,7 @@ def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
         with place.open("rb") as raw:
             if not zipfile.is_zipfile(raw):
                 raise ValueError("it is no .npz file, or its end is missing")
+            _check_sizes(raw)
         with np.load(place, allow_pickle=False) as file:
             arrays: Arrays = {name: file[name] for name in file.files}
         notes = json.loads(arrays.pop("notes").tobytes())
@@ -151,13 +153,27 @@ def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
         raise MobeeError(f"{place}: there is no such file. `mobee roadmap build` makes maps.") from None
     except OSError as error:
         raise MobeeError(f"{place}: the map cannot be read ({error.strerror or error}).") from error
-    except (ValueError, KeyError, AttributeError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, AttributeError, TypeError, EOFError, RecursionError, zipfile.BadZipFile, NotImplementedError) as error:
         raise MobeeError(
             f"{place}: no roadmap, or only a part of one ({_line(error)}). Give another file, or remove it and build it anew."
         ) from error
     if found != FORMAT:
         raise MobeeError(f"{place}: written as {found!r}, this mobee reads {FORMAT!r}. Use the version that wrote it, or build it anew.")
     return arrays, notes
+
+
+def _check_sizes(raw: BinaryIO) -> None:
+    """Raise ValueError if an array claims to be larger than the file, before it is allocated; `write` compresses nothing."""
+    with zipfile.ZipFile(raw) as archive:
+        for entry in archive.infolist():
+            if entry.file_size != entry.compress_size:
+                raise ValueError(f"{entry.filename!r} is compressed")
+            with archive.open(entry) as array:
+                version = np.lib.format.read_magic(array)
+                header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                shape, _, dtype = header(array)
+            if math.prod(shape) * dtype.itemsize > entry.file_size:
+                raise ValueError(f"{entry.filename!r} claims the shape {shape}, more than its {entry.file_size} bytes")
 
 
 def _line(error: Exception) -> str:

@@ -20,6 +20,7 @@ from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore, store_of
 from services.agents.config import Config
+from services.agents.room import Room
 from services.agents.streams import LearnedStream, ReachStream, publish_decision, publish_transition
 from services.common.bus_plant import BusPlant
 from services.common.hands import hand_of
@@ -72,10 +73,14 @@ class AgentNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
-        self._store = TransitionStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None
+        self._room = room = Room(service)
+        store = room.when_there_is(lambda: TransitionStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
         plant = BusPlant(service, robot, (config.part,))
         continued = store_of(Path(config.continues)) if config.continues else None
-        self._agent = CuriousAgent(config.space(robot), plant, settings=config.curious(), store=self._store, continues=continued)
+        space, settings = config.space(robot), config.curious()
+        self._agent = room.when_there_is(lambda: CuriousAgent(space, plant, settings=settings, store=store, continues=continued))
+        if store is not None:
+            room.patient(store)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
         self._decisions = service.bus.publisher(Decision, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
@@ -124,7 +129,7 @@ class AgentNode:
             "interrupted": self._work.interrupted,
             "action_time_mean": self._seconds / self._made if self._made else NOT_MEASURED,
         }
-        return f"{self._agent.transitions} transitions, {self._made} now", numbers
+        return f"{self._room.prefix()}{self._agent.transitions} transitions, {self._made} now", numbers
 
 
 class ReachNode:
@@ -135,14 +140,20 @@ class ReachNode:
         self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
         plant = BusPlant(service, robot, (config.part,))
         known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
-        self._agent = ReachAgent(
-            config.space(robot) if known is None else known.space,
-            plant,
-            None if known is None else known.model.debiased(),
-            marker=config.marker or hand_of(robot, config.part),
-            settings=config.reaching(),
-            store=ReachStore(Path(config.run_dir) / STORE, config.part) if config.run_dir else None,
+        self._room = room = Room(service)
+        store = room.when_there_is(lambda: ReachStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
+        self._agent = room.when_there_is(
+            lambda: ReachAgent(
+                config.space(robot) if known is None else known.space,
+                plant,
+                None if known is None else known.model.debiased(),
+                marker=config.marker or hand_of(robot, config.part),
+                settings=config.reaching(),
+                store=store,
+            )
         )
+        if store is not None:
+            room.patient(store)
         self._stream = ReachStream(service.bus, self._agent)
         self._work = Work(service, plant, config.part)
         self._mark()
@@ -188,4 +199,4 @@ class ReachNode:
             "reward_mean": self._rewards / self._made if self._made else NOT_MEASURED,
             "missing_mean": self._missing / self._reached if self._reached else NOT_MEASURED,
         }
-        return f"{self._agent.tries} problem-tries, {self._made} now", numbers
+        return f"{self._room.prefix()}{self._agent.tries} problem-tries, {self._made} now", numbers

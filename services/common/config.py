@@ -120,6 +120,8 @@ def read_toml(path: Path, cls: type[_C]) -> _C:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: nested too deeply") from None
 
     def where(field: str) -> str:
         line = line_of(text, field)

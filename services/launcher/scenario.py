@@ -86,6 +86,8 @@ def read_scenario(
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: nested too deeply") from None
     _place_files(data, path.parent)
     for who in with_also if isinstance(data.get("services"), dict) else ():
         data["services"].setdefault(who, {})
@@ -164,7 +166,7 @@ def _value(text: str) -> Any:
     """Return a value from its TOML text; a word without quotes is a string."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return text.strip()
 
 

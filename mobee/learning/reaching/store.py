@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mobee.database import explained, opened, transaction
+from mobee.database import damaged, explained, json_of, opened, transaction
 from mobee.errors import MobeeError
 from mobee.learning.reaching.tries import Step
 from mobee.reach import ReachTarget
@@ -72,7 +72,7 @@ class ReachStore(AgentFile):
         """Return the settings of all learners, each with the number of steps recorded before."""
         with explained(self.path):
             rows = self._db.execute("SELECT n, settings FROM reach_learners WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
-        return [(n, json.loads(settings)) for n, settings in rows]
+        return [(n, json_of(self.path, f"the settings of {self.agent}", settings)) for n, settings in rows]
 
     def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
         """Commit one step and the targets of new problems; all is on disk when this returns."""
@@ -95,7 +95,7 @@ class ReachStore(AgentFile):
         """Return the target of each problem, in order."""
         with explained(self.path):
             rows = self._db.execute("SELECT target FROM reach_problems WHERE agent = ? ORDER BY problem", (self.agent,)).fetchall()
-        return [_read(target) for (target,) in rows]
+        return [self._problem(target) for (target,) in rows]
 
     def load(self) -> list[Step]:
         """Return all steps, in order; raises MobeeError if one is absent."""
@@ -104,7 +104,26 @@ class ReachStore(AgentFile):
         for expected, row in enumerate(rows, start=1):
             if row[0] != expected:
                 raise MobeeError(f"{self.path}: step {expected} of {self.agent} is missing; the file was edited. Restore it from a copy.")
-        return [_step(*row) for row in rows]
+        return [self._step(*row) for row in rows]
+
+    def _problem(self, text: object) -> ReachTarget:
+        what = f"a target of {self.agent}"
+        made = json_of(self.path, what, text)
+        try:
+            normal = None if made["normal"] is None else np.array(made["normal"], dtype=float)
+            return ReachTarget(np.array(made["position"], dtype=float), made["radius"], made["aim"], normal)
+        except (LookupError, TypeError, ValueError):  # InvalidValue is a ValueError
+            raise damaged(self.path, f"{what} is not what MoBeE writes") from None
+
+    def _step(self, *row: Any) -> Step:
+        values = dict(zip(COLUMNS, row, strict=True))
+        what = f"step {values['n']} of {self.agent}"
+        lists = {name: json_of(self.path, what, values[name]) for name in ("q", "touched")}
+        flags, reals = ("failed", "settled"), ("reward", "expected", "missing", "duration")
+        kinds = {name: float if name in reals else int for name in values if name not in lists}
+        if any(type(values[name]) is not kind for name, kind in kinds.items()) or not all(isinstance(one, list) for one in lists.values()):
+            raise damaged(self.path, f"{what} is not what MoBeE writes")
+        return Step(**values | {name: tuple(one) for name, one in lists.items()} | {name: bool(values[name]) for name in flags})
 
 
 def reaching_parts(file: str | Path) -> tuple[str, ...]:
@@ -125,18 +144,6 @@ def _row(step: Step) -> tuple[Any, ...]:
     return tuple(json.dumps(value) if isinstance(value, tuple) else value for value in astuple(step))
 
 
-def _step(*row: Any) -> Step:
-    values = dict(zip(COLUMNS, row, strict=True))
-    lists = {name: tuple(json.loads(values[name])) for name in ("q", "touched")}
-    return Step(**values | lists | {name: bool(values[name]) for name in ("failed", "settled")})
-
-
 def _written(target: ReachTarget) -> str:
     normal = None if target.normal is None else target.normal.tolist()
     return json.dumps({"position": target.position.tolist(), "radius": target.radius, "aim": target.aim, "normal": normal})
-
-
-def _read(text: str) -> ReachTarget:
-    made = json.loads(text)
-    normal = None if made["normal"] is None else np.array(made["normal"])
-    return ReachTarget(np.array(made["position"]), made["radius"], made["aim"], normal)

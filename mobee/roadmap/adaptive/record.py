@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mobee.database import explained, transaction
+from mobee.database import damaged, explained, json_of, transaction
 from mobee.errors import UnknownName
 from mobee.plant import Outcome
 from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
@@ -54,7 +54,13 @@ class MapStore(TransitionStore):
             if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'map_changes'").fetchone() is None:
                 return []
             rows = self._db.execute("SELECT n, change FROM map_changes WHERE agent = ? ORDER BY number", (self.agent,)).fetchall()
-        return [Change(n, *json.loads(change)) for n, change in rows]
+        return [self._change(n, change) for n, change in rows]
+
+    def _change(self, n: int, text: object) -> Change:
+        match json_of(self.path, f"a change of the map of {self.agent}", text):
+            case [str(what), dict(given)]:
+                return Change(n, what, given)
+        raise damaged(self.path, f"a change of the map of {self.agent} is not what MoBeE writes")
 
 
 CHANGES = ("grow", "join", "prune")

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import resource
+import zipfile
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.archive import robot_digest, world_digest
+from mobee.roadmap.archive import read, robot_digest, world_digest
 
 
 def test_a_robot_read_again_under_another_name_is_the_same(icub: mobee.Robot) -> None:
@@ -49,3 +53,36 @@ def test_what_a_link_carries_is_another_world() -> None:
         world.add("cup", mobee.sphere(0.03))
     carried.attach("cup", "l_hand", (np.zeros(3), np.eye(3)))
     assert world_digest(free) != world_digest(carried)
+
+
+def _bomb(path: Path, header: bytes, content: bytes, notes: bytes = b"{}", compress: int = zipfile.ZIP_STORED) -> None:
+    """An .npz whose array claims what its header says."""
+    with zipfile.ZipFile(path, "w", compress) as archive:
+        for name, data in (("notes", _npy(b"|u1", len(notes)) + notes), ("poses", header + content)):
+            archive.writestr(f"{name}.npy", data)
+
+
+def _npy(dtype: bytes, count: int) -> bytes:
+    text = b"{'descr': '%s', 'fortran_order': False, 'shape': (%d,), }" % (dtype, count)
+    text = text.ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+
+
+@pytest.mark.parametrize(
+    "bomb",
+    [
+        lambda path: _bomb(path, _npy(b"<f8", 10**13), bytes(800)),
+        lambda path: _bomb(path, _npy(b"<f8", 10**7), bytes(8 * 10**7), compress=zipfile.ZIP_DEFLATED),
+        lambda path: _bomb(path, _npy(b"<f8", 1), bytes(8), notes=b"[" * 200_000),
+        lambda path: _bomb(path, _npy(b"|O", 1), bytes(8)),
+        lambda path: _bomb(path, b"", b""),
+    ],
+    ids=["claims 80 TB", "80 MB in 80 kB", "nested notes", "objects", "empty"],
+)
+def test_a_file_that_claims_more_than_it_holds_is_one_line_and_takes_no_memory(tmp_path: Path, bomb: Callable[[Path], None]) -> None:
+    bomb(tmp_path / "map.npz")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(mobee.MobeeError, match="no roadmap, or only a part of one") as error:
+        read(tmp_path / "map.npz")
+    assert "\n" not in str(error.value)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 40_000  # kB

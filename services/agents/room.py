@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Waits of an agent for its store: until there is room on the disk, however long, and until its predecessor has ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+from mobee.errors import InUse, NoRoom
+from services.common.service import Service
+
+_T = TypeVar("_T")
+PERIOD = 1.0  # s between two attempts
+PREDECESSOR = 15.0  # s for which another process may write this agent's data: an agent without a router ends after 10 s
+
+
+class Appends(Protocol):
+    """A store to which something is appended."""
+
+    append: Callable[..., None]
+
+
+class Room:
+    """Repeats what the disk refuses, and answers calls meanwhile; the part stays where it is."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self.waits_for = ""  # why this agent waits; empty: it does not
+
+    def prefix(self) -> str:
+        """The begin of the agent's line in `mobee status`."""
+        return f"waits: {self.waits_for}; " if self.waits_for else ""
+
+    def when_there_is(self, act: Callable[[], _T]) -> _T:
+        """Return the result of `act` as soon as the disk takes it; raises what else `act` raises."""
+        begun = time.monotonic()
+        while True:
+            try:
+                result = act()
+            except NoRoom as error:
+                self._wait("no_room", error)
+            except InUse as error:
+                if time.monotonic() > begun + PREDECESSOR:
+                    raise
+                self._wait("in_use", error)
+            else:
+                break
+        if self.waits_for:
+            self._service.bus.event("info", "continues", f"the disk takes the data again after {time.monotonic() - begun:.0f} s")
+            self.waits_for = ""
+        return result
+
+    def patient(self, store: Appends) -> None:
+        """Let a store wait for room whenever something is appended to it."""
+        append = store.append
+        store.append = lambda *data: self.when_there_is(lambda: append(*data))
+
+    def _wait(self, code: str, error: NoRoom | InUse) -> None:
+        if not self.waits_for:
+            self._service.bus.event("error", code, f"this agent waits: {error}")
+        self.waits_for = str(error)
+        self._service.spin(time.monotonic() + PERIOD)
+        self._service.check_router()
