@@ -401,7 +401,7 @@ class EStop(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "estop",
         "STOP",
-        writer="any client; robot_sim repeats it while it is latched (LATEST), launcher and controller until then",
+        writer="any client; robot_sim repeats it while it is latched, launcher and controller until then",
         readers="robot_sim, controller, port_filter, launcher, monitor",
     )
 

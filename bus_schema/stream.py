@@ -11,9 +11,9 @@ Delivery = Literal["CONTROL", "LATEST", "STEP", "STOP", "DATA", "BULK", "EVENTS"
 
 DELIVERIES: dict[Delivery, str] = {
     "CONTROL": "LATEST in free mode, STEP in lockstep",
-    "LATEST": "dropped rather than blocking the sender, highest priority; a receiver keeps the newest message only",
+    "LATEST": "dropped rather than blocking the sender, high priority; a receiver keeps the newest message only",
     "STEP": "every message, in order: a full queue blocks the sender",
-    "STOP": "as STEP, since a late emergency stop is better than a lost one",
+    "STOP": "highest priority, before all others; dropped for a receiver that does not read, so that it delays no other: senders repeat it",
     "DATA": "dropped rather than blocking the sender, lower priority than control",
     "BULK": "as DATA, lowest priority: pictures",
     "EVENTS": "as BULK; a subscriber that joins late gets the last 100 messages",

@@ -13,6 +13,7 @@ from typing import Any
 
 from experiments.bench.against_cases import CASES
 from experiments.kit.command_line import positive_number, positive_whole
+from experiments.kit.live.floods import FLOODS
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT, FAILED, OK
 
@@ -91,6 +92,14 @@ BENCHES = {
             "--rates": {"type": _rate, "nargs": "+", "metavar": "HZ", "help": "ticks a second (default: 100 200 500 1000)"},
             "--seconds": _number("how long each run lasts (default: 30)", positive_number, "S"),
             "--backend": {"choices": ("kinematic", "pybullet", "mujoco"), "help": "the robot (default: kinematic)"},
+        },
+    ),
+    "stop": Bench(
+        "the emergency stop under floods of messages, calls, tokens and connections: time until robot_sim obeys",
+        quick="four floods, 5 stops under each",
+        options={
+            "--floods": {"nargs": "+", "choices": ("nothing", *FLOODS), "metavar": "FLOOD", "help": "names of floods (default: all)"},
+            "--stops": _number("stops under each flood (default: 20)"),
         },
     ),
     "plant": Bench(

@@ -12,7 +12,7 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 
-_PATIENCE = 0.3  # s: a system that runs answers at once
+PATIENCE = 0.3  # s: a system that runs answers at once
 
 
 def add_endpoint(parser: argparse.ArgumentParser) -> None:
@@ -30,10 +30,10 @@ def endpoint(text: str) -> str:
 
 
 @contextmanager
-def connected(endpoint: str) -> Iterator[Any]:
-    """Open a session with the running system; raises UserError if there is none."""
+def connected(endpoint: str, patience: float = PATIENCE) -> Iterator[Any]:
+    """Open a session with the running system; raises UserError if there is none within `patience` s."""
     try:
-        session = open_client(endpoint, patience=_PATIENCE)
+        session = open_client(endpoint, patience=patience)
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     with session:

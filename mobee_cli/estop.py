@@ -17,7 +17,7 @@ from services.common import rpc
 from services.common.bus import Bus
 from services.common.observe import Heard, alive, listen
 
-_REPEAT, _PATIENCE = 0.1, 2.0  # s
+_REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under attack is slow
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Send the stop or the release, and wait until the robot confirms it."""
-    with connected(arguments.endpoint) as session:
+    with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
         if arguments.reset:
             try:
                 rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)

@@ -13,7 +13,7 @@ from services.common.config import ServiceConfig
 from services.common.emergency_stop import StopRecord
 from services.common.exit_codes import ENVIRONMENT
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_router
+from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client, open_router
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,14 +30,15 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         if arguments.stop_record is not None:
             StopRecord(arguments.stop_record).create()
-        session = open_router(arguments.listen)
+        router = open_router(arguments.listen)
+        session = open_client(arguments.listen)
     except OSError as error:
         raise UserError(f"{arguments.stop_record} cannot be written: {error.strerror}", ENVIRONMENT) from None
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     if not any(host in arguments.listen for host in ("127.0.0.1", "localhost", "[::1]", "unixsock")):
         print("mobee router: every program that reaches this address can move the robot: keep it inside a trusted network", file=sys.stderr)
-    with Service("router", ServiceConfig(endpoint=arguments.listen), session=session) as service:
+    with router, Service("router", ServiceConfig(endpoint=arguments.listen), session=session) as service:
         service.describe = lambda: (f"routes at {arguments.listen}", {})
         service.ready()
         service.run()

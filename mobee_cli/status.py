@@ -15,6 +15,7 @@ from bus_schema.rpc import Stat
 from mobee_cli.connect import add_endpoint, connected
 from services.common.exit_codes import FAILED
 from services.common.observe import Heard, alive, listen, stats
+from services.common.text import printable
 
 _LISTEN = 0.3  # s: longer than the pause between two states of a part
 _RESTARTS = "restarts_"
@@ -89,7 +90,7 @@ def _as_text(status: dict[str, Any]) -> str:
         says = f"refused {refused}; {service['text']}" if refused else service["text"]
         lines.append(
             f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>7}{_say(service['restarts']):>10}  "
-            f"{' '.join(says.split())}"[:columns].rstrip()
+            f"{printable(' '.join(says.split()))}"[:columns].rstrip()
         )
     pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
     lines += [f"page  {page}" for page in pages]  # not cut to the width of the terminal

@@ -22,19 +22,24 @@ from mobee.errors import MobeeError
 
 @dataclass(frozen=True, slots=True)
 class _Settings:
-    """Zenoh's settings of a delivery class.  `history`: number of past messages that a late subscriber gets."""
+    """Zenoh's settings of a delivery class.
+
+    `history`: number of past messages that a late subscriber gets.  `express`: each message is sent by itself, at once; a burst of them
+    overflows Zenoh's queue of two and is lost.
+    """
 
     congestion: zenoh.CongestionControl
     priority: zenoh.Priority
     history: int = 0
+    express: bool = False
 
 
 _DROP, _BLOCK = zenoh.CongestionControl.DROP, zenoh.CongestionControl.BLOCK
 
 _SETTINGS: dict[Delivery, _Settings] = {  # the classes are described in bus_schema/stream.py
-    "LATEST": _Settings(_DROP, zenoh.Priority.REAL_TIME),
-    "STEP": _Settings(_BLOCK, zenoh.Priority.REAL_TIME),
-    "STOP": _Settings(_BLOCK, zenoh.Priority.REAL_TIME),
+    "STOP": _Settings(_DROP, zenoh.Priority.REAL_TIME, express=True),  # alone with this priority, so that no other stream is before it
+    "LATEST": _Settings(_DROP, zenoh.Priority.INTERACTIVE_HIGH),
+    "STEP": _Settings(_BLOCK, zenoh.Priority.INTERACTIVE_HIGH),
     "DATA": _Settings(_DROP, zenoh.Priority.DATA),
     "BULK": _Settings(_DROP, zenoh.Priority.DATA_LOW),
     "EVENTS": _Settings(_DROP, zenoh.Priority.DATA_LOW, history=100),
@@ -57,7 +62,7 @@ class Publisher(Generic[_M]):
             "encoding": encoding_of(cls),
             "congestion_control": how.congestion,
             "priority": how.priority,
-            "express": False,  # a burst of express messages overflows its two-batch queue and is lost
+            "express": how.express,
         }
         if how.history:
             cache = zenoh.ext.CacheConfig(max_samples=how.history)

@@ -16,14 +16,17 @@ from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 from services.common.exit_codes import BAD_INPUT, FAILED
 from services.common.session import BusUnreachable
+from services.common.text import printable
 
 HELD = "MOBEE_HELD"  # environment variable; if set, standard input is a pipe that the launcher closes when the service may join the system
 
 
-def wait_until_released() -> None:
-    """Wait until the services on which this one depends are ready, if the launcher has started it before them."""
-    if os.environ.pop(HELD, None) is not None:
-        os.read(sys.stdin.fileno(), 1)  # returns at the end of the file
+def wait_until_released() -> bool:
+    """Wait until the services on which this one depends are ready, if the launcher has started it; return whether it has."""
+    if os.environ.pop(HELD, None) is None:
+        return False
+    os.read(sys.stdin.fileno(), 1)  # returns at the end of the file
+    return True
 
 
 def robot_of(config: ServiceConfig) -> Robot:
@@ -52,13 +55,17 @@ class _LogFile(logging.FileHandler):
             super().handleError(record)
 
 
+class _OneLine(logging.Formatter):
+    """A line for each entry, whatever its text holds: the reason of a stop, for example, is that of any client."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        """Escape control characters; a traceback, which is added later, keeps its lines."""
+        return printable(super().formatMessage(record))
+
+
 def set_up_log(who: str, file: Path | None = None) -> logging.Logger:
     """Return the logger of a service; it writes to `file`, or to standard error, which the launcher redirects to a file."""
-    logging.basicConfig(
-        handlers=[logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)],
-        level=logging.INFO,
-        format=f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s",
-        datefmt="%H:%M:%S",
-        force=True,
-    )
+    handler = logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)
+    handler.setFormatter(_OneLine(f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s", datefmt="%H:%M:%S"))
+    logging.basicConfig(handlers=[handler], level=logging.INFO, force=True)
     return logging.getLogger(who)

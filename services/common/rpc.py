@@ -64,22 +64,36 @@ def ask(
     *,
     request: type[Request] = Empty,
     timeout: float = TIMEOUT,
+    wanted: Callable[[_R], bool] | None = None,
     **fields: object,
 ) -> None:
-    """Call without waiting; a thread of Zenoh calls `done` once with the reply or the failure."""
+    """Call without waiting; a thread of Zenoh calls `done` once with the reply or the failure.
+
+    `wanted`: chooses among the replies if several processes may answer; if none is wanted, `done` gets the first.
+    """
     message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
     answers: list[zenoh.Reply] = []
 
     def finish() -> None:
-        result: _R | CallFailed = CallFailed("no_answer", _no_answer(key))
-        if answers:
-            try:
-                result = _read(key, answers[0], reply)
-            except CallFailed as failed:
-                result = failed
-        done(result)
+        results = [_result(key, answer, reply) for answer in (answers if wanted is not None else answers[:1])]
+        chosen = (one for one in results if wanted is not None and not isinstance(one, CallFailed) and wanted(one))
+        done(next(chosen, results[0] if results else CallFailed("no_answer", _no_answer(key))))
 
-    session.get(key, payload=encode(message), encoding=encoding_of(request), timeout=timeout, handler=Callback(answers.append, finish))
+    session.get(
+        key,
+        payload=encode(message),
+        encoding=encoding_of(request),
+        timeout=timeout,
+        handler=Callback(answers.append, finish),
+        consolidation=None if wanted is None else zenoh.ConsolidationMode.NONE,
+    )
+
+
+def _result(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R | CallFailed:
+    try:
+        return _read(key, answer, reply)
+    except CallFailed as failed:
+        return failed
 
 
 def _no_answer(key: str) -> str:

@@ -10,6 +10,7 @@ import os
 import secrets
 import signal
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -41,6 +42,8 @@ _R = TypeVar("_R", bound=Reply)
 _C = TypeVar("_C", bound=ServiceConfig)
 
 ORPHANED = 10.0  # s without a router after which a service ends
+ONLY_ONE = ("robot_sim", "model", "controller", "port_filter")  # two would both be obeyed
+FRESH_STATS, STATS_PERIOD = 10, 0.2  # of so many answers to `stat` within so many s each is computed; others repeat the last one
 
 
 class Service(Listener):
@@ -76,8 +79,7 @@ class Service(Listener):
         if config.mode == "lock":
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
-        if session is None:
-            wait_until_released()
+        self._is_child = session is None and wait_until_released()
         self._lease = lease
         session = session or self._open_session()
         with ExitStack() as failed:
@@ -108,6 +110,8 @@ class Service(Listener):
         self.mark: Callable[[], None] = lambda: None  # called at the start of a measurement: sets the counters of `describe` to 0
         self.end: Callable[[], None] = _leave  # called after a shutdown call
         self._answering = Answering(self.bus)
+        self._stats: deque[float] = deque([0.0] * FRESH_STATS, FRESH_STATS)  # monotonic times of the newest answers that were computed
+        self._last_stat: Stat | None = None
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._is_ready = False
         self._router, self._router_seen = "", time.monotonic()
@@ -157,23 +161,41 @@ class Service(Listener):
         *,
         request: type[Request] = Empty,
         timeout: float = rpc.TIMEOUT,
+        wanted: Callable[[_R], bool] | None = None,
         **fields: object,
     ) -> None:
-        """Call without waiting; `done` is called with the answer or the failure in the main thread."""
+        """Call without waiting; `done` is called with the answer or the failure in the main thread.  `wanted`: see rpc.ask."""
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
             self.inbox.put(lambda: self.bus.guarded(f"the answer to {key}", lambda: done(answer)))
 
-        rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, **fields)
+        rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, wanted=wanted, **fields)
 
     def ready(self) -> None:
-        """Declare the liveliness token, after all subscriptions and calls are declared."""
+        """Declare the liveliness token, after all subscriptions and calls are declared.
+
+        A process of ONLY_ONE that the launcher has not started ends if another one of its name answers.
+        """
+        if self.who in ONLY_ONE and not self._is_child:
+            self._require_no_other()
         gc.collect()
         gc.freeze()  # objects that live as long as the process: a full collection of them would delay a tick
         _return_free_memory()
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)
+
+    def _require_no_other(self) -> None:
+        def is_other(stat: Stat) -> bool:
+            return stat.instance != self.instance and stat.ready
+
+        answers: list[Stat | rpc.CallFailed] = []
+        self.ask(keys.service_rpc(self.who, "stat"), Stat, answers.append, wanted=is_other)
+        self.spin(time.monotonic() + 2.0 * rpc.TIMEOUT, lambda: bool(answers))
+        if answers and isinstance(answers[0], Stat) and is_other(answers[0]):
+            where, pid = self.config.endpoint, answers[0].pid
+            self.log.error("%s runs already at %s (process %d), and two would both be obeyed: this one ends", self.who, where, pid)
+            raise SystemExit(ENVIRONMENT)
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
         """Run handlers until that time of the monotonic clock, or until `enough` returns True."""
@@ -229,6 +251,13 @@ class Service(Listener):
             raise SystemExit(ENVIRONMENT)
 
     def _stat(self, request: Empty, key: str) -> Stat:
+        now = time.monotonic()
+        if self._last_stat is None or now - self._stats[0] > STATS_PERIOD:
+            self._last_stat = self._new_stat()
+            self._stats.append(now)
+        return self._last_stat
+
+    def _new_stat(self) -> Stat:
         text, numbers = self.describe()
         return Stat(
             v=VERSION,
@@ -251,7 +280,7 @@ class Service(Listener):
 
     def _mark(self, request: Empty, key: str) -> Done:
         self.bus.rejected.clear()
-        self.inbox.dropped = 0
+        self.inbox.dropped, self._last_stat = 0, None
         self.mark()
         return Done(v=VERSION)
 

@@ -9,13 +9,14 @@ import re
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import zenoh
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
+_MOST_CONNECTIONS = 10_000  # of a router
 LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: address at which a service connects to the router, instead of its endpoint
 _LONGEST_PATH = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
 
@@ -86,8 +87,18 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
 
 
 def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -> zenoh.Session:
-    """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable."""
-    settings: dict[str, object] = {"mode": "router", "listen/endpoints": [endpoint, *filter(None, [local_endpoint])]}
+    """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable.
+
+    Connections that say nothing are closed soon, and many may wait meanwhile, so that they keep nobody out.
+    """
+    settings: dict[str, object] = {
+        "mode": "router",
+        "listen/endpoints": [endpoint, *filter(None, [local_endpoint])],
+        "transport/unicast/accept_pending": _MOST_CONNECTIONS,
+        "transport/unicast/accept_timeout": 5000,  # ms
+        "transport/unicast/max_sessions": _MOST_CONNECTIONS,
+    }
+    _allow_many_descriptors()
     try:
         return zenoh.open(_config(NAMESPACE, lease, settings))
     except zenoh.ZError as error:
@@ -95,6 +106,15 @@ def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -
             f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, end it with `mobee stop --endpoint {endpoint}`, "
             "or choose another endpoint with --endpoint, such as tcp/127.0.0.1:7448."
         ) from None
+
+
+def _allow_many_descriptors() -> None:
+    """Let this process open as many files as the system allows it to: each connection is one."""
+    with suppress(ImportError, ValueError, OSError):  # not on Windows; refused
+        import resource
+
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _reason(error: zenoh.ZError) -> str:

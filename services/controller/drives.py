@@ -10,6 +10,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop, PartStatus
 from bus_schema.rpc import Driven, Take, Taken, WithEpoch
 from mobee.robot.robot import Robot
+from services.common.emergency_stop import StopLine
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
@@ -33,7 +34,7 @@ class Drives:
         self._stop: EStop | None = None  # an emergency stop outlives a robot_sim that dies
         self._stop_is_latched = False  # robot_sim has shown in this run that it obeys the stop
         self._repeat_at = 0.0  # monotonic clock
-        self._stops = service.bus.publisher(EStop)
+        self._stops, self._line = service.bus.publisher(EStop), StopLine(service.bus.session)
         self._attempts: dict[str, object] = {}  # part -> identity of the attempt in progress
         self._on_attempt_end: list[Callable[[], None]] = []
 
@@ -65,23 +66,31 @@ class Drives:
         self._attempts.clear()
         self._stop_is_latched = False
 
-    def note_stop(self, message: EStop) -> None:
-        """Note an emergency stop: nothing is armed until the gates show its reset.  A message that says `set = false` has no effect."""
-        if message.set:
+    def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
+        """Note emergency stops, after which nothing is armed until the gates show the reset.
+
+        A stop is repeated until robot_sim has latched it, and forgotten when robot_sim was reset.
+        """
+        now = time.monotonic()
+        for message in self._line.heard():
+            if self._stop is None:  # it is left to robot_sim first: a repetition could come after its release
+                self._repeat_at = now + STOP_PERIOD
             self._stop = message
             self._stop_is_latched |= message.src == "robot_sim" and message.run == self._service.bus.run
-
-    def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
-        """Compare the noted stop with the gates; repeat it until robot_sim has latched it, and forget it when robot_sim was reset."""
         if self._stop is None:
             return
         if any(state.gate == "estop" for state in parts.values()):
             self._stop_is_latched = True
         elif self._stop_is_latched:
             self._stop, self._stop_is_latched = None, False
-        elif (now := time.monotonic()) >= self._repeat_at:
+        elif now >= self._repeat_at:
             self._repeat_at = now + STOP_PERIOD
             self._stops.put(set=True, source=self._stop.source, reason=self._stop.reason)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether an emergency stop is known."""
+        return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
         """Whether a part in this state may be taken and armed."""

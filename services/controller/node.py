@@ -10,13 +10,13 @@ from functools import partial
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import EStop, Forces, Order, Targets, Tick
+from bus_schema.messages import Forces, Order, Targets, Tick
 from bus_schema.rpc import PartMeta
 from mobee import Gains
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.exit_codes import BAD_INPUT
-from services.common.inbox import CROWDED_WITH_STOPS, Timer
+from services.common.inbox import Timer
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.worlds import robot_hash
@@ -53,7 +53,6 @@ class ControllerNode:
         service.on_run(self._new_run)
         service.on_newest(Forces, self._take_forces, "model")
         service.on_newest(Targets, self._reaches.follow_targets)
-        service.on_each(EStop, self._drives.note_stop, any_run=True, crowd=CROWDED_WITH_STOPS)
         service.on_tick(self._begin)
         if service.locked:
             service.on_alive(self._note_alive)

@@ -23,7 +23,16 @@ from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, LEASE, LOCAL_ENDPOINT, BusUnreachable, local_endpoint, open_router, spare_threads
+from services.common.session import (
+    DEFAULT_ENDPOINT,
+    LEASE,
+    LOCAL_ENDPOINT,
+    BusUnreachable,
+    local_endpoint,
+    open_client,
+    open_router,
+    spare_threads,
+)
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
@@ -110,7 +119,8 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         if scenario.is_locked:
             spare_threads()
             local, lease = open_meanwhile.enter_context(local_endpoint()), max(part.config.patience for part in scenario.parts)
-        session = open_meanwhile.enter_context(open_router(endpoint, lease, local))
+        router = open_meanwhile.enter_context(open_router(endpoint, lease, local))
+        session = open_client(local or endpoint, lease=lease)  # the router itself runs no Python, so that nothing here delays a message
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
     except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable) as error:
@@ -129,7 +139,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
             "or of the record of emergency stops with the variable XDG_STATE_HOME",
             ENVIRONMENT,
         )
-    with service:
+    with service, router.liveliness().declare_token(keys.alive("router", service.instance)):
         return _Run(service, scenario, directory, options, local, record).execute(started)
 
 
@@ -154,10 +164,9 @@ class _Run:
     def execute(self, started: float) -> int:
         """Start, supervise and stop the services, and report; return the exit code; `started`: monotonic time of the launch [s]."""
         self._handle_signals()
-        with self._service.bus.session.liveliness().declare_token(keys.alive("router", self._service.instance)):
-            self._service.describe = self._describe
-            self._service.ready()
-            ready, duration = self._live(started)
+        self._service.describe = self._describe
+        self._service.ready()
+        ready, duration = self._live(started)
         with contextlib.suppress(OSError):  # one that is left does no harm
             self._record.remove()
         return self._report(ready, duration)

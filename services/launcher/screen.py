@@ -11,6 +11,7 @@ import time
 from collections.abc import Collection
 from pathlib import Path
 
+from services.common.text import printable
 from services.launcher.child import Child
 
 _LOG_LINES = 5  # newest lines on the screen
@@ -27,7 +28,7 @@ class Screen:
 
     def add(self, text: str) -> None:
         """Add a line; in a pipe, print it."""
-        line = f"{time.strftime('%H:%M:%S')} {text}"
+        line = f"{time.strftime('%H:%M:%S')} {printable(text)}"
         self._lines = [*self._lines, line][-_LOG_LINES:]
         if not self._terminal:
             print(line, file=sys.stderr, flush=True)
@@ -55,7 +56,7 @@ class Screen:
 
 def _row(child: Child) -> str:
     status = child.reason if child.phase in ("failed", "fault") else child.stat.text if child.stat else ""
-    return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {' '.join(status.split())}"
+    return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {printable(' '.join(status.split()))}"
 
 
 def _pages(children: Collection[Child]) -> list[str]:

@@ -7,11 +7,10 @@ import time
 from collections.abc import Callable
 
 from bus_schema.messages import EStop
-from services.common.emergency_stop import BY_LAUNCHER, Stop, StopRecord, replaces
-from services.common.inbox import CROWDED_WITH_STOPS
+from services.common.emergency_stop import BY_LAUNCHER, Stop, StopLine, StopRecord, replaces
 from services.common.service import Service
 
-PERIOD = 0.1  # s between two repetitions
+PERIOD = 0.05  # s between two looks for a stop, and between two repetitions
 
 
 class EmergencyStops:
@@ -26,8 +25,8 @@ class EmergencyStops:
         self._service, self._record, self._announce = service, record, announce
         self._publisher = service.bus.publisher(EStop)
         self._waiting: Stop | None = None  # for robot_sim's confirmation
-        self._repeats = False
-        service.on_each(EStop, self._note, any_run=True, crowd=CROWDED_WITH_STOPS)
+        self._line = StopLine(service.bus.session)
+        self._watch()
 
     @property
     def waiting(self) -> str:
@@ -37,10 +36,17 @@ class EmergencyStops:
     def stop(self, reason: str) -> None:
         """Stop the robot."""
         self._keep(Stop(BY_LAUNCHER, reason[:2000], time.time()))
+        self._repeat()
+
+    def _watch(self) -> None:
+        was_waiting = self._waiting
+        for message in self._line.heard():
+            self._note(message)
+        if self._waiting is was_waiting:  # a new stop is left to robot_sim first: a repetition could come after its release
+            self._repeat()
+        self._service.inbox.at(time.monotonic() + PERIOD, self._watch)
 
     def _note(self, message: EStop) -> None:
-        if not message.set:
-            return
         if message.src == "robot_sim":
             self._waiting = None
         elif message.src != self._service.who and message.tw > self._record.released_at():
@@ -55,11 +61,7 @@ class EmergencyStops:
                 self._record.latch(stop)
             except OSError as error:
                 self._announce(f"the emergency stop is repeated, but {self._record.path} was not written: {error.strerror}")
-        if not self._repeats:
-            self._repeat()
 
     def _repeat(self) -> None:
-        self._repeats = self._waiting is not None
         if self._waiting is not None:
             self._publisher.put(set=True, source=self._waiting.source, reason=self._waiting.reason)
-            self._service.inbox.at(time.monotonic() + PERIOD, self._repeat)

@@ -140,7 +140,7 @@ class Supervisor:
                 child.asking = False
                 self._note_answer(child, answer)
 
-        self._service.ask(keys.service_rpc(child.who, "stat"), Stat, note, timeout=STAT_TIMEOUT)
+        self._service.ask(keys.service_rpc(child.who, "stat"), Stat, note, timeout=STAT_TIMEOUT, wanted=lambda stat: stat.pid == pid)
         if child.unanswered:
             self._ask_pulse(child)
 
@@ -167,8 +167,13 @@ class Supervisor:
 
     def _note_token(self, who: str, instance: str, up: bool) -> None:
         child = self.children.get(who)
-        if child is not None and instance.startswith(f"i{child.pid}_"):
+        if child is None:
+            return
+        if instance.startswith(f"i{child.pid}_"):
             child.has_token = up
+        elif up:
+            own = f"process {child.pid} of this launcher" if child.pid else "no process of this launcher at present"
+            self._service.bus.reject("two_processes", f"a second {who}, {instance}, is on the bus beside {own}")
 
     def _note_end(self, child: Child, code: int) -> None:
         if code == 0 and child.program.may_end:

@@ -31,7 +31,8 @@ class WorldServer:
     def __init__(self, service: Service, model: Model) -> None:
         self._service, self._model = service, model
         self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
-        self._expiry: dict[str, int] = {}  # of objects that vision added, ns of the bus clock
+        self._perceived: set[str] = set()  # objects that vision added: it changes no other
+        self._expiry: dict[str, int] = {}  # of those that vanish when they are not seen again, ns of the bus clock
         self._presenter = ""  # service that presents the target
         service.on_alive(self._note_alive)
         service.on_each(WorldObject, self._perceive)
@@ -62,11 +63,17 @@ class WorldServer:
     def _perceive(self, seen: WorldObject) -> None:
         world = self._model.world
         is_new = seen.name not in world.objects
+        if not is_new and seen.name not in self._perceived:
+            self._service.bus.reject(
+                "authority", f"{seen.src} sees {seen.name!r}, which the scenario or a client placed: it stays as it is"
+            )
+            return
         try:
             self._put(world, seen)
         except MobeeError as error:
             self._service.bus.reject("world", str(error))
             return
+        self._perceived.add(seen.name)
         if is_new or seen.name in self._expiry:
             self._expiry[seen.name] = seen.valid_until
 
@@ -81,7 +88,8 @@ class WorldServer:
         if request.name == TARGET:
             self._require_presenter(request.who)
         self._put(world, request)
-        self._expiry.pop(request.name, None)  # the client that added it removes it
+        self._perceived.discard(request.name)  # the client that added it removes it
+        self._expiry.pop(request.name, None)
 
     def _require_presenter(self, who: str) -> None:
         """Refuse a second service that presents a target, since both would move the same object; raises CallRefused."""
@@ -110,6 +118,7 @@ class WorldServer:
 
     def _remove(self, world: World, name: str) -> None:
         world.remove(name)
+        self._perceived.discard(name)
         self._expiry.pop(name, None)
 
     def _put(self, world: World, seen: WorldObject | AddObject) -> None:

@@ -116,8 +116,8 @@ class Forwarder:
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:
         self._service, self._twin = service, twin
         self._router: dict[str, Any] = {}  # tokens by instance
-        self._down = twin.bus.publisher(EStop, delivery="LATEST")
-        self._up = service.bus.publisher(EStop, delivery="LATEST")
+        self._down = twin.bus.publisher(EStop)
+        self._up = service.bus.publisher(EStop)
         service.on_each(EStop, self._stop_clients, any_run=True, crowd=CROWDED_WITH_STOPS)
         twin.on_each(EStop, self._stop_robot, any_run=True, crowd=CROWDED_WITH_STOPS)
         twin.on_request(keys.ESTOP_RESET, Empty, lambda request, key: self._ask(key, Done))

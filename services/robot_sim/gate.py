@@ -7,6 +7,7 @@ Pure logic: the caller gives the time.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -85,11 +86,13 @@ def refused_as_call() -> Iterator[None]:
         raise CallRefused(refused.reason, str(refused)) from None
 
 
-MAX_AGE = 0.1  # s between the tick an order answers and the tick it arrives in, in free mode
+MAX_AGE = 0.1  # s between the tick an order answers and its arrival, in free mode: by the ticks, and by this process's own clock
 MAX_TTL = 1000  # ms
 POSITION_MARGIN = math.radians(1.0)  # rad by which a position may exceed its limit (encoder noise); it is then clipped
 MAX_START = math.radians(2.0)  # rad between the measured position and the first commanded one
 MAX_STEP = 2.0  # largest move of a position reference, in distances covered at full speed
+
+_REMEMBERED = 128  # ticks; at the highest rate, 1 kHz, an order may answer one of the last hundred
 
 _EXACT = 1.0 + 1e-9  # factor for rounding: a reference at the limit is within the limit
 
@@ -221,7 +224,14 @@ class Gate:
     """
 
     def __init__(
-        self, part: str, limits: Limits, dt: float, epoch: int = 0, report: Report | None = None, ttl_ticks: int | None = None
+        self,
+        part: str,
+        limits: Limits,
+        dt: float,
+        epoch: int = 0,
+        report: Report | None = None,
+        ttl_ticks: int | None = None,
+        speed: float = 1.0,
     ) -> None:
         """Begin in state idle.
 
@@ -231,9 +241,13 @@ class Gate:
             dt: the tick, s.
             epoch: every later epoch is larger.
             report: called with code, text and numbers when the part holds.
-            ttl_ticks: age [ticks] after which a command is not in force any more; None: the command's own ttl, in real time.
+            ttl_ticks: age [ticks] after which a command is not in force any more; None: the command's own ttl, in real time since the
+                tick that it answers.
+            speed: simulated time per real time; times in real time are longer for a robot in slow motion.
         """
         self.part, self.epoch, self._ttl_ticks = part, epoch, ttl_ticks
+        self._stretch = max(1.0, 1.0 / speed)
+        self._begun: deque[int] = deque(maxlen=_REMEMBERED)  # ns, monotonic clock: the beginning of the newest ticks
         self.state: GateState = "idle"
         self.owner: tuple[str, str] | None = None  # service, instance of its token
         self.faults = 0
@@ -317,16 +331,19 @@ class Gate:
             raise Refused("seq", f"{self.part}: seq {order.seq} after {self._newest_seq}")
         self._newest_seq = order.seq
         self._admission.check(order, k)
+        asked = self._beginning(order.re_k, k, now)
+        self._check_delay(now - asked)
         if order.mode == "position":
             before, at = self._last_position or (None, k)
             self._admission.check_step(order.reference, before, k - at, q)
             self._last_position = (order.reference, k)
         else:
             self._last_position = None
-        self._in_force = InForce(order, now + order.ttl * 1_000_000)
+        self._in_force = InForce(order, asked + round(order.ttl * 1_000_000 * self._stretch))
 
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
-        """Return the order for the motors in tick k; `q` [rad] and `velocity` [rad/s] (n,) are measured."""
+        """Return the order for the motors in tick k, which begins now; `q` [rad] and `velocity` [rad/s] (n,) are measured."""
+        self._begun.append(now)
         current = self._in_force
         if current is not None and self._has_expired(current, k, now):
             current = None
@@ -338,6 +355,16 @@ class Gate:
             self._shaper.start(q, velocity)
         self.mode, self.seq, self.age = order.mode, order.seq, k - order.re_k
         return self._shaped(order.mode, order.reference, q, velocity)
+
+    def _beginning(self, re_k: int, k: int, now: int) -> int:
+        """Return when tick re_k began, ns; the present tick k is the newest that has begun."""
+        ago = k - re_k + 1
+        return self._begun[-ago] if ago <= len(self._begun) else now
+
+    def _check_delay(self, delay: int) -> None:
+        """Refuse an order that was on its way for too long, although no ticks have passed: this process itself did not run."""
+        if self._ttl_ticks is None and delay > 1e9 * MAX_AGE * self._stretch:
+            raise Refused("age", f"{self.part}: answers a tick that began {delay / 1e6:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
 
     def _has_expired(self, current: InForce, k: int, now: int) -> bool:
         """Whether the command is too old; then the part holds."""

@@ -18,14 +18,19 @@ from services.robot_sim.kinematic import Backend
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
 ESTOP_PERIOD = 0.1  # s between two repetitions of an emergency stop
+CHECK_PERIOD = 0.01  # s between two looks for an emergency stop; every tick looks too
 
 
 class Guard:
     """One gate a part, and the emergency stop of all."""
 
-    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None) -> None:
-        """Begin with the emergency stop that the record holds; `record`: None if stops are not kept beyond this process."""
+    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
+        """Begin with the emergency stop that the record holds.
+
+        `record`: None if stops are not kept beyond this process.  `speed`: simulated time per real time.
+        """
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
+        self._speed = speed
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._stop: Stop | None = None if record is None else record.read()
         self._counted = dict.fromkeys(INDISPENSABLE, "")  # instance that was there first: a second token of that name changes nothing
@@ -33,11 +38,12 @@ class Guard:
         self._on_answer: Callable[[str, int, Answer], None] = lambda who, re_k, answer: None
         if not service.locked:
             self._newest = service.bus.latest(Commands)
-        self._estop = service.bus.publisher(EStop, delivery="LATEST")
+        self._estop = service.bus.publisher(EStop)
         # Epochs grow over restarts too: what a controller holds from before never fits again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
-        self._line = StopLine(service.second_session(), lambda: service.inbox.put(self._check_stop), self._is_own)
+        self._line = StopLine(service.second_session())
         self._declare()
+        self._watch_line()
         if self._stop is not None:
             self._stop_all(self._stop)
 
@@ -96,7 +102,7 @@ class Guard:
             self._service.bus.event("warning", code, text, **values)
 
         ttl_ticks = LOCKED_TTL if self._service.locked else None
-        return Gate(part, Limits.of(self._robot, part), self._dt, epoch, report, ttl_ticks)
+        return Gate(part, Limits.of(self._robot, part), self._dt, epoch, report, ttl_ticks, self._speed)
 
     def _declare(self) -> None:
         service = self._service
@@ -180,14 +186,17 @@ class Guard:
             self._counted[who] = next(iter(self._service.alive.get(who, ())), "")
             self.hold_all(f"{who} is gone")
 
-    def _is_own(self, message: EStop) -> bool:
-        return message.src == self._service.who and message.run == self._service.bus.run
+    def _watch_line(self) -> None:
+        """Look for emergency stops also while no tick begins: in a pause, and while lockstep waits."""
+        self._check_stop()
+        self._service.inbox.at(time.monotonic() + CHECK_PERIOD, self._watch_line)
 
     def _check_stop(self) -> None:
-        message = self._line.take()
-        if message is None:
-            return
-        stop = Stop(message.source, message.reason, time.time())
+        for message in self._line.heard():
+            if message.src != self._service.who or message.run != self._service.bus.run:  # not this process's own repetition
+                self._obey(Stop(message.source, message.reason, time.time()))
+
+    def _obey(self, stop: Stop) -> None:
         if not replaces(stop, self._stop):
             return
         if self._stop is None:

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, NoReturn
 
+from msgspec import Struct
+
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty, Pace, PartMeta, Place
@@ -30,6 +32,16 @@ MAX_CLOCK_RATE = 100.0  # messages per second of real time on `clock` in free mo
 IDLE_PERIOD = 1.0  # s between two checks of a run that is paused or over, in lockstep
 
 
+MAX_PAUSE = 600.0  # s after which a pause ends by itself
+
+
+class Pause(Struct, frozen=True):
+    """A pause of the robot's time."""
+
+    by: str
+    until: float  # monotonic clock
+
+
 class Node:
     """The simulated robot as a service."""
 
@@ -40,9 +52,10 @@ class Node:
         self._dt = self._dt_ns / 1e9
         self._period = self._dt / config.speed  # s of real time a tick
         self._bus.run, self._bus.dt = _new_run(), self._dt_ns
-        self._paused = False
+        self._pause: Pause | None = None
         self._pace = 0.0  # lockstep: s of real time that a simulated second takes at least
-        self._guard = Guard(service, robot, backend, self._dt, StopRecord(Path(config.stop_record)) if config.stop_record else None)
+        record = StopRecord(Path(config.stop_record)) if config.stop_record else None
+        self._guard = Guard(service, robot, backend, self._dt, record, config.speed)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt)
         self._clock = self._bus.publisher(Clock)
@@ -56,7 +69,7 @@ class Node:
             self._bus.event("info", "backend", note)
         service.describe, service.words = self._describe, self._words
         service.mark = self._mark
-        for verb, handler in (("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
+        for verb, handler in (("reset", self._reset), ("pause", self._begin_pause), ("resume", self._resume)):
             service.on_request(keys.sim(verb), Empty, handler)
         service.on_request(keys.sim("place"), Place, self._place)
         service.on_request(keys.sim("pace"), Pace, self._set_pace)
@@ -77,7 +90,7 @@ class Node:
             if now >= router_check:
                 self._service.check_router()
                 router_check = now + 1.0
-            if not self._paused:
+            if not self._is_paused():
                 self._tick(now)
 
     def _run_locked(self, lockstep: Lockstep) -> NoReturn:
@@ -89,7 +102,7 @@ class Node:
             if self._bus.k == 0 and not lockstep.is_complete():
                 self._publish_start()
                 self._service.spin(now + START_PERIOD, lockstep.is_complete)
-            elif self._paused or lockstep.is_over():
+            elif self._is_paused() or lockstep.is_over():
                 self._service.spin(now + IDLE_PERIOD)
             else:
                 self._tick_locked(lockstep)
@@ -150,6 +163,8 @@ class Node:
     def _describe(self) -> tuple[str, Mapping[str, float]]:
         states = [gate.state for gate in self._guard.gates.values()]
         text = f"{self._backend.name} {self._config.rate:g} Hz, tick {self._bus.k}, {states.count('armed')} of {len(states)} parts armed"
+        if self._pause is not None:
+            text = f"paused by {self._pause.by}, for at most {max(0.0, self._pause.until - time.monotonic()):.0f} s more; {text}"
         if self._guard.stop_reason:
             text = f"{self._guard.stop_reason}; {text}"
         numbers = self._watch.counters.numbers(self._rate.missed, self._backend.pairs_watched)
@@ -174,21 +189,37 @@ class Node:
         self._sensors.reset()
         if self._lockstep is not None:
             self._lockstep.begin()
-        self._paused = False
+        self._pause = None
         self._bus.event("info", "new_run", f"reset by {request.who}: run {self._bus.run}")
         return Done(v=VERSION)
 
-    def _pause(self, request: Empty, key: str) -> Done:
-        if not self._paused:
-            self._paused = True
+    def _begin_pause(self, request: Empty, key: str) -> Done:
+        """Pause, or let one's own pause last longer."""
+        self._require_pauser(request.who)
+        if self._pause is None:
             self._guard.hold_all(f"paused by {request.who}")
             self._note_disturbance("paused")
             self._publish_tick("paused")
+        self._pause = Pause(request.who, time.monotonic() + MAX_PAUSE)
         return Done(v=VERSION)
 
     def _resume(self, request: Empty, key: str) -> Done:
-        self._paused = False
+        self._require_pauser(request.who)
+        self._pause = None
         return Done(v=VERSION)
+
+    def _require_pauser(self, who: str) -> None:
+        """Refuse a call of another service than the one that has paused the robot, while that one runs."""
+        pause = self._pause
+        if pause is not None and who != pause.by and self._service.alive.get(pause.by):
+            raise CallRefused("owned", f"{pause.by} has paused the robot, and only it can let it go on while it runs")
+
+    def _is_paused(self) -> bool:
+        """Return whether time stands still; a pause that was forgotten ends by itself."""
+        if self._pause is not None and time.monotonic() > self._pause.until:
+            self._bus.event("warning", "pause_over", f"the pause by {self._pause.by} lasted {MAX_PAUSE:g} s: the robot goes on")
+            self._pause = None
+        return self._pause is not None
 
     def _place(self, request: Place, key: str) -> Done:
         x, y, z = request.position

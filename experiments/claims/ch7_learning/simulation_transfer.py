@@ -79,7 +79,7 @@ def results(folder: Path) -> dict[str, Any]:
     """Compute the distances and the claim from the transitions in the folder."""
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
-    return {"claims": judged((equal,), tasks), "distances": table} | _at_the_table(arguments, folder)
+    return {"claims": judged((equal,), tasks), "distances": table} | _at_the_table(folder)
 
 
 def figure(folder: Path) -> Path:
@@ -96,9 +96,9 @@ def _compared(folder: Path) -> dict[str, Compared]:
     return {task: compared(folder, task, _least(folder)) for task in names}
 
 
-def _at_the_table(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
+def _at_the_table(folder: Path) -> dict[str, Any]:
     """Return how the actions of each part at the table ended, on each robot; nothing without --table."""
-    if "table" not in _tasks(arguments):
+    if not (folder / "table").exists():
         return {}
     return {
         "at the table": {

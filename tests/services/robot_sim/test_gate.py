@@ -234,9 +234,34 @@ def test_a_command_100_ms_old_is_just_in_time() -> None:
     gated = Gated().owned()
     for _ in range(20):
         gated.tick()
-    gated.command(ref=0.05, re_k=10)
+    gated.command(ref=0.05, re_k=10, ttl=200)
     gated.tick()
     assert gated.gate.age == 11
+
+
+def test_a_command_from_before_a_freeze_of_this_process_is_refused_although_no_tick_has_passed() -> None:
+    gated = Gated().owned()
+    for _ in range(20):
+        gated.tick()
+    gated.now += 100_000_000
+    gated.command(ref=0.05, ttl=200)  # it answers the newest tick, which began 100 ms ago
+    gated.now += 1_000_000
+    assert refusal(gated, ref=0.05, ttl=200) == "age"
+    gated.now -= 1_000_000
+    gated.tick()
+    assert gated.gate.state == "armed"
+
+
+def test_a_command_lasts_for_its_ttl_from_the_tick_that_it_answers() -> None:
+    gated = Gated().owned()
+    for _ in range(20):
+        gated.tick()
+    gated.command(ref=0.05, re_k=15, ttl=100)
+    for _ in range(5):
+        gated.tick()
+        assert gated.gate.state == "armed"
+    gated.tick()
+    assert gated.gate.state == "hold"
 
 
 @pytest.mark.parametrize("seq", [0, 3])

@@ -51,7 +51,7 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
     stops = bench.rig.record(EStop)
     epoch = bench.arm("left_arm")
     bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.3))
-    bench.rig.bus.publisher(EStop, delivery="LATEST").put(set=True, source="test", reason="because")
+    bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
     wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
     with pytest.raises(CallFailed) as caught:
         bench.drive("left_arm", "arm", epoch)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Floods of messages, calls, tokens and connections, each made by a process of its own: `python -m experiments.kit.live.floods`.
+
+They speak from the documented contract alone, as any program on the machine can.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import secrets
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.messages import Clock, Commands, EStop, Event, Forces, Image, Message, Motion, State, Tick, Transition, WorldObject
+from bus_schema.rpc import Empty
+from services.common.session import open_client
+
+MESSAGES, BIG_MESSAGES, CALLS, TOKENS = 10_000, 100, 1_400, 500  # a second
+IDLE = 1000  # connections that say nothing
+_BURST = 0.005  # s between two bursts of a flood
+_BIG = bytes(1_000_000)
+_GARBAGE = b"\xc1" + bytes(99)  # no msgpack
+
+
+def _paced(rate: float, send: Callable[[], object]) -> None:
+    """Call `send` at a rate, for ever."""
+    begun, sent = time.monotonic(), 0
+    while True:
+        due = int((time.monotonic() - begun) * rate)
+        for _ in range(due - sent):
+            send()
+        sent = due
+        time.sleep(_BURST)
+
+
+def _put(cls: type[Message], name: str, payload: bytes, rate: float) -> Callable[[str], None]:
+    def flood(endpoint: str) -> None:
+        with open_client(endpoint) as session:
+            publisher = session.declare_publisher(cls.stream.key(name), encoding=encoding_of(cls))
+            _paced(rate, lambda: publisher.put(payload))
+
+    return flood
+
+
+def _no_stop() -> bytes:
+    """A message on `estop` that sets no stop."""
+    return encode(EStop(v=VERSION, run="-", src="flood", seq=0, k=0, t=0, tw=0, set=False, source="flood", reason=""))
+
+
+def _ask_stat(endpoint: str) -> None:
+    key = keys.service_rpc("robot_sim", "stat")
+
+    def ask() -> None:
+        session.get(key, payload=encode(Empty(v=VERSION, id=secrets.token_hex(8), who="flood")), encoding=encoding_of(Empty), timeout=1.0)
+
+    with open_client(endpoint) as session:
+        _paced(CALLS, ask)
+
+
+def _come_and_go(endpoint: str) -> None:
+    with open_client(endpoint) as session:
+        liveliness: Any = session.liveliness()
+        _paced(TOKENS, lambda: liveliness.declare_token(keys.alive("model", f"i{secrets.token_hex(6)}")).undeclare())
+
+
+def _connect(endpoint: str) -> None:
+    """Keep IDLE connections; one that the router closes is opened again."""
+    host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
+    held: list[socket.socket] = []
+    while True:
+        for connection in list(held):
+            with contextlib.suppress(BlockingIOError):
+                if not connection.recv(1):
+                    held.remove(connection)
+                    connection.close()
+        while len(held) < IDLE:
+            connection = socket.create_connection((host, int(port)), timeout=1.0)
+            connection.setblocking(False)
+            held.append(connection)
+        time.sleep(0.05)
+
+
+FLOODS: dict[str, Callable[[str], None]] = {
+    "estop, set = false": _put(EStop, "", _no_stop(), MESSAGES),
+    "estop, garbage": _put(EStop, "", _GARBAGE, MESSAGES),
+    "calls of robot_sim's stat": _ask_stat,
+    "tick, garbage": _put(Tick, "", _GARBAGE, MESSAGES),
+    "clock, garbage": _put(Clock, "", _GARBAGE, MESSAGES),
+    "commands, garbage": _put(Commands, "", _GARBAGE, MESSAGES),
+    "state, garbage": _put(State, "left_arm", _GARBAGE, MESSAGES),
+    "motion, garbage": _put(Motion, "left_arm", _GARBAGE, MESSAGES),
+    "forces, garbage": _put(Forces, "model", _GARBAGE, MESSAGES),
+    "event, garbage": _put(Event, "flood", _GARBAGE, MESSAGES),
+    "world, garbage": _put(WorldObject, "flood", _GARBAGE, MESSAGES),
+    "transition, garbage": _put(Transition, "left_arm", _GARBAGE, MESSAGES),
+    "commands, 1 MB": _put(Commands, "", _BIG, BIG_MESSAGES),
+    "world, 1 MB": _put(WorldObject, "flood", _BIG, BIG_MESSAGES),
+    "image, 1 MB": _put(Image, "left", _BIG, BIG_MESSAGES),
+    "tokens": _come_and_go,
+    "idle connections": _connect,
+}
+
+
+@contextmanager
+def flood(endpoint: str, name: str) -> Iterator[None]:
+    """One of FLOODS while the body of the `with` statement runs."""
+    process = subprocess.Popen([sys.executable, "-m", "experiments.kit.live.floods", endpoint, name])
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+def main(arguments: Any = None) -> None:
+    """Flood until the process is killed."""
+    endpoint, name = arguments or sys.argv[1:]
+    FLOODS[name](endpoint)
+
+
+if __name__ == "__main__":
+    main()

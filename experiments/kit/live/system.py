@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A live system that runs while something is done to it: launched as a user launches it, and ended as by Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bus_schema import keys
+from bus_schema.rpc import Empty, Stat
+from experiments.kit.live.launch import LaunchFailed, free_endpoint, stop
+from services.common import rpc
+
+_START_TIMEOUT = 120.0  # s
+
+
+@dataclass
+class System:
+    """A launcher process and where it writes."""
+
+    process: subprocess.Popen[str]
+    endpoint: str
+    folder: Path  # of run folders, errors and the record of emergency stops
+
+    @property
+    def run_dir(self) -> Path:
+        """The folder of its run."""
+        return next((self.folder / "runs").iterdir())
+
+    @property
+    def says(self) -> str:
+        """The lines of its screen so far."""
+        return (self.folder / "launcher.err").read_text()
+
+
+def start(folder: Path, scenario: str, settings: Sequence[str] = (), endpoint: str = "") -> System:
+    """Start a system without monitor and wait until all its services are ready; raises LaunchFailed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    endpoint = endpoint or free_endpoint()
+    argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", endpoint]
+    argv += ["--runs", str(folder / "runs"), *(f"--set={setting}" for setting in settings)]
+    environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
+    with (folder / "launcher.err").open("w") as errors:
+        process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=errors, text=True, process_group=0, env=environment)
+    system = System(process, endpoint, folder)
+    try:
+        wait_for(lambda: "all ready" in system.says or process.poll() is not None, _START_TIMEOUT, "the system is ready")
+        if process.poll() is not None:
+            raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(system.says.splitlines() or ['no message'])[-1]}")
+    except BaseException:
+        stop(process)
+        raise
+    return system
+
+
+@contextmanager
+def running(folder: Path, scenario: str, settings: Sequence[str] = ()) -> Iterator[System]:
+    """A system that is ready; it is stopped afterwards."""
+    system = start(folder, scenario, settings)
+    try:
+        yield system
+    finally:
+        stop(system.process)
+
+
+def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: float = 0.01) -> Any:
+    """Return the condition's first true value; raises LaunchFailed after `timeout` s."""
+    give_up = time.monotonic() + timeout
+    while not (value := condition()):
+        if time.monotonic() > give_up:
+            raise LaunchFailed(f"not within {timeout:g} s: {what}")
+        time.sleep(period)
+    return value
+
+
+def stat_of(session: Any, who: str, timeout: float = 0.5) -> Stat | None:
+    """Return the status of a service; None if it does not answer."""
+    try:
+        return rpc.call(session, "observer", keys.service_rpc(who, "stat"), Empty, Stat, timeout=timeout)
+    except rpc.CallFailed:
+        return None
