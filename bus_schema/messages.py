@@ -30,7 +30,7 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]  # so small that the difference of 
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
-MotionStatus = Literal["idle", "moving", "settled", "timeout", "held"]
+MotionStatus = Literal["idle", "moving", "settled", "timeout", "suspended", "held"]  # suspended: in hold; the action may continue
 ReachPhase = Literal["reaching", "returning", "over", "interrupted"]
 Aim = Literal["centre", "surface"]
 Role = Literal["obstacle", "target", "ghost"]

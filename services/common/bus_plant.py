@@ -332,7 +332,7 @@ class BusPlant:
         motion = self._motion.get(part)
         if motion is None or motion.k <= asked:
             return False
-        return motion.action_id != action_id or motion.status != "moving"
+        return motion.action_id != action_id or motion.status not in ("moving", "suspended")
 
     def _is_interrupted(self, part: str, action_id: str) -> bool:
         motion = self._motion[part]

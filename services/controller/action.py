@@ -28,13 +28,30 @@ class Action:
         self._test: SettleTest | None = None
         self.owner: Owner | None = None
         self.id = ""
+        self.target: Array | None = None  # (n_part,) rad, to which the action may continue after a suspension
+        self.suspended_at = 0.0  # s
         self.status: MotionStatus = "held"
         self.since_k = self.start_k = 0
 
-    def start(self, action_id: str, k: int, t: float) -> None:
-        """Start an action whose goal was set at tick k, time t [s]."""
-        self.id, self.start_k = action_id, k
+    def start(self, action_id: str, k: int, t: float, target: Array | None = None) -> None:
+        """Start an action whose goal was set at tick k, time t [s]; `target`: of an action that may be suspended."""
+        self.id, self.start_k, self.target = action_id, k, target
         self.settle_again(k, t)
+
+    @property
+    def is_in_hold(self) -> bool:
+        """Whether the part is not under control."""
+        return self.status in ("held", "suspended")
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether the action has not ended: the part moves, or will move again."""
+        return self.status in ("moving", "suspended")
+
+    def suspend(self, k: int, t: float) -> None:
+        """Let the part rest at tick k, time t [s], without ending the action."""
+        self._test, self.suspended_at = None, t
+        self._set_status("suspended", k)
 
     def settle_again(self, k: int, t: float) -> None:
         """Continue the action at tick k with a new settle test; it ends when the part has settled again."""
@@ -60,7 +77,9 @@ class Action:
     def lose_owner(self, k: int) -> None:
         """End the action and the ownership, because the owner has ended."""
         self.owner, self._test = None, None
-        if self.status != "held":
+        if self.status == "suspended":
+            self.hold(k)
+        elif self.status != "held":
             self.resume(k)
 
     def _set_status(self, status: MotionStatus, k: int) -> None:
@@ -73,5 +92,5 @@ def busy_owners(actions: Iterable[Action]) -> list[str]:
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:
-            owners[action.owner.who] = owners.get(action.owner.who, True) and action.status == "moving"
+            owners[action.owner.who] = owners.get(action.owner.who, True) and action.is_under_way
     return sorted(who for who, busy in owners.items() if busy)

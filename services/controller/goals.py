@@ -70,7 +70,7 @@ class GoalServer:
         self._check_free(part)
         self._reaches.interrupt(part)
         self._law.set_attractor(part, target)
-        return self._start(part, request.action_id)
+        return self._start(part, request.action_id, target)
 
     def _reach(self, part: str, request: ReachFor) -> Started:
         self._check_epoch(part, request.epoch)
@@ -83,13 +83,13 @@ class GoalServer:
         self._commands.send_again(part)  # before the next tick
         return started
 
-    def _start(self, part: str, action_id: str) -> Started:
-        self._actions[part].start(action_id, self._service.bus.k, self._service.bus.t * 1e-9)
+    def _start(self, part: str, action_id: str, target: Array | None = None) -> Started:
+        self._actions[part].start(action_id, self._service.bus.k, self._service.bus.t * 1e-9, target)
         return Started(v=VERSION, k=self._service.bus.k)
 
     def _force(self, part: str, request: Force) -> Done:
         self._check_epoch(part, request.epoch)
-        if self._actions[part].status == "held" and (request.f is not None or request.marker is not None):
+        if self._actions[part].is_in_hold and (request.f is not None or request.marker is not None):
             raise CallRefused("held", f"{part} is in hold, and takes no force: wait until the status of its motion is not 'held'")
         try:
             self._apply(part, request)
@@ -115,7 +115,7 @@ class GoalServer:
             self._law.set_client_force(part, np.array(request.f))
 
     def _check_free(self, part: str) -> None:
-        if self._actions[part].status == "held":
+        if self._actions[part].is_in_hold:
             raise CallRefused("held", f"{part} is in hold: wait until the status of its motion is not 'held'")
 
     def _check_epoch(self, part: str, epoch: int) -> None:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Forces, Order, Targets, Tick
+from bus_schema.messages import Forces, Order, PartStatus, Targets, Tick
 from bus_schema.rpc import PartMeta
 from mobee import Gains
 from mobee.arrays import Array
@@ -28,6 +28,7 @@ from services.controller.goals import GoalServer
 from services.controller.law import RobotLaw
 from services.controller.publish import CommandPublisher, Counters, MotionPublisher
 from services.controller.reaches import Reaches
+from services.controller.suspension import Suspensions
 
 
 class ControllerNode:
@@ -46,6 +47,7 @@ class ControllerNode:
         self._commands = CommandPublisher(service, config.ttl, self._law, self._actions, self._drives)
         self._reaches = Reaches(service.bus, robot, self._law, self._actions)
         self._goals = GoalServer(service, robot, self._law, self._actions, self._reaches, self._commands)
+        self._suspensions = Suspensions()
         self._tick: Tick | None = None  # waits for its forces
         self._timer: Timer | None = None  # free mode: end of that wait
         self._mark()
@@ -121,21 +123,41 @@ class ControllerNode:
     def _supervise(self, tick: Tick, fresh: bool) -> None:
         """Arm the parts that can be armed; a part that is not under control has no action and rests where it is."""
         self._drives.watch_stop(tick.parts)
+        self._suspensions.note_forces(tick, fresh)
         for part, action in self._actions.items():
             state = tick.parts[part]
             lacking = "no fresh forces" if not fresh else "no fresh state" if tick.t - state.t > MAX_STATE_AGE else ""
             if lacking or not self._drives.is_armed(part, state):
                 if not lacking:
                     self._drives.try_arm(part, state)
-                if action.status != "held":
-                    self._hold(part, tick.k, lacking or f"gate {state.gate}")
+                self._lose(part, tick, state, lacking or f"gate {state.gate}")
                 self._law.rest(part)
                 self._counters.held_ticks += 1
-            elif action.status == "held":
-                self._law.rest(part)
-                if action.owner is None:
-                    self._law.seek_posture(part)
-                action.resume(tick.k)
+            elif action.is_in_hold:
+                self._regain(part, tick)
+
+    def _lose(self, part: str, tick: Tick, state: PartStatus, why: str) -> None:
+        """Suspend the action of a part that is not under control, or end it."""
+        action = self._actions[part]
+        may_continue = self._suspensions.may_continue(action, tick, state) and not self._drives.is_stopped
+        if may_continue and action.status == "moving":
+            action.suspend(tick.k, tick.t * 1e-9)
+            self._law.clear_client_forces(part)
+            self._service.bus.event("warning", "suspended", f"{part} holds, and its action waits: {why}")
+        elif action.status != "held" and not may_continue:
+            self._hold(part, tick.k, why)
+
+    def _regain(self, part: str, tick: Tick) -> None:
+        """Go on with a part that is under control again, from rest: with its suspended action, or without an action."""
+        action = self._actions[part]
+        self._law.rest(part)
+        if action.status == "suspended" and action.target is not None and self._suspensions.is_of_the_model(action, tick):
+            self._law.set_attractor(part, action.target)
+            action.settle_again(tick.k, tick.t * 1e-9)
+            return
+        if action.owner is None:
+            self._law.seek_posture(part)
+        action.resume(tick.k)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
         """Return the orders to the parts, and their reference (n,); without fresh forces, every part that follows is ordered to hold."""
@@ -149,7 +171,7 @@ class ControllerNode:
             return {part: Order(self._drives.epochs[part], "hold") for part in followers}, self._law.q
         reference = self._law.step(tick, min(ticks, MAX_TICKS))
         speeds = {part: self._law.settle_speeds(part) for part in self._actions}
-        moving = {part: action for part, action in self._actions.items() if action.status != "held"}
+        moving = {part: action for part, action in self._actions.items() if not action.is_in_hold}
         for part, action in moving.items():
             action.update(tick.k, tick.t * 1e-9, *speeds[part], partial(self._law.is_approaching, part))
             self._reaches.update(part, tick)
@@ -169,6 +191,7 @@ class ControllerNode:
     def _new_run(self) -> None:
         self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare_robots)
         self._drives.forget()
+        self._suspensions = Suspensions()
         self._tick = None
         self._commands.begin_tick()
         self._law.reset()
@@ -189,5 +212,5 @@ class ControllerNode:
         self._counters = Counters()
 
     def _describe(self) -> tuple[str, Mapping[str, float]]:
-        controlled = [part for part, action in self._actions.items() if action.status != "held"]
+        controlled = [part for part, action in self._actions.items() if not action.is_in_hold]
         return f"{len(controlled)} of {len(self._actions)} parts under control", self._counters.numbers()

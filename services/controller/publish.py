@@ -84,7 +84,7 @@ class MotionPublisher:
         if known != self._published[part] or action.since_k >= k:
             return False
         if tick.mode == "lock":
-            return (action.status == "moving" or action.owner is None) and k % LOCKSTEP_PUBLISH_PERIOD > 0
+            return (action.is_under_way or action.owner is None) and k % LOCKSTEP_PUBLISH_PERIOD > 0
         return k % max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt)) > 0
 
 

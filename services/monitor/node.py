@@ -201,7 +201,7 @@ class MonitorNode:
         now, seen = time.monotonic(), self._seen
         seen.clock_age = None if self._ticked is None else now - self._ticked
         seen.gates, seen.why_held, seen.services = self._known.gates, self._why_held, set(self._service.alive)
-        held = {part for part, motion in self._known.motions.items() if motion.status == "held"}
+        held = {part for part, motion in self._known.motions.items() if motion.status in ("held", "suspended")}
         self._held_since = {part: self._held_since.get(part, now) for part in held}
         seen.held_for = {part: now - since for part, since in self._held_since.items()}
         seen.stop = None if self._stop is None or now - self._stop[0] > STOP_REPEATED else self._stop[1]
@@ -253,9 +253,9 @@ class MonitorNode:
             self._learning.log(learned.agent, learned)
 
     def _show_event(self, event: Event) -> None:
-        if event.code == "held":
-            part, _, why = event.text.partition(" holds: ")
-            self._why_held[part] = why
+        if event.code in ("held", "suspended"):
+            what, _, why = event.text.partition(": ")
+            self._why_held[what.split(" ")[0]] = why
         self._stream.log("events", rr.TextLog(f"{event.src}: {event.text}", level=LEVELS[event.level]))
         self._tell(event.level, event.src, event.text)
 

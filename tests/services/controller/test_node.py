@@ -92,7 +92,7 @@ def test_forces_that_do_not_come_in_half_a_tick_are_replaced_by_the_last(run: St
     assert run.statuses() == {"idle"}
 
 
-def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_no_action_ends(run: Stage) -> None:
+def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_the_action_continues_when_they_are_back(run: Stage) -> None:
     _, epoch = run.own("left_arm")
     run.goal("left_arm", epoch, near("left_arm"), "interrupted")
     run.ticks(10)
@@ -100,7 +100,8 @@ def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_no_actio
     run.ticks(3)
     assert run.motion("left_arm").status == "moving"
     k = run.tick()
-    assert {(run.motion(p).status, run.motion(p).since_k) for p in PARTS} == {("held", k)}
+    found = {p: (run.motion(p).status, run.motion(p).since_k) for p in PARTS}
+    assert found == dict.fromkeys(PARTS, ("held", k)) | {"left_arm": ("suspended", k)}
     assert run.motion("left_arm").action_id == "interrupted"
     for part in PARTS:
         assert wait_for(lambda part=part: run.commands(part, k - 1), "the command")[-1].mode == "hold"
@@ -108,15 +109,19 @@ def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_no_actio
     refused("held", lambda: run.force("left_arm", epoch, f=[1.0] * 16))
     run.force("left_arm", epoch)  # clearing is always right
     run.ticks(150)  # beyond any look of the settle test
-    assert run.statuses() == {"held"}
+    assert run.statuses() == {"held", "suspended"}
     assert "settled" not in {m.status for m in run.motions["left_arm"] if m.action_id == "interrupted"}
     run.model.silent = False
     k = run.tick()
-    motion = run.motion("left_arm")
-    assert (motion.status, motion.action_id, motion.since_k) == ("idle", "", k)
-    np.testing.assert_allclose(motion.goal, run.sim.of("left_arm"), atol=1e-12)
+    motion, other = run.motion("left_arm"), run.motion("right_arm")
+    assert (motion.status, motion.action_id, motion.since_k) == ("moving", "interrupted", k)
+    assert (other.status, other.action_id) == ("idle", "")
+    np.testing.assert_allclose(motion.goal, near("left_arm"), atol=1e-12)
     command = wait_for(lambda: run.commands("left_arm", k - 1), "the command")[-1]
-    np.testing.assert_allclose(command.ref, 0.0, atol=1e-12)
+    assert 0.0 < np.abs(command.ref).max() < 0.1  # rad/s, from rest
+    motion = run.play(lambda: (m := run.motion("left_arm")).status == "settled" and m, "the end of the action")
+    assert motion.action_id == "interrupted"
+    np.testing.assert_allclose(motion.q[:7], near("left_arm")[:7], atol=np.deg2rad(2.0))
 
 
 def test_forces_that_lag_by_more_than_three_ticks_are_no_forces(run: Stage) -> None:

@@ -148,7 +148,7 @@ class AtGoals:
                 continue
             if motion.status == "settled" or motion.status == "timeout":
                 self._endings[part] = motion.status
-            elif motion.status != "moving":
+            elif motion.status not in ("moving", "suspended"):
                 self._endings[part] = "refused"
 
     def _start(self, k: int) -> None:
