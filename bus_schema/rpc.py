@@ -79,6 +79,12 @@ class Pace(Request, frozen=True, kw_only=True):
     speed: Annotated[float, Meta(ge=0, le=1000)]  # largest simulated time per real time; 0: as fast as the processes answer
 
 
+class Explore(Request, frozen=True, kw_only=True):
+    """Choose the next actions by another explorer."""
+
+    explorer: Name  # as in the settings of an agent
+
+
 class AddObject(Request, frozen=True, kw_only=True):
     """Add an object to the model's world, or replace the one of the same name."""
 
@@ -243,6 +249,7 @@ CALLS = (
     Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, "every service"),
     Call("{service}/rpc/{verb}", ("config",), Empty, Config, "every service"),
     Call("{service}/rpc/{verb}", ("rest", "go_on"), Empty, Done, "agents"),
+    Call("{service}/rpc/{verb}", ("explore",), Explore, Done, "agents"),
     Call("{part}/meta", (), Empty, PartMeta, "robot_sim"),
     Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, "robot_sim"),
     Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, "robot_sim"),

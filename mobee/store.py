@@ -121,6 +121,9 @@ def store_of(run: Path) -> Path:
     return run / STORE if run.is_dir() else run
 
 
+EXPLORERS = """
+CREATE TABLE IF NOT EXISTS explorers (agent TEXT NOT NULL, n INTEGER NOT NULL, explorer TEXT NOT NULL, PRIMARY KEY (agent, n))
+"""  # a table of files in which an explorer was changed
 CONTINUED = "continued"  # key of the record of an agent that began with the transitions of another file
 PLANT = "plant"  # key of the plant's settings
 
@@ -188,6 +191,7 @@ class TransitionStore(AgentFile):
             known, agents = other.settings(), other.agents()
             if self.agent not in agents:
                 raise MobeeError(f"{source}: holds no transitions of {self.agent}. It holds those of {', '.join(agents) or 'no agent'}.")
+            changes = other.explorers()
             origin = {"transitions": other._last, "before": known.pop(CONTINUED, None), "plant": known.pop(PLANT, None)}
             with explained(other.path):
                 rows = other._db.execute("SELECT * FROM transitions WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
@@ -196,6 +200,21 @@ class TransitionStore(AgentFile):
             self._record(_texts(settings | {CONTINUED: origin}))
             self._db.executemany(f"INSERT INTO transitions VALUES ({', '.join('?' * len(rows[0]))})", rows)
         self._last = len(rows)
+        for n, explorer in changes.items():
+            self.change_explorer(n, explorer)
+
+    def change_explorer(self, n: int, explorer: str) -> None:
+        """Record by which explorer actions are chosen after `n` transitions; it is on disk when this returns."""
+        with explained(self.path), transaction(self._db):
+            self._db.execute(EXPLORERS)
+            self._db.execute("INSERT OR REPLACE INTO explorers VALUES (?, ?, ?)", (self.agent, n, explorer))
+
+    def explorers(self, agent: str | None = None) -> dict[int, str]:
+        """Return the changes of the explorer of this agent, or of another one in the file: its name, by the transitions made before."""
+        with explained(self.path):
+            if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'explorers'").fetchone() is None:
+                return {}
+            return dict(self._db.execute("SELECT n, explorer FROM explorers WHERE agent = ? ORDER BY n", (self._named(agent),)).fetchall())
 
     def load(self, agent: str | None = None) -> list[Transition]:
         """Return all transitions of this agent, or of another one in the file, in order."""

@@ -66,7 +66,7 @@ class CuriousAgent(CuriousLearner):
             if continues is not None:
                 store.continue_from(continues, self.settings)
             store.bind(self.settings)
-            self._replay(store.load())
+            self._replay(store.load(), store.explorers())
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -85,6 +85,19 @@ class CuriousAgent(CuriousLearner):
         action = self._choose(state)
         self._pending = state, action
         return action
+
+    def explore_by(self, explorer: str | Explorer) -> None:
+        """Choose the next actions by another explorer; see `CuriousSettings`.
+
+        Its store keeps from which transition on, so that an agent that is restarted goes on with it. An action just decided is not changed.
+
+        Raises:
+            UnknownName: no such explorer.
+            InvalidValue: it ignores the goal that the agent has.
+        """
+        self._explore_by(explorer)
+        if self.store is not None:
+            self.store.change_explorer(self.transitions + (self._pending is not None), self.explorer)
 
     def target(self, action: int) -> Array:
         """Return the goal pose of the action just decided, shape (n_part,), in [rad]."""

@@ -64,9 +64,14 @@ def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str
         if weight is not None:
             raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
         return None
+    require_pursuing(explorer)
+    return External(space, goal, weight)
+
+
+def require_pursuing(explorer: str) -> None:
+    """Raise InvalidValue if an explorer ignores external rewards."""
     if explorer not in PURSUING:
         raise InvalidValue(f"the explorer {explorer!r} ignores a goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
-    return External(space, goal, weight)
 
 
 def target_states(space: Space, given: Any) -> Ints:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS, Draws, Explorer, choose
-from mobee.learning.goal import Goal, pursued
+from mobee.learning.goal import Goal, pursued, require_pursuing
 from mobee.learning.space import Space
 from mobee.learning.transitions import Divergence, TransitionModel
 from mobee.learning.value_iteration import OutcomeModel, value_iteration
@@ -131,7 +131,7 @@ class CuriousLearner:
         """Number of transitions observed, those of its store included."""
         self.last: Transition | None = None
         """The newest transition."""
-        self._settings = settings
+        self._settings, self._first_explorer = settings, self.explorer
         self._external = pursued(space, settings.goal, settings.goal_weight, self.explorer)
         self._plans = Plans(settings.discount, settings.tolerance, settings.relative)
         self._draws = Draws(space.part)
@@ -141,7 +141,7 @@ class CuriousLearner:
         """The settings of the learner and its space, as plain JSON values; a store can be continued only with equal settings."""
         record = vars(self._settings) | {
             "space": self.space.settings,
-            "explorer": self.explorer,
+            "explorer": self._first_explorer,
             "divergence": self.model.divergence,
             "forgetting": self.model.forgetting,
             "goal": None if self._external is None else self._external.settings,
@@ -160,6 +160,13 @@ class CuriousLearner:
             wanted = self._pursued() if reward is None else reward
             plan = self._plans.make(key, (reward, beliefs), wanted, self.beliefs if beliefs is None else beliefs)
         return plan
+
+    def _explore_by(self, explorer: str | Explorer) -> None:
+        """Choose actions by another explorer from now on; raises UnknownName, or InvalidValue if it ignores the learner's goal."""
+        name, score = named("explorer", explorer, EXPLORERS)
+        if self._external is not None:
+            require_pursuing(name)
+        self.explorer, self._score = name, score
 
     def _choose(self, state: int) -> int:
         draws = self._draws.at(self.seed, self.transitions)
@@ -187,11 +194,18 @@ class CuriousLearner:
         for watch in WATCHERS:
             watch(self, transition)
 
-    def _replay(self, transitions: list[Transition]) -> None:
-        """Learn from recorded transitions; each decision is repeated, so that the next plan starts from the same values as before."""
+    def _replay(self, transitions: list[Transition], explorers: Mapping[int, str]) -> None:
+        """Learn from recorded transitions; each decision is repeated, so that the next plan starts from the same values as before.
+
+        `explorers`: by which decisions were made, from that number of transitions on.
+        """
         for transition in transitions:
+            if self.transitions in explorers:
+                self._explore_by(explorers[self.transitions])
             self._score(self, transition.s, self._draws.at(self.seed, self.transitions))
             self._learn(transition)
+        for explorer in list(explorers.values())[-1:]:  # also if it was changed during an action that was never observed
+            self._explore_by(explorer)
 
     def _pursued(self) -> Array:
         """Return the reward (S, A) for plans: that of the model, or of the agent's goal."""

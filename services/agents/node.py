@@ -12,8 +12,9 @@ import numpy as np
 from bus_schema import VERSION, keys
 from bus_schema.messages import Decision
 from bus_schema.messages import Transition as TransitionMessage
-from bus_schema.rpc import Done, Empty
-from mobee import ActionInterrupted, CuriousAgent, ReachTarget
+from bus_schema.rpc import Done, Empty, Explore
+from mobee import ActionInterrupted, CuriousAgent, MobeeError, ReachTarget
+from mobee.learning.explorers import EXPLORERS
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.record import load_learned
@@ -25,7 +26,7 @@ from services.agents.streams import LearnedStream, ReachStream, publish_decision
 from services.common.bus_plant import BusPlant
 from services.common.hands import hand_of
 from services.common.rate import NOT_MEASURED
-from services.common.service import Service
+from services.common.service import CallRefused, Service
 
 
 class Work:
@@ -85,6 +86,8 @@ class AgentNode:
         self._decisions = service.bus.publisher(Decision, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
         self._work = Work(service, plant, config.part)
+        self._bus = service.bus
+        service.on_request(keys.service_rpc(service.who, "explore"), Explore, self._explore)
         self._mark()
         service.mark, service.describe = self._mark, self._describe
 
@@ -93,6 +96,19 @@ class AgentNode:
         agent, wanted = self._agent, self._config.transitions
         resumed = f"{self._config.part} continues after {agent.transitions} transitions" if agent.transitions else ""
         self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
+
+    def _explore(self, request: Explore, key: str) -> Done:
+        """Choose the next actions by another explorer, and record that."""
+        valid = (*EXPLORERS, self._config.explorer)
+        if request.explorer not in valid:  # a call imports no code
+            raise CallRefused("explorer", f"no explorer {request.explorer!r}; valid: {', '.join(valid)}")
+        try:
+            self._agent.explore_by(request.explorer)
+        except MobeeError as error:
+            raise CallRefused("explorer", str(error)) from None
+        text = f"{self._config.part} explores by {self._agent.explorer} from now on, as {request.who} asked"
+        self._bus.event("info", "explorer", text)
+        return Done(v=VERSION)
 
     def _step(self) -> None:
         agent = self._agent

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 from bus_schema import encoding_of, keys
-from bus_schema.messages import Clock, Event, Motion, Transition
-from bus_schema.rpc import Done, Empty, Goal
+from bus_schema.messages import Clock, Decision, Event, Motion, Transition
+from bus_schema.rpc import Done, Empty, Explore, Goal
 from mobee import Lattice, load_robot
 from mobee.errors import UnknownName
 from mobee.store import STORE, TransitionStore
 from services.agents.config import Config
+from services.common.rpc import CallFailed
 from tests.services.an_explorer import last_action
 from tests.services.fake_controller import FakeController
 from tests.services.harness import Program, Rig, rig, wait_for
@@ -370,3 +371,23 @@ def test_an_agent_that_is_asked_to_rest_gives_its_goal_away_and_goes_on_later(st
     stage.rig.call(keys.service_rpc("agent_torso", "go_on"), Empty, Done)
     assert len(stage.made(before + 1)) > n
     agent.stop()
+
+
+def test_its_explorer_is_changed_on_request_and_kept_after_a_kill(stage: Stage) -> None:
+    decisions = stage.rig.record(Decision, "torso")
+    first = stage.agent()
+    stage.made(2)
+    explore = keys.service_rpc("agent_torso", "explore")
+    with pytest.raises(CallFailed, match="valid: curious, random"):
+        stage.rig.call(explore, Explore, Done, explorer="os:getcwd")
+    stage.rig.call(explore, Explore, Done, explorer="random")
+    wait_for(lambda: decisions[-1].explorer == "random", "a decision of the new explorer")
+    first.process.send_signal(signal.SIGKILL)
+    first.wait(20.0)
+    known = len(decisions)
+    stage.agent()
+    wait_for(lambda: len(decisions) > known, "a decision after the kill")
+    assert {one.explorer for one in decisions[known:]} == {"random"}
+    with TransitionStore(stage.folder / STORE, "torso", read_only=True) as store:
+        assert store.settings()["explorer"] == "curious"
+        assert list(store.explorers().values()) == ["random"]

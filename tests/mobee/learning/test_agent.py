@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.agent import CuriousAgent, run
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice
@@ -169,6 +169,52 @@ def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, options):
     assert np.array_equal(again.model.tries, whole.model.tries)
     if options.get("explorer", "curious") == "curious":  # who plans only for those who look starts elsewhere
         assert np.array_equal(again.plan()[1], whole.plan()[1])
+
+
+def test_an_agent_whose_explorer_was_changed_goes_on_as_if_it_had_never_stopped(tmp_path):
+    def make(name, plant):
+        return CuriousAgent(arm(), plant, seed=3, store=TransitionStore(tmp_path / name, "left_arm"))
+
+    whole = make("whole.sqlite", FickleDice(toy_robot(), seed=9))
+    whole.run(20)
+    whole.explore_by("least_tried")
+    whole.run(10)
+    whole.explore_by("curious")
+    whole.run(20)
+
+    first = make("parts.sqlite", FickleDice(toy_robot(), seed=9))
+    first.run(20)
+    first.explore_by("least_tried")
+    first.run(5)
+    first.store.close()
+    again = make("parts.sqlite", FickleDice(toy_robot(), seed=9, actions=25, start={"left_arm": np.array(first.last.q)}))
+    assert (again.explorer, again.settings["explorer"]) == ("least_tried", "curious")
+    again.run(5)
+    again.explore_by("curious")
+    again.run(20)
+    assert again.store.load() == whole.store.load()
+    assert np.array_equal(again.plan()[1], whole.plan()[1])
+    again.store.close()
+
+    continued = CuriousAgent(
+        arm(),
+        InstantPlant(toy_robot()),
+        seed=3,
+        store=TransitionStore(tmp_path / "more.sqlite", "left_arm"),
+        continues=tmp_path / "parts.sqlite",
+    )
+    assert continued.store.explorers() == {20: "least_tried", 30: "curious"}
+    assert np.array_equal(continued.plan()[1], whole.plan()[1])
+
+
+def test_an_explorer_that_ignores_the_agent_s_goal_is_not_changed_to():
+    space = arm()
+    agent = CuriousAgent(space, InstantPlant(space.robot), goal=[3])
+    with pytest.raises(InvalidValue, match="ignores a goal"):
+        agent.explore_by("random")
+    with pytest.raises(UnknownName, match="Did you mean 'random'"):
+        agent.explore_by("randon")
+    assert agent.explorer == "curious"
 
 
 def test_a_transition_is_on_disk_before_the_next_action(tmp_path):
