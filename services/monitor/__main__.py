@@ -11,7 +11,6 @@ from services.common.entry import explained, robot_of
 from services.common.service import Service
 from services.monitor.config import Config
 from services.monitor.node import MonitorNode
-from services.monitor.viewer.blueprint import blueprint, shown_of
 from services.monitor.viewer.output import open_output
 
 LAST_WORDS = 0.4  # s in which open pages learn that the system has ended
@@ -24,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         robot = robot_of(config)
         nodes: list[MonitorNode] = []
         with (
-            open_output(config, blueprint(shown_of(robot)), lambda: nodes[0].now if nodes else 0.0) as output,
+            open_output(config, robot, lambda: nodes[0].now if nodes else 0.0) as output,
             Service("monitor", config, robot) as service,
         ):
             nodes.append(MonitorNode(service, config, robot, output))

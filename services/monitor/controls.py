@@ -19,6 +19,7 @@ from bus_schema.rpc import (
     AddObject,
     Done,
     Empty,
+    Explore,
     Goal,
     MoveObject,
     ObjectState,
@@ -40,7 +41,8 @@ from mobee.robot.robot import Robot
 from services.common.hands import hand_for, hand_of, part_of
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.monitor.story.words import title_of
+from services.monitor.story.sentences import STRATEGIES
+from services.monitor.story.words import listed, title_of
 from services.monitor.web.board import Board
 from services.monitor.web.server import Refused
 
@@ -89,6 +91,7 @@ class PageControls:
             "reset": lambda given: self._reset(),
             "pace": self._pace,
             "fields": self._fields,
+            "explore": self._explore,
             "take": self._take_over,
             "give": self._give_back,
             "goal": self._goal,
@@ -175,6 +178,19 @@ class PageControls:
         shown = bool(given["shown"])
         self._service.inbox.put(lambda: self._show_fields(shown))
         return "The fields are shown." if shown else "The fields are hidden."
+
+    def _explore(self, given: dict[str, Any]) -> str:
+        """Change the explorer of the agent of a part, or of all agents."""
+        name = str(given["explorer"])
+        agents = [f"agent_{self._part(given)}"] if given.get("part") else [who for who in self._service.alive if who.startswith("agent_")]
+        if not agents:
+            raise Refused("no agent runs")
+        for agent in agents:
+            if not self._service.alive.get(agent):
+                raise Refused(f"{agent} does not run")
+            self._call(keys.service_rpc(agent, "explore"), Explore, Done, explorer=name)
+        whose = listed([title_of(agent.removeprefix("agent_")) for agent in sorted(agents)])
+        return f"From the next action on the {whose} explore{'s' if len(agents) == 1 else ''} {STRATEGIES.get(name, f'by {name}')}."
 
     # Parts
 

@@ -38,9 +38,10 @@ from services.common.worlds import AT_TABLE
 from services.monitor.config import Config
 from services.monitor.controls import Known, PageControls
 from services.monitor.status import STALE, Seen, banner
+from services.monitor.story.sentences import STRATEGIES
 from services.monitor.story.teller import Teller
 from services.monitor.story.words import joint_words, title_of
-from services.monitor.viewer.blueprint import TIMELINE
+from services.monitor.viewer.blueprint import TIMELINE, shown_of
 from services.monitor.viewer.learning import Learning
 from services.monitor.viewer.output import Output
 from services.monitor.viewer.plots import Plots
@@ -128,9 +129,18 @@ class MonitorNode:
             }
             for name, part in robot.parts.items()
         ]
-        shapes = shapes_of(robot, self._colors)
-        about = {"icub": robot.name in AT_TABLE, "lockstep": self._service.locked, "monitor": self._service.instance}
-        return {"name": robot.name, "parts": parts, "shapes": shapes, **about}
+        shown = shown_of(robot)
+        return {
+            "name": robot.name,
+            "parts": parts,
+            "shapes": shapes_of(robot, self._colors),
+            "eye": shown.eye.tolist(),
+            "target": shown.target.tolist(),
+            "explorers": STRATEGIES,
+            "icub": robot.name in AT_TABLE,
+            "lockstep": self._service.locked,
+            "monitor": self._service.instance,
+        }
 
     def _repeat(self, rate: Rate, look_: Callable[[], None]) -> None:
         def turn() -> None:

@@ -22,6 +22,7 @@ from services.monitor.viewer.scene import Scene
 from services.monitor.web.board import Board
 from services.monitor.web.body import look
 from services.monitor.web.server import Site
+from services.monitor.web.surfaces import surfaces_of
 
 PERIOD = 0.1  # s between two pictures
 NOT_SHOWN = ("q", "contacts")  # on the page they are the body
@@ -68,7 +69,8 @@ def replay(run: Path, port: int, tell: Callable[[str], None]) -> None:
     with tempfile.TemporaryDirectory(prefix="mobee-page-") as private:
         frames = Frames(None, blueprint(shown_of(story.robot), in_motion=False), "replay")
         scene = Scene(frames, story.robot)
-        site = Site(board, "", NoControls(), frames, ViewerFiles(Path(private)).path, lambda: player.now()[0], seek=player.seek)
+        files, surfaces = ViewerFiles(Path(private)).path, surfaces_of(story.robot)
+        site = Site(board, "", NoControls(), frames, files, lambda: player.now()[0], seek=player.seek, surfaces=surfaces)
         server = serve(site, HOST, port)
         tell(f"http://{HOST}:{server.port}/")
         begin = time.monotonic()
@@ -83,13 +85,14 @@ def replay(run: Path, port: int, tell: Callable[[str], None]) -> None:
 
 def _show(story: Story, player: Player, board: Board, frames: Frames, scene: Scene, clock: float) -> None:
     at, plays = player.now()
-    values = story.at(at)
+    values, shown = story.at(at), shown_of(story.robot)
+    camera = {"eye": shown.eye.tolist(), "target": shown.target.tolist()}
     q = np.array(values["q"])
     contacts = [_contact(one) for one in values.get("contacts", [])]
     board.put("player", {"at": round(at, 1), "length": round(story.length, 1), "plays": plays})
     for name, value in values.items():
         if name not in NOT_SHOWN:
-            board.put(name, value)
+            board.put(name, value | camera if name == "robot" else value)
     board.put("body", {"t": round(at, 2), "q": values["q"], **look(story.robot, q, contacts)})
     frames.set_time(TIMELINE, clock)  # not the time of the story: a viewer shows the newest time, also after a step back
     scene.set_objects([object_of(one) for one in values.get("objects", [])])

@@ -13,14 +13,15 @@ from services.monitor.story.words import action_words, displacement, listed, ord
 
 UNSURE = 0.05  # an outcome that is likelier than the goal by less is not expected
 STRATEGIES = {
-    "curious": "by curiosity: it goes where it expects to learn most",
+    "curious": "by curiosity",
     "random": "at random",
-    "least_tried": "by the action that it has tried least here",
+    "least_tried": "by what was tried least",
     "nearest_untried": "by the shortest path to an untried action",
     "count_bonus": "by a bonus for rarely tried actions",
     "posterior_sampling": "by curiosity under a drawn model",
     "depleting": "by curiosity that plans for what will be left",
 }
+WITHOUT_PLAN = {"random": "it chooses at random", "least_tried": "it chooses what it tried least from where it is"}
 
 
 def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:
@@ -62,6 +63,8 @@ def surprise_sentence(seen: Transition) -> str:
 
 def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence[int]) -> str:
     """Return where the agent's plan leads and why; `untried`, `actions`: of each state, how many actions were never tried, and all."""
+    if decision.explorer in WITHOUT_PLAN:
+        return f"nothing in particular: {WITHOUT_PLAN[decision.explorer]}."
     end = decision.plan[-1] if decision.plan else decision.goal
     steps = len(decision.plan)
     if not untried or end >= len(untried):

@@ -15,6 +15,7 @@ from mobee.learning.beliefs import surprise_of
 from mobee.learning.space import Space
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot
+from services.monitor.story.baselines import Curve, baselines, outcomes_of
 from services.monitor.story.knowledge import Knowledge, knowledge_of
 from services.monitor.story.places import MAX_STATES, Spot, base_link, places, shown_spot, space_of
 from services.monitor.story.sentences import (
@@ -30,6 +31,7 @@ from services.monitor.story.words import action_words, title_of
 
 RECENT = 60  # transitions whose surprise is shown
 LARGEST_CURVE = 400  # points
+GROWTH = 1.1  # in transitions, after which the baselines are simulated again: the agent knows more of their world
 
 
 @dataclass
@@ -45,10 +47,13 @@ class _Agent:
     known: Knowledge | None = None
     first: float = 0.0  # nats: the largest information gain ever seen
     decision: Decision | None = None
+    explorer: str = ""  # of its newest decision
     last: Transition | None = None
     reach: Reach | None = None
     recent: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=RECENT))  # surprise, whether the goal was reached
-    curve: list[tuple[int, float, float]] = field(default_factory=list)  # transitions, share tried, share predictable
+    curve: Curve = field(default_factory=list)
+    baselines: dict[str, Curve] = field(default_factory=dict)  # by explorer
+    simulated: int = 0  # transitions up to which the baselines were simulated
 
 
 class Teller:
@@ -75,7 +80,7 @@ class Teller:
         """An agent begins an action."""
         agent = self._agent(seen.agent)
         if agent is not None:
-            agent.decision = seen
+            agent.decision, agent.explorer = seen, seen.explorer
             self.changed |= {"cards", "left"}
 
     def note_transition(self, seen: Transition) -> None:
@@ -101,6 +106,10 @@ class Teller:
             agent.curve.append((known.n, round(known.tried, 4), round(known.predictable, 4)))
             if len(agent.curve) > LARGEST_CURVE:
                 agent.curve = agent.curve[::2]
+        if known.n > GROWTH * agent.simulated:
+            outcomes = outcomes_of(learned, known, agent.space)
+            agent.baselines, agent.simulated = baselines(outcomes, known.exists, known.state, known.n), known.n
+            self.changed.add("baselines")
         self.changed |= {"cards", "left", "curves"}
 
     def note_reach(self, part: str, reach: Reach) -> None:
@@ -128,6 +137,7 @@ class Teller:
         agent.settings, agent.space = settings, space_of(settings, self._robot)
         agent.where = agent.known = None
         agent.curve.clear()
+        agent.baselines, agent.simulated = {}, 0
         if agent.space is not None and agent.space.part != agent.part:
             agent.space = None
         if agent.space is not None and len(agent.space) <= MAX_STATES:
@@ -147,6 +157,8 @@ class Teller:
         if known is not None and space is not None:
             card |= {"n": known.n, "states": len(space), "actions": int(known.exists.sum())}
             card |= {"tried": round(known.tried, 4), "predictable": round(known.predictable, 4)}
+        if agent.explorer:
+            card["explorer"] = agent.explorer
         if decision is not None and space is not None and max(decision.s, decision.goal) < len(space):
             card["now"] = tries_sentence(decision, space, agent.where)
             card["expects"] = expects_sentence(decision)
@@ -169,6 +181,7 @@ class Teller:
                 "link": base_link(self._robot, part),
                 "marker": title_of(agent.spot.name),
                 "points": np.round(agent.where, 4).tolist(),
+                "tip": {"link": agent.spot.link, "point": np.round(agent.spot.position, 4).tolist()},
             }
             for part, agent in self._agents.items()
             if agent.where is not None and agent.spot is not None
@@ -188,6 +201,9 @@ class Teller:
                 "path": [] if decision is None else [decision.goal, *decision.plan],
             }
         return found
+
+    def _baselines(self) -> dict[str, Any]:
+        return {part: agent.baselines for part, agent in self._agents.items() if agent.baselines}
 
     def _curves(self) -> dict[str, Any]:
         return {part: agent.curve for part, agent in self._agents.items() if agent.curve}

@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import rerun as rr
-import rerun.blueprint as rrb
 
+from mobee.robot.robot import Robot
 from services.common.exit_codes import BAD_INPUT
 from services.monitor.config import Config
+from services.monitor.viewer.blueprint import blueprint, shown_of
 from services.monitor.viewer.files import ViewerFiles
 from services.monitor.viewer.frames import Frames
 from services.monitor.web.board import Board
 from services.monitor.web.record import STORY, Record
 from services.monitor.web.server import Controls, PageServer, Refused, Site
+from services.monitor.web.surfaces import surfaces_of
 
 HOST = "127.0.0.1"
 RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
@@ -68,12 +70,12 @@ class Output:
 
 
 @contextmanager
-def open_output(config: Config, layout: rrb.Blueprint, now: Callable[[], float]) -> Iterator[Output]:
+def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Iterator[Output]:
     """Serve as configured, and record to a run_dir if there is one; exits with code 2 and one line if a port cannot be used.
 
     `now`: the robot's time, s.
     """
-    folder = _folder_of(config)
+    folder, layout = _folder_of(config), blueprint(shown_of(robot))
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
         record = Record(folder / STORY, now) if folder else None
         board = Board(record.put if record else None)
@@ -88,7 +90,7 @@ def open_output(config: Config, layout: rrb.Blueprint, now: Callable[[], float])
         try:
             if config.serve:
                 key = _key_of(folder)
-                site = Site(board, key, controls, frames, ViewerFiles(Path(private)).path, now)
+                site = Site(board, key, controls, frames, ViewerFiles(Path(private)).path, now, surfaces=surfaces_of(robot))
                 server = serve(site, config.bind, config.web_port)
                 url = f"http://{HOST}:{config.web_port}/?key={key}"
             yield Output(frames, board, record, server, controls, url)

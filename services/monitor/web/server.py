@@ -26,9 +26,10 @@ NEWS_PATIENCE = 5.0  # s that a request for news waits
 FRAME_PATIENCE = 2.0  # s that a request for the 3D view waits
 GONE = 6.0  # s without a request after which a page counts as closed
 LARGEST_CALL = 20_000  # bytes
+NAMED = ("127.0.0.1", "localhost")  # under one name the page is served, under the other the viewer that it embeds
 POLICY = (
     "default-src 'self'; connect-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' data: blob:; worker-src 'self' blob:; frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+    "img-src 'self' data: blob:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-src {both}; frame-ancestors {both}"
 )
 """Content security policy: the browser itself refuses every address but this server."""
 
@@ -80,6 +81,7 @@ class Site:
     """What the server serves.
 
     `key`: the word in the page's address without which a page shows everything and can do nothing.
+    `surfaces`: returns the robot as triangles, see web/surfaces.py.
     `viewer_file`: returns the path of a file of Rerun's viewer, by name; None: there is no 3D view.
     `time`: the robot's time now, s.  `others`: further files, by the name under which they are served.
     `seek`: moves in time on a page that shows the past, given the query of the address.
@@ -93,6 +95,7 @@ class Site:
     time: Callable[[], float]
     others: Mapping[str, Path] = field(default_factory=dict)
     seek: Callable[[Mapping[str, str]], None] | None = None
+    surfaces: Callable[[], bytes] = bytes
     pages: Pages = field(default_factory=Pages)
 
 
@@ -156,6 +159,8 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send_news(query)
             elif name == "frame":
                 self._send_frame(query)
+            elif name == "surfaces":
+                self._send(HTTPStatus.OK, "application/octet-stream", self._site.surfaces())
             elif name == "seek" and self._site.seek is not None:
                 self._site.seek(query)
                 self._send(HTTPStatus.NO_CONTENT, "text/plain", b"")
@@ -243,7 +248,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Type", f"{kind}; charset=utf-8" if kind.startswith("text/") else kind)
         self.send_header("Content-Length", str(length))
         self.send_header("Cache-Control", "max-age=3600" if cache else "no-store")
-        self.send_header("Content-Security-Policy", POLICY)
+        port = self.headers.get("Host", "").rpartition(":")[2]
+        both = " ".join(["'self'", *(f"http://{name}:{port}" for name in NAMED if port.isdecimal())])
+        self.send_header("Content-Security-Policy", POLICY.format(both=both))
         self.send_header("X-Content-Type-Options", "nosniff")
         self.send_header("Referrer-Policy", "no-referrer")
         self.end_headers()

@@ -7,11 +7,12 @@ const NEAR = 13; // pixels
 const DARK = [26, 34, 44];
 
 export class BodyPicture {
-  constructor(canvas, tip, { dropped, picked }) {
+  constructor(canvas, tip, { dropped, picked, changed }) {
     this.canvas = canvas;
     this.tip = tip;
     this.dropped = dropped; // (name, place): an object was dragged there
     this.picked = picked; // (place or null): a place was clicked
+    this.changed = changed; // (): the picture is to be drawn again
     this.robot = null;
     this.body = null;
     this.objects = [];
@@ -27,11 +28,16 @@ export class BodyPicture {
     this.listen();
   }
 
+  touch() {
+    this.dirty = true;
+    this.changed();
+  }
+
   look(name) {
     this.view = [...VIEWS[name]];
     if (!this.isIcub() && name !== "top") this.view[0] += 180;
     this.frame = null;
-    this.dirty = true;
+    this.touch();
   }
 
   isIcub() {
@@ -254,7 +260,7 @@ export class BodyPicture {
       if (!start.moved) return;
       if (this.dragging) this.dragging.thing.position = this.unproject(x, y, this.dragging.from);
       else this.view = [start.view[0] + (x - start.x) * 0.5, Math.min(89, Math.max(-20, start.view[1] + (y - start.y) * 0.4))];
-      this.dirty = true;
+      this.touch();
     });
     this.canvas.addEventListener("pointerup", (event) => {
       if (!start) return;
@@ -271,7 +277,7 @@ export class BodyPicture {
         this.place = spot ? spot.place : this.unproject(x, y, this.handPlace());
         this.picked(this.place, null);
       }
-      this.dirty = true;
+      this.touch();
     });
     this.canvas.addEventListener("pointerleave", () => (this.tip.hidden = true));
   }

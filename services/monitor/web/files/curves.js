@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The curve of what is known, and the small plot of surprise on each card.
+// The curves of what each agent knows beside what other explorers would, and the small plot of surprise on each card.
 
-const MARGIN = { left: 46, right: 14, top: 24, bottom: 30 };
+const MARGIN = { left: 40, right: 10, top: 22, bottom: 30 };
+const LEGEND = 20; // pixels
+const OTHERS = { least_tried: ["least tried", "#b9c4cf", []], random: ["random", "#7c8a99", [2, 3]] };
 
 export function sharpened(canvas) {
   const ratio = window.devicePixelRatio || 1;
@@ -15,7 +17,8 @@ export function sharpened(canvas) {
   return { ink, width, height };
 }
 
-export function drawCurves(canvas, curves, colors, waiting) {
+// One plot for each agent, side by side.  `curves`: rows of transitions, share tried, share predictable; `baselines`: by explorer the same.
+export function drawCurves(canvas, curves, baselines, colors, titles, waiting) {
   const { ink, width, height } = sharpened(canvas);
   if (!width || !height) return;
   const names = Object.keys(curves);
@@ -24,51 +27,90 @@ export function drawCurves(canvas, curves, colors, waiting) {
     ink.fillText(waiting, 16, 30);
     return;
   }
-  const newest = Math.max(8, ...names.map((name) => curves[name].at(-1)[0]));
-  const grows = newest - Math.min(...names.map((name) => curves[name][0][0]));
-  const most = grows > newest / 4 ? nice(newest) : newest + Math.max(2, Math.round(grows / 4));
-  const top = Math.min(1, nice(100 * Math.max(0.05, ...names.map((name) => curves[name].at(-1)[1]))) / 100);
-  const begun = Math.min(...names.map((name) => curves[name][0][0]));
-  const least = begun > most / 4 ? Math.floor(begun) : 0; // agents that go on after an earlier run
+  drawLegend(ink, width);
+  const each = width / names.length;
+  names.forEach((name, i) => {
+    ink.save();
+    ink.translate(i * each, LEGEND);
+    drawPlot(ink, each, height - LEGEND, curves[name], baselines[name] || {}, colors[name], titles[name]);
+    ink.restore();
+  });
+}
+
+function drawLegend(ink, width) {
+  const entries = [["tried at least once", "#e9edf2", [], 2.2], ["predictable", "#e9edf2", [4, 4], 1.6]];
+  for (const [text, color, dash] of Object.values(OTHERS)) entries.push([`${text}: tried`, color, dash, 1.4]);
+  let at = 10;
+  ink.textAlign = "left";
+  for (const [text, color, dash, thick] of entries) {
+    if (at + 30 + ink.measureText(text).width > width) break;
+    ink.strokeStyle = color;
+    ink.setLineDash(dash);
+    ink.lineWidth = thick;
+    line(ink, [[at, 11], [at + 20, 11]]);
+    ink.fillStyle = "#c2ccd6";
+    ink.fillText(text, at + 25, 15);
+    at += 40 + ink.measureText(text).width;
+  }
+  ink.setLineDash([]);
+}
+
+function drawPlot(ink, width, height, curve, others, color, title) {
+  const [begun, newest] = [curve[0][0], curve.at(-1)[0]];
+  const grows = newest - begun;
+  const least = begun > newest / 4 ? begun : 0; // an agent that goes on after an earlier run
+  const most = grows > newest / 4 ? nice(Math.max(8, newest)) : newest + Math.max(2, Math.round(grows / 4));
+  const ends = [curve.at(-1)[1], ...Object.values(others).map((points) => points.at(-1)[1])];
+  const top = Math.min(1, nice(100 * Math.max(0.05, ...ends)) / 100);
   const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (n - least)) / (most - least);
   const y = (share) => height - MARGIN.bottom - ((height - MARGIN.top - MARGIN.bottom) * share) / top;
   ink.strokeStyle = "#262f3a";
   ink.fillStyle = "#98a5b3";
   ink.lineWidth = 1;
+  const steps = width > 320 ? 4 : 2;
   for (let step = 0; step <= 4; step++) {
     const share = (top * step) / 4;
     line(ink, [[MARGIN.left, y(share)], [width - MARGIN.right, y(share)]]);
     ink.textAlign = "right";
-    ink.fillText(`${+(100 * share).toFixed(1)} %`, MARGIN.left - 5, y(share) + 4);
-    ink.textAlign = "center";
-    const n = least + ((most - least) * step) / 4;
-    ink.fillText(`${Math.round(n)}`, x(n), height - MARGIN.bottom + 13);
+    if (height > 120 || step % 2 === 0) ink.fillText(`${+(100 * share).toFixed(1)} %`, MARGIN.left - 5, y(share) + 4);
   }
-  ink.fillText("transitions that the agent has observed", (MARGIN.left + width) / 2, height - 4);
-  for (const name of names) {
-    ink.strokeStyle = `rgb(${colors[name]})`;
-    for (const [column, dash, thick] of [[1, [], 2.2], [2, [4, 4], 1.6]]) {
-      ink.setLineDash(dash);
-      ink.lineWidth = thick;
-      const points = curves[name].map((point) => [x(point[0]), y(Math.min(top, point[column]))]);
-      line(ink, points);
-      if (points.length === 1) dot(ink, points[0], `rgb(${colors[name]})`);
-    }
+  for (let step = 0; step <= steps; step++) {
+    const n = least + ((most - least) * step) / steps;
+    ink.textAlign = step === steps ? "right" : "center";
+    ink.fillText(`${Math.round(n)}`, x(n) + (step === steps ? 6 : 0), height - MARGIN.bottom + 13);
   }
+  ink.textAlign = "center";
+  ink.fillText("transitions", (MARGIN.left + width - MARGIN.right) / 2, height - 4);
+  ink.save();
+  ink.beginPath();
+  ink.rect(MARGIN.left, 0, width - MARGIN.left, height);
+  ink.clip();
+  for (const [name, points] of Object.entries(others)) {
+    const [, shade, dash] = OTHERS[name] || [name, "#98a5b3", []];
+    ink.strokeStyle = shade;
+    ink.setLineDash(dash);
+    ink.lineWidth = 1.4;
+    line(ink, points.filter(([n]) => n >= least).map((point) => [x(point[0]), y(Math.min(top, point[1]))]));
+  }
+  ink.strokeStyle = `rgb(${color})`;
+  for (const [column, dash, thick] of [[1, [], 2.2], [2, [4, 4], 1.6]]) {
+    ink.setLineDash(dash);
+    ink.lineWidth = thick;
+    const points = curve.map((point) => [x(point[0]), y(Math.min(top, point[column]))]);
+    line(ink, points);
+    if (points.length === 1) dot(ink, points[0], `rgb(${color})`);
+  }
+  ink.restore();
   ink.setLineDash([]);
   ink.textAlign = "left";
-  ink.fillStyle = "#e9edf2";
-  let at = MARGIN.left;
-  const legend = [["share of its actions tried at least once", []], ["predictable: tried twice or more, at least 80 % alike", [4, 4]]];
-  for (const [text, dash] of legend) {
-    ink.strokeStyle = "#e9edf2";
-    ink.setLineDash(dash);
-    ink.lineWidth = 2;
-    line(ink, [[at, 12], [at + 22, 12]]);
-    ink.fillText(text, at + 28, 16);
-    at += 44 + ink.measureText(text).width;
+  ink.fillStyle = `rgb(${color})`;
+  ink.fillText(title, MARGIN.left, 13);
+  const gain = newest > 20 && others.random?.length ? others.random.at(-1)[1] : 0;
+  if (gain > 0) {
+    ink.fillStyle = "#c2ccd6";
+    ink.textAlign = "right";
+    ink.fillText(`${(curve.at(-1)[1] / gain).toFixed(1)} × random`, width - MARGIN.right, 13);
   }
-  ink.setLineDash([]);
 }
 
 export function drawSurprise(canvas, recent, hue) {

@@ -37,12 +37,25 @@ export class MovePanel {
     const fields = button("Fields (F)", () => document.dispatchEvent(new KeyboardEvent("keydown", { key: "f", bubbles: true })));
     const resets = button("Reset (0, twice)", () => document.dispatchEvent(new KeyboardEvent("keydown", { key: "0", bubbles: true })));
     const release = button("Release the stop (R)", () => this.send("release"));
+    const explorers = this.explorers();
     this.sliders = found.motors.map((motor) => this.slider(motor));
     const box = document.createElement("div");
     box.className = "sliders";
     box.append(...this.sliders.map((one) => one.label));
-    this.panel.replaceChildren(parts, row(this.takes, this.gives, reaches, release, fields, resets), box);
+    this.panel.replaceChildren(parts, row(this.takes, this.gives, explorers, reaches, release, fields, resets), box);
     this.update();
+  }
+
+  // The choice of how the agent of the part explores.
+  explorers() {
+    const label = document.createElement("label");
+    this.explorer = document.createElement("select");
+    this.explorer.replaceChildren(...Object.entries(this.robot.explorers || {}).map(([name, words]) => new Option(words, name)));
+    this.explorer.title = "How the agent of this part chooses its actions (X)";
+    this.explorer.addEventListener("change", () => this.send("explore", { part: this.part, explorer: this.explorer.value }));
+    label.append("explores (X)", this.explorer);
+    this.explores = label;
+    return label;
   }
 
   slider(motor) {
@@ -78,6 +91,9 @@ export class MovePanel {
     this.takes.disabled = this.isTaken();
     this.gives.disabled = !this.isTaken();
     for (const one of this.sliders) one.input.disabled = !this.isTaken();
+    const card = this.state.cards.find((one) => one.part === this.part);
+    this.explores.hidden = !card?.explorer;
+    if (card?.explorer && document.activeElement !== this.explorer) this.explorer.value = card.explorer;
   }
 
   // The sliders of a part that is not taken show where it is.

@@ -3,16 +3,18 @@
 import { BodyPicture, title } from "./body.js";
 import { drawCurves, drawSurprise } from "./curves.js";
 import { MovePanel } from "./move.js";
+import { View } from "./view.js";
 
 const $ = (id) => document.getElementById(id);
 const key = new URLSearchParams(location.search).get("key") || "";
 const me = sessionStorage.getItem("page") || Math.random().toString(36).slice(2, 12);
 sessionStorage.setItem("page", me);
 
-const state = { robot: null, status: {}, control: {}, cards: [], curves: {}, connected: false, viewerTime: null, past: false, pace: 0, place: null };
+const state = { robot: null, status: {}, control: {}, cards: [], curves: {}, baselines: {}, connected: false, past: false, pace: 0, place: null };
 const colorOf = (part) => state.robot?.parts.find((one) => one.name === part)?.color || [152, 165, 179];
 
 const picture = new BodyPicture($("body"), $("tip"), {
+  changed: () => redraw(),
   dropped: async (name, place) => {
     if (await send("place", { name, position: place })) send("reach", { object: name });
   },
@@ -21,6 +23,7 @@ const picture = new BodyPicture($("body"), $("tip"), {
     say(place ? "A place is picked: H lets the nearest hand reach for it." : `The ${name} is picked: H lets the nearest hand reach for it; or drag it.`);
   },
 });
+const view = new View({ frame: $("viewer"), canvas: $("scene"), note: $("loading"), button: $("other-view") });
 const move = new MovePanel($("move"), { send, state });
 
 // ---- calls
@@ -56,14 +59,15 @@ async function follow() {
   let after = 0;
   for (;;) {
     try {
-      const late = `${picture.body ? `&body=${picture.body.t}` : ""}${state.viewerTime === null ? "" : `&viewer=${state.viewerTime}`}`;
+      const late = `${drawn === null ? "" : `&body=${drawn}`}${view.rerunTime === null || state.past ? "" : `&viewer=${view.rerunTime}`}`;
       const answer = await fetch(`news?after=${after}&page=${me}${late}`);
       if (!answer.ok) throw new Error(answer.statusText);
       const news = await answer.json();
       state.connected = true;
       after = news.version;
       show(news);
-      await new Promise((resolve) => (document.hidden ? setTimeout(resolve, 500) : requestAnimationFrame(resolve)));
+      await nextFrame(); // in which the news are drawn
+      await nextFrame(); // the one before has been made
     } catch (error) {
       console.debug(error);
       state.connected = false;
@@ -74,6 +78,8 @@ async function follow() {
   }
 }
 
+const nextFrame = () => new Promise((resolve) => (document.hidden ? setTimeout(resolve, 250) : requestAnimationFrame(resolve)));
+
 const shows = {
   robot(robot) {
     const restarted = state.robot && state.robot.monitor !== robot.monitor;
@@ -83,7 +89,8 @@ const shows = {
     picture.look("oblique");
     move.build(robot);
     showLegend();
-    if (restarted && $("viewer").src) reloadViewer();
+    view.open(robot);
+    if (restarted) view.reload();
   },
   status(status) {
     state.status = status;
@@ -97,29 +104,34 @@ const shows = {
   },
   body(body) {
     picture.body = body;
-    picture.dirty = true;
+    picture.touch();
     move.follow(body.q);
   },
   objects(objects) {
     if (!picture.dragging) picture.objects = objects;
-    picture.dirty = true;
+    picture.touch();
     move.update();
   },
   places(places) {
     picture.places = places;
-    picture.dirty = true;
+    picture.touch();
     showLegend();
   },
   left(left) {
     picture.left = left;
-    picture.dirty = true;
+    picture.touch();
   },
   cards(cards) {
     state.cards = cards;
     showCards();
+    move.update();
   },
   curves(curves) {
     state.curves = curves;
+    showCurves();
+  },
+  baselines(baselines) {
+    state.baselines = baselines;
     showCurves();
   },
   events(events) {
@@ -204,14 +216,23 @@ function labelled(kind, label, text) {
 function showCards() {
   const known = new Set(state.cards.map((card) => title(card.part)));
   const silent = (state.status.agents || []).filter((name) => !known.has(name));
-  const cards = state.cards.map(card);
+  const cards = state.cards.map(keptCard);
   for (const name of silent) cards.push(waiting(name, "Its agent is up. Waiting for its first decision."));
   if (!cards.length) cards.push(waiting("No agent moves this robot", state.robot ? "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders." : "Waiting for the robot."));
   $("cards").replaceChildren(...cards);
   for (const one of state.cards) {
-    const plot = $("cards").querySelector(`[data-part="${one.part}"] canvas`);
-    if (plot) drawSurprise(plot, one.recent, colorOf(one.part));
+    const { made, text, plotted } = kept.get(one.part);
+    if (plotted === text) continue;
+    drawSurprise(made.querySelector("canvas"), one.recent, colorOf(one.part));
+    kept.get(one.part).plotted = text;
   }
+}
+
+const kept = new Map(); // cards by part, with what they were made from: one that has not changed is not made again
+function keptCard(one) {
+  const text = JSON.stringify([one, picture.chosen === one.part, state.control.taken]);
+  if (kept.get(one.part)?.text !== text) kept.set(one.part, { made: card(one), text });
+  return kept.get(one.part).made;
 }
 
 function waiting(name, text) {
@@ -235,7 +256,6 @@ function card(one) {
   else if (taken) made.append(node("p", "now", "Taken over on this page. Its agent rests. G gives it back."));
   else if (one.now) {
     const now = node("p", "", node("b", "", "Tries "), node("strong", "now", one.now), ` ${one.expects}`);
-    now.title = one.chooses ? `It chooses ${one.chooses}.` : "";
     made.append(now);
   } else if (!one.last) made.append(node("p", "", "Waiting for its first action to begin."));
   if (one.last) {
@@ -248,7 +268,7 @@ function card(one) {
   } else if (one.now && !taken) {
     made.append(node("p", "", one.n ? `It goes on after ${one.n} transitions of an earlier run.` : "Its first action has not ended yet: nothing is learned so far."));
   }
-  if (one.wants && !taken) made.append(labelled("", "Wants", one.wants));
+  if (one.wants && !taken) made.append(labelled("", one.wants.startsWith("nothing") ? "Wants" : `Wants, ${one.chooses},`, one.wants));
   made.addEventListener("click", () => choose(picture.chosen === one.part ? null : one.part));
   return made;
 }
@@ -260,7 +280,7 @@ function share(part) {
 
 function choose(part) {
   picture.chosen = part;
-  picture.dirty = true;
+  picture.touch();
   $("wonders-of").textContent = part ? title(part) : "";
   if (part) move.choose(part);
   showCards();
@@ -289,38 +309,13 @@ function showLegend() {
 function showCurves() {
   if ($("knows").hidden) return;
   const colors = Object.fromEntries(Object.keys(state.curves).map((part) => [part, colorOf(part)]));
-  drawCurves($("curves"), state.curves, colors, "The curve begins when an agent has ended its first action.");
+  const titles = Object.fromEntries(Object.keys(state.curves).map((part) => [part, title(part)]));
+  drawCurves($("curves"), state.curves, state.baselines, colors, titles, "The curve begins when an agent has ended its first action.");
 }
-
-// ---- the 3D view
-
-function openViewer() {
-  const frame = $("viewer");
-  if (frame.src || window.innerWidth < 640) {
-    if (!frame.src) $("loading").textContent = "The 3D view needs a wide window.";
-    return;
-  }
-  frame.src = "viewer.html";
-  frame.hidden = false;
-}
-
-addEventListener("message", (event) => {
-  if (event.source !== $("viewer").contentWindow || event.origin !== location.origin) return;
-  const { kind, share: part, time, text } = event.data;
-  if (kind === "loading") $("loading").textContent = `The 3D view loads: ${Math.round(100 * part)} %. The story beside it is live already.`;
-  if (kind === "ready") $("loading").textContent = "The 3D view draws its first picture.";
-  if (kind === "shown") $("loading").hidden = true;
-  if (kind === "time") {
-    state.viewerTime = state.past ? null : time;
-  }
-  if (kind === "failed") {
-    $("loading").hidden = false;
-    $("loading").textContent = `The 3D view has failed (${String(text).slice(0, 200)}). Press V to load it again.`;
-  }
-});
 
 // ---- keys and buttons
 
+const QUICK_EXPLORERS = ["curious", "least_tried", "random"];
 let resets = 0;
 let seeking = 0;
 function seek(at) {
@@ -336,29 +331,43 @@ const actions = {
   m: ["tab-move", "move a part: sliders, take over (T), give back (G)", () => tab("move")],
   t: ["take", "take the chosen part over from its agent", () => move.take()],
   g: ["give", "give the chosen part back", () => move.give()],
+  x: ["explorer", "change how the agents explore: curious, least tried, random", () => nextExplorer()],
   n: ["next", "choose the next part", () => move.next()],
   h: ["reach", "let the nearest hand reach for the place or ball that was clicked", () => (state.place ? send("reach", state.place) : say("Click a place in the picture of the body first.", true))],
   b: ["ball", "let the nearest hand reach for the ball (the first target in the world)", () => move.reachTarget(picture.objects)],
   f: ["fields", "show or hide the fields around the body", () => toggleFields()],
-  "1": ["view-oblique", "see the body from the front, left and above (drag turns it)", () => picture.look("oblique")],
-  "2": ["view-front", "see it from the front", () => picture.look("front")],
-  "3": ["view-top", "see it from above", () => picture.look("top")],
-  "4": ["view-side", "see it from the side", () => picture.look("side")],
+  "1": ["view-oblique", "see the body from the front, left and above (drag turns it)", () => look("oblique")],
+  "2": ["view-front", "see it from the front", () => look("front")],
+  "3": ["view-top", "see it from above", () => look("top")],
+  "4": ["view-side", "see it from the side", () => look("side")],
   p: ["part", "show the places of one agent after the other, then of all", () => chooseNext()],
   k: ["tab-knows", "what the agents know, as curves", () => tab("knows")],
   e: ["tab-events", "the events", () => tab("events")],
   "+": ["faster", "lockstep: double the largest speed", () => pace(2)],
   "-": ["slower", "lockstep: halve the largest speed", () => pace(0.5)],
   "0": ["reset", "start the simulation again at home (press twice)", () => resetTwice()],
-  v: ["viewer", "load the 3D view again", () => reloadViewer()],
+  v: ["viewer", "change between the light 3D view and Rerun's, which has plots, eyes and events too", () => view.toggle()],
   "?": ["help", "list these keys", () => help()],
 };
 const byName = { ...Object.fromEntries(Object.values(actions).map(([name, , act]) => [name, act])), play: () => fetch("seek?toggle=1") };
 
+function look(name) {
+  picture.look(name);
+  view.scene.turn(name);
+  redraw();
+}
+
 function toggleFields() {
   picture.fields = !picture.fields;
-  picture.dirty = true;
+  picture.touch();
   if (key && !state.past) send("fields", { shown: picture.fields });
+}
+
+// The explorer after the one by which the shown agent, or the first, chooses now.
+function nextExplorer() {
+  const part = picture.chosen || "";
+  const now = state.cards.find((one) => !part || one.part === part)?.explorer;
+  send("explore", { part, explorer: QUICK_EXPLORERS[(QUICK_EXPLORERS.indexOf(now) + 1) % QUICK_EXPLORERS.length] });
 }
 
 function pace(factor) {
@@ -371,14 +380,6 @@ function resetTwice() {
   if (performance.now() - resets < 2500) return send("reset");
   resets = performance.now();
   say("Press 0 again to start the simulation anew.");
-}
-
-function reloadViewer() {
-  $("viewer").src = "";
-  $("viewer").removeAttribute("src");
-  $("loading").hidden = false;
-  state.viewerTime = null;
-  openViewer();
 }
 
 function tab(name) {
@@ -416,17 +417,36 @@ document.addEventListener("click", (event) => {
 $("seek").addEventListener("input", () => seek($("seek").value));
 const watch = new ResizeObserver(() => {
   picture.frame = null;
-  picture.dirty = true;
+  picture.touch();
   showCurves();
 });
 watch.observe($("body"));
 watch.observe($("knows"));
 
-function animate() {
-  picture.draw();
-  requestAnimationFrame(animate);
+// What the agents' hands do now, for the 3D view: where each is, and where its action leads.
+function marks() {
+  const found = [];
+  for (const [part, where] of Object.entries(picture.places)) {
+    const left = picture.left[part];
+    if (!left || (picture.chosen && picture.chosen !== part)) continue;
+    const at = (index) => (where.points[index] ? picture.moved(where.link, where.points[index]) : null);
+    found.push({ part, color: colorOf(part), hand: where.tip ? picture.moved(where.tip.link, where.tip.point) : null, to: left.path.length ? at(left.path[0]) : null });
+  }
+  return found;
 }
 
-animate();
+let drawn = null; // s of robot time of the newest body that was drawn
+let isDue = false;
+function redraw() {
+  if (isDue) return;
+  isDue = true;
+  requestAnimationFrame(() => {
+    isDue = false;
+    picture.draw();
+    if (!picture.body || !picture.robot) return;
+    if (!$("scene").hidden) view.scene.draw(picture.body, picture.objects, marks(), picture.fields);
+    drawn = picture.body.t;
+  });
+}
+
 follow();
-setTimeout(openViewer, 1500); // after the story, which is light

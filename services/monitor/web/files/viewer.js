@@ -17,8 +17,10 @@ function onEvent(text) {
   }
 }
 
+const page = new URLSearchParams(window.location.search).get("page") || window.location.origin; // that embeds this viewer
+
 function tell(message) {
-  window.parent.postMessage(message, window.location.origin);
+  window.parent.postMessage(message, page);
 }
 
 function pieces(buffer) {
@@ -60,10 +62,12 @@ async function follow(handle) {
       }
       if (frame.found.length) {
         after = frame.number;
-        tell({ kind: "frame", number: after });
+        const came = performance.now();
         await hasShown(frame.time);
         await new Promise((resolve) => requestAnimationFrame(resolve));
-        if (++frames === 2) tell({ kind: "shown" }); // with the first one the viewer may still read the meshes
+        frames += 1;
+        if (frames === 2) tell({ kind: "shown" }); // with the first one the viewer may still read the meshes
+        if (frames > 2) tell({ kind: "frame", delay: (performance.now() - came) / 1000 });
       }
     } catch (error) {
       console.debug("no frame", error);

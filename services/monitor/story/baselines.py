@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What random and least-tried exploration would know after as many transitions, simulated on what an agent has learned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bus_schema.messages import Learned
+from mobee.arrays import Array, Ints
+from mobee.learning.space import Space
+from services.monitor.story.knowledge import PREDICTABLE_SHARE, PREDICTABLE_TRIES, Knowledge
+
+BASELINES = ("least_tried", "random")
+RUNS = 4  # of each; their mean is shown
+POINTS = 60  # of a curve
+LONGEST = 10_000  # transitions that are simulated: 0.4 s of a core
+SEED = 0
+
+Curve = list[tuple[int, float, float]]
+"""Points of a curve: number of transitions, share of the state-actions that were tried, and share that are predictable."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """The outcomes of all state-actions: states (S, A, B), and their cumulative probabilities (S, A, B)."""
+
+    states: Ints
+    cumulative: Array
+
+
+def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
+    """Return the outcomes that an agent has seen, with their shares.
+
+    An action that it has not tried reaches its goal with the share of all its tries that did, and else stays.
+    """
+    found: dict[tuple[int, int], list[tuple[int, float]]] = {}
+    missed = np.zeros(known.tries.shape)
+    for one in learned.surprises:
+        if one.s < len(space) and one.a < missed.shape[1] and one.s_next < len(space):
+            found.setdefault((one.s, one.a), []).append((one.s_next, one.share))
+            missed[one.s, one.a] += one.share
+    width = 1 + max((len(rows) for rows in found.values()), default=1)
+    states = np.repeat(np.arange(len(space))[:, None, None], missed.shape[1], axis=1).repeat(width, axis=2)
+    shares = np.zeros(states.shape)
+    states[:, :, 0], shares[:, :, 0] = np.where(known.exists, space.goals, 0), np.clip(1.0 - missed, 0.0, 1.0)
+    for (s, a), rows in found.items():
+        for place, (state, share) in enumerate(rows, start=1):
+            states[s, a, place], shares[s, a, place] = state, share
+    tries = known.tries.sum()
+    untried = known.tries == 0
+    shares[untried, 0] = (known.tries * shares[:, :, 0]).sum() / tries if tries else 1.0
+    shares[untried, 1] = 1.0 - shares[untried, 0]
+    return Outcomes(states, np.cumsum(shares, axis=2))
+
+
+def baselines(outcomes: Outcomes, exists: Array, start: int, transitions: int) -> dict[str, Curve]:
+    """Simulate the explorers BASELINES from a state on; returns the curve of each.
+
+    `exists`: (S, A), which are state-actions at all.
+    """
+    transitions = min(transitions, LONGEST)
+    rng = np.random.default_rng(SEED)
+    rows = np.arange(len(BASELINES) * RUNS)
+    is_random = rows >= RUNS
+    state = np.full(len(rows), start)
+    counts = np.zeros((len(rows), *outcomes.states.shape), dtype=np.int32)
+    tries = np.where(exists, 0, np.iinfo(np.int32).max // 2)[None].repeat(len(rows), axis=0)
+    shown = set(np.unique(np.linspace(0, transitions, POINTS).astype(int)).tolist())
+    curves: dict[str, Curve] = {name: [(0, 0.0, 0.0)] for name in BASELINES}
+    weight = np.where(is_random, 0.0, 1.0)[:, None]
+    absent = np.where(exists, 0.0, np.inf)
+    for n in range(1, transitions + 1):
+        drawn = rng.random((len(rows), exists.shape[1] + 1))
+        action = (weight * tries[rows, state] + drawn[:, 1:] + absent[state]).argmin(axis=1)
+        place = (drawn[:, :1] > outcomes.cumulative[state, action, :-1]).sum(axis=1)
+        tries[rows, state, action] += 1
+        counts[rows, state, action, place] += 1
+        state = outcomes.states[state, action, place]
+        if n in shown:
+            for first, name in enumerate(BASELINES):
+                tried, predictable = _shares(counts[first * RUNS : (first + 1) * RUNS], exists)
+                curves[name].append((n, round(tried, 4), round(predictable, 4)))
+    return curves
+
+
+def _shares(counts: Ints, exists: Array) -> tuple[float, float]:
+    tries = counts.sum(axis=3)
+    predictable = (tries >= PREDICTABLE_TRIES) & (counts.max(axis=3) >= PREDICTABLE_SHARE * tries)
+    return float((tries > 0)[:, exists].mean()), float(predictable[:, exists].mean())

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: Apache-2.0
+// Draws the robot in perspective, shaded, by a depth buffer in JavaScript: it needs no graphics card, and a frame costs milliseconds.
+
+const FIELD_OF_VIEW = 42; // degrees, of the smaller side
+const SHADES = 64; // of a colour
+const LIGHT = unit([-0.55, 0.8, 0.5]); // where the light comes from: to the right, up and back as the camera sees it
+const RESOLUTIONS = [0.5, 0.75, 1, 1.5, 2]; // pixels that are computed for each of the page's, along a side
+const ENOUGH = 9; // ms of a frame below which a finer picture is computed
+const TOO_MUCH = 20; // ms of a frame above which a coarser one is
+const TRAIL = 60; // places of a hand
+const OBJECT_ROUND = 20; // corners of a circle
+
+export class SceneView {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.buffer = document.createElement("canvas");
+    this.surfaces = [];
+    this.things = new Map(); // surfaces of objects, by their shape as text
+    this.trails = {};
+    this.resolution = 2; // index
+    this.cost = 0; // ms
+    this.camera = null;
+    this.listen();
+  }
+
+  // The robot: `eye` and `target` are the camera's place and what it sees.
+  async open(robot) {
+    this.robot = robot;
+    this.trails = {};
+    this.home = { eye: robot.eye, target: robot.target };
+    this.turn("oblique");
+    const data = await (await fetch("surfaces")).arrayBuffer();
+    this.surfaces = surfacesIn(data);
+  }
+
+  turn(name) {
+    const { eye, target } = this.home;
+    const [dx, dy, dz] = sub(eye, target);
+    const distance = Math.hypot(dx, dy, dz);
+    const front = this.robot.icub ? 180 : 0; // degrees: the side on which the robot has its front
+    const views = {
+      oblique: [Math.atan2(dy, dx), Math.asin(dz / distance)],
+      front: [radians(front), radians(4)],
+      top: [radians(front), radians(88)],
+      side: [radians(front + 90), radians(6)],
+    };
+    const [azimuth, elevation] = views[name];
+    this.camera = { azimuth, elevation, distance, target: [...target] };
+  }
+
+  listen() {
+    let start = null;
+    this.canvas.addEventListener("pointerdown", (event) => {
+      if (!this.camera) return;
+      start = { x: event.clientX, y: event.clientY, ...this.camera };
+      this.canvas.setPointerCapture(event.pointerId);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!start) return;
+      this.camera.azimuth = start.azimuth - 0.008 * (event.clientX - start.x);
+      this.camera.elevation = Math.min(1.55, Math.max(-0.6, start.elevation + 0.006 * (event.clientY - start.y)));
+      this.redraw();
+    });
+    for (const name of ["pointerup", "pointercancel"]) this.canvas.addEventListener(name, () => (start = null));
+    this.canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (!this.camera) return;
+        event.preventDefault();
+        const farthest = 6 * Math.hypot(...sub(this.home.eye, this.home.target));
+        this.camera.distance = Math.min(farthest, Math.max(0.05, this.camera.distance * Math.exp(0.001 * event.deltaY)));
+        this.redraw();
+      },
+      { passive: false },
+    );
+  }
+
+  redraw() {
+    if (this.shown) this.draw(...this.shown);
+  }
+
+  // `body`: poses of the links and contacts; `marks`: of each agent its hand's place, where it goes, and its colour.
+  draw(body, objects, marks, fields) {
+    this.shown = [body, objects, marks, fields];
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width || !height || !this.camera) return;
+    const begun = performance.now();
+    this.prepare(width, height);
+    const touched = new Set(body.contacts.flatMap((one) => [one.first, one.second]));
+    for (const one of this.surfaces) this.surface(one, body.links[one.link] || STILL);
+    for (const one of objects) this.surface(this.thing(one), pose(one));
+    this.present(width, height);
+    this.overlay(body, marks, touched, fields);
+    this.adapt(performance.now() - begun);
+  }
+
+  prepare(width, height) {
+    const scale = RESOLUTIONS[this.resolution];
+    const [w, h] = [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
+    if (w !== this.buffer.width || h !== this.buffer.height || !this.pixels) {
+      [this.buffer.width, this.buffer.height] = [w, h];
+      this.image = new ImageData(w, h);
+      this.pixels = new Uint32Array(this.image.data.buffer);
+      this.depth = new Float32Array(w * h);
+      this.ground = new Uint32Array(w * h);
+      for (let y = 0; y < h; y++) {
+        const t = y / h;
+        this.ground.fill(rgb(30 - 16 * t, 38 - 19 * t, 48 - 23 * t), y * w, (y + 1) * w);
+      }
+    }
+    this.pixels.set(this.ground);
+    this.depth.fill(0);
+    const { azimuth, elevation, distance, target } = this.camera;
+    const back = [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
+    const right = [-Math.sin(azimuth), Math.cos(azimuth), 0];
+    const up = cross(back, right);
+    this.axes = [right, up, back];
+    this.eye = target.map((one, i) => one + distance * back[i]);
+    this.focal = (0.5 * Math.min(w, h)) / Math.tan(radians(FIELD_OF_VIEW / 2));
+    this.near = 0.05 * distance;
+  }
+
+  // A point in pixels of the buffer, and its inverse depth.
+  project(p) {
+    const d = sub(p, this.eye);
+    const inverse = 1 / Math.max(this.near, -dot(d, this.axes[2]));
+    const scale = this.focal * inverse;
+    return [this.buffer.width / 2 + scale * dot(d, this.axes[0]), this.buffer.height / 2 - scale * dot(d, this.axes[1]), inverse];
+  }
+
+  surface({ vertices, normals, triangles, shades, screen }, m) {
+    const [right, up, back] = this.axes;
+    const row = (a) => [0, 1, 2].map((i) => a[0] * m[i] + a[1] * m[4 + i] + a[2] * m[8 + i]);
+    const offset = [m[3] - this.eye[0], m[7] - this.eye[1], m[11] - this.eye[2]];
+    const [r, u, b] = [row(right), row(up), row(back)];
+    const [ro, uo, bo] = [dot(right, offset), dot(up, offset), dot(back, offset)];
+    const light = [0, 1, 2].map((i) => LIGHT[0] * r[i] + LIGHT[1] * u[i] + LIGHT[2] * b[i]);
+    const [cx, cy, focal, near] = [this.buffer.width / 2, this.buffer.height / 2, this.focal, this.near];
+    for (let v = 0, s = 0; v < vertices.length; v += 3, s += 4) {
+      const x = vertices[v];
+      const y = vertices[v + 1];
+      const z = vertices[v + 2];
+      const away = -(b[0] * x + b[1] * y + b[2] * z + bo);
+      const inverse = 1 / (away < near ? near : away);
+      screen[s] = cx + focal * inverse * (r[0] * x + r[1] * y + r[2] * z + ro);
+      screen[s + 1] = cy - focal * inverse * (u[0] * x + u[1] * y + u[2] * z + uo);
+      screen[s + 2] = away < near ? -1 : inverse;
+      const bright = light[0] * normals[v] + light[1] * normals[v + 1] + light[2] * normals[v + 2];
+      screen[s + 3] = (SHADES - 1) * Math.min(1, bright > 0 ? 0.3 + 0.7 * bright : 0.3 + 0.22 * bright);
+    }
+    for (let t = 0; t < triangles.length; t += 3) fill(this, screen, 4 * triangles[t], 4 * triangles[t + 1], 4 * triangles[t + 2], shades);
+  }
+
+  thing(one) {
+    const key = `${one.kind} ${one.size} ${one.color}`;
+    if (!this.things.has(key)) this.things.set(key, thingSurface(one));
+    return this.things.get(key);
+  }
+
+  present(width, height) {
+    const ratio = window.devicePixelRatio || 1;
+    const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (this.canvas.width !== w || this.canvas.height !== h) [this.canvas.width, this.canvas.height] = [w, h];
+    this.buffer.getContext("2d").putImageData(this.image, 0, 0);
+    this.ink = this.canvas.getContext("2d");
+    this.ink.setTransform(1, 0, 0, 1, 0, 0);
+    this.ink.imageSmoothingQuality = "medium";
+    this.ink.drawImage(this.buffer, 0, 0, w, h);
+    const scale = w / this.buffer.width;
+    this.ink.setTransform(scale, 0, 0, scale, 0, 0);
+    this.unit = 1 / (scale / ratio); // a pixel of the page
+  }
+
+  // What stands before everything: fields that are touched, contacts, the hands' trails and where they go.
+  overlay(body, marks, touched, fields) {
+    const { ink, unit: px } = this;
+    ink.lineCap = "round";
+    for (const shape of this.robot.shapes) {
+      if (!shape.field || !(fields || touched.has(shape.name))) continue;
+      const m = body.links[shape.link] || STILL;
+      ink.strokeStyle = ink.fillStyle = touched.has(shape.name) ? "rgba(255,70,60,0.35)" : "rgba(90,200,220,0.10)";
+      const half = shape.kind === "capsule" ? shape.size[1] / 2 : 0;
+      const ends = [-half, half].map((z) => this.project(apply(m, shape.position.map((p, i) => p + shape.rotation[i][2] * z))));
+      ink.lineWidth = this.focal * shape.size[0] * (ends[0][2] + ends[1][2]);
+      stroke(ink, [ends[0], [ends[1][0] + 0.01, ends[1][1]]]);
+    }
+    for (const mark of marks) {
+      const trail = (this.trails[mark.part] ||= []);
+      const last = trail.at(-1);
+      if (mark.hand && (!last || Math.hypot(...sub(last, mark.hand)) > 0.004)) trail.push(mark.hand);
+      if (trail.length > TRAIL) trail.shift();
+      const points = trail.map((p) => this.project(p));
+      ink.lineWidth = 2 * px;
+      for (let i = 1; i < points.length; i++) {
+        ink.strokeStyle = `rgba(${mark.color},${(0.75 * i) / points.length})`;
+        stroke(ink, [points[i - 1], points[i]]);
+      }
+      if (mark.to && mark.hand) this.goal(ink, mark, px);
+    }
+    for (const one of body.contacts) {
+      const [x, y] = this.project(one.point);
+      ink.fillStyle = one.kind === "solid" ? "rgb(255,70,60)" : "rgba(255,120,90,0.9)";
+      disc(ink, x, y, (one.kind === "solid" ? 5 : 3.5) * px);
+    }
+  }
+
+  goal(ink, { hand, to, color }, px) {
+    const [from, end] = [this.project(hand), this.project(to)];
+    ink.strokeStyle = "rgba(255,255,255,0.9)";
+    ink.lineWidth = 1.6 * px;
+    ink.setLineDash([5 * px, 5 * px]);
+    stroke(ink, [from, end]);
+    ink.setLineDash([]);
+    ink.fillStyle = `rgb(${color})`;
+    disc(ink, end[0], end[1], 4.5 * px);
+    ink.beginPath();
+    ink.arc(end[0], end[1], 8 * px, 0, 7);
+    ink.stroke();
+  }
+
+  adapt(took) {
+    this.cost = this.cost ? 0.8 * this.cost + 0.2 * took : took;
+    const finest = window.devicePixelRatio > 1 ? 4 : 3;
+    if (this.cost > TOO_MUCH && this.resolution > 0) this.resolution -= 1;
+    else if (this.cost < ENOUGH && this.resolution < finest) this.resolution += 1;
+    else return;
+    this.cost = 0; // measured anew at the new resolution
+  }
+}
+
+const STILL = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+
+function surfacesIn(data) {
+  const length = new DataView(data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+  let at = 4 + length;
+  const take = (kind, count) => {
+    const found = new kind(data, at, count);
+    at += 4 * count;
+    return found;
+  };
+  return header.map((one) => {
+    const vertices = take(Float32Array, 3 * one.vertices);
+    const normals = take(Float32Array, 3 * one.vertices);
+    return surface(one.link, one.color, vertices, normals, take(Uint32Array, 3 * one.triangles));
+  });
+}
+
+function surface(link, color, vertices, normals, triangles) {
+  const shades = new Uint32Array(SHADES);
+  for (let i = 0; i < SHADES; i++) {
+    const bright = i / (SHADES - 1);
+    const white = 90 * Math.max(0, bright - 0.75) ** 1.5;
+    shades[i] = rgb(...color.map((channel) => Math.min(255, channel * (0.22 + 0.95 * bright) + white)));
+  }
+  return { link, vertices, normals, triangles, shades, screen: new Float32Array((4 * vertices.length) / 3) };
+}
+
+function thingSurface({ kind, size, color }) {
+  if (kind === "box") {
+    const [vertices, normals, triangles] = [[], [], []];
+    for (let axis = 0; axis < 3; axis++) {
+      for (const side of [-1, 1]) {
+        const first = vertices.length / 3;
+        const [a, b] = side > 0 ? [(axis + 1) % 3, (axis + 2) % 3] : [(axis + 2) % 3, (axis + 1) % 3];
+        for (const [s, t] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+          const [corner, normal] = [[0, 0, 0], [0, 0, 0]];
+          corner[axis] = (side * size[axis]) / 2;
+          corner[a] = (s * size[a]) / 2;
+          corner[b] = (t * size[b]) / 2;
+          normal[axis] = side;
+          vertices.push(...corner);
+          normals.push(...normal);
+        }
+        triangles.push(first, first + 1, first + 2, first, first + 2, first + 3);
+      }
+    }
+    return surface(0, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
+  }
+  const [radius, half] = [size[0], kind === "sphere" ? 0 : size[1] / 2];
+  const flat = kind === "cylinder";
+  const profile = flat ? [[0, -1, 0, -1], [1, -1, 0, -1], [1, -1, 1, 0], [1, 1, 1, 0], [1, 1, 0, 1], [0, 1, 0, 1]] : [];
+  for (let i = 0; !flat && i <= OBJECT_ROUND / 2; i++) {
+    const angle = Math.PI * ((2 * i) / OBJECT_ROUND - 0.5);
+    profile.push([Math.cos(angle), Math.sin(angle), Math.cos(angle), Math.sin(angle)]);
+  }
+  const [vertices, normals, triangles] = [[], [], []];
+  for (let i = 0; i <= OBJECT_ROUND; i++) {
+    const [c, s] = [Math.cos((2 * Math.PI * i) / OBJECT_ROUND), Math.sin((2 * Math.PI * i) / OBJECT_ROUND)];
+    profile.forEach(([r, z, nr, nz], j) => {
+      vertices.push(radius * r * c, radius * r * s, flat ? half * z : radius * z + Math.sign(z) * half);
+      normals.push(nr * c, nr * s, nz);
+      const first = i * profile.length + j;
+      const beside = first + profile.length;
+      if (i < OBJECT_ROUND && j < profile.length - 1) triangles.push(first, beside, beside + 1, first, beside + 1, first + 1);
+    });
+  }
+  return surface(0, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
+}
+
+function pose({ rotation: r, position: p }) {
+  return [...r[0], p[0], ...r[1], p[1], ...r[2], p[2]];
+}
+
+// Fill a triangle that faces the camera: rows from top to bottom, depth and shade linear in the picture.
+function fill({ pixels, depth, image: { width, height } }, screen, a, b, c, shades) {
+  if (screen[a + 2] < 0 || screen[b + 2] < 0 || screen[c + 2] < 0) return; // behind the camera
+  const [ax, ay, bx, by, cx, cy] = [screen[a], screen[a + 1], screen[b], screen[b + 1], screen[c], screen[c + 1]];
+  const area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
+  if (area >= 0) return; // seen from behind
+  const top = Math.max(0, Math.ceil(Math.min(ay, by, cy) - 0.5));
+  const bottom = Math.min(height - 1, Math.floor(Math.max(ay, by, cy) - 0.5));
+  if (top > bottom) return;
+  const [az, al] = [screen[a + 2], screen[a + 3]];
+  const [zb, zc, lb, lc] = [screen[b + 2] - az, screen[c + 2] - az, screen[b + 3] - al, screen[c + 3] - al];
+  const zx = (zb * (cy - ay) - zc * (by - ay)) / area;
+  const zy = (zc * (bx - ax) - zb * (cx - ax)) / area;
+  const lx = (lb * (cy - ay) - lc * (by - ay)) / area;
+  const ly = (lc * (bx - ax) - lb * (cx - ax)) / area;
+  for (let y = top; y <= bottom; y++) {
+    const row = y + 0.5;
+    let left = Infinity;
+    let right = -Infinity;
+    if (ay > row !== by > row) {
+      const x = ax + ((row - ay) * (bx - ax)) / (by - ay);
+      if (x < left) left = x;
+      if (x > right) right = x;
+    }
+    if (by > row !== cy > row) {
+      const x = bx + ((row - by) * (cx - bx)) / (cy - by);
+      if (x < left) left = x;
+      if (x > right) right = x;
+    }
+    if (cy > row !== ay > row) {
+      const x = cx + ((row - cy) * (ax - cx)) / (ay - cy);
+      if (x < left) left = x;
+      if (x > right) right = x;
+    }
+    const first = Math.max(0, Math.ceil(left - 0.5));
+    const last = Math.min(width - 1, Math.ceil(right - 0.5) - 1);
+    let z = az + zx * (first + 0.5 - ax) + zy * (row - ay);
+    let light = al + lx * (first + 0.5 - ax) + ly * (row - ay);
+    for (let x = first, at = y * width + first; x <= last; x++, at++) {
+      if (z > depth[at]) {
+        depth[at] = z;
+        pixels[at] = shades[light < 0 ? 0 : light > SHADES - 1 ? SHADES - 1 : light | 0];
+      }
+      z += zx;
+      light += lx;
+    }
+  }
+}
+
+const radians = (degrees) => (Math.PI * degrees) / 180;
+const rgb = (r, g, b) => ((255 << 24) | (Math.round(b) << 16) | (Math.round(g) << 8) | Math.round(r)) >>> 0;
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const apply = (m, p) => [0, 4, 8].map((i) => m[i] * p[0] + m[i + 1] * p[1] + m[i + 2] * p[2] + m[i + 3]);
+
+function unit(v) {
+  const length = Math.hypot(...v);
+  return v.map((one) => one / length);
+}
+
+function stroke(ink, points) {
+  ink.beginPath();
+  points.forEach(([x, y], i) => (i ? ink.lineTo(x, y) : ink.moveTo(x, y)));
+  ink.stroke();
+}
+
+function disc(ink, x, y, radius) {
+  ink.beginPath();
+  ink.arc(x, y, radius, 0, 7);
+  ink.fill();
+}

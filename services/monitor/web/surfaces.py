@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robot as triangles, for the page's own 3D view."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.rendering import palette
+from mobee.rendering.palette import Color
+from mobee.robot.robot import Robot, Shape
+from mobee.robot.urdf.hull import facets
+
+ROUND = 20  # corners of a circle
+BLOCK = 4  # bytes to which the header is padded: the arrays that follow are read in place
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of one colour that move with a link.
+
+    `vertices`: (v, 3) m, in the root frame with every joint at zero.  `normals`: (v, 3), of length 1.  `triangles`: (t, 3) indices, the
+    corners anticlockwise as seen from outside.
+    """
+
+    link: int
+    color: Color
+    vertices: Array
+    normals: Array
+    triangles: Ints
+
+
+def surfaces_of(robot: Robot) -> Callable[[], bytes]:
+    """Return a function that returns the solids of a robot, encoded; they are made when the first page asks for them."""
+    colors = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
+    return cache(lambda: encoded([_surface(shape, colors) for shape in robot.shapes if shape.role == "solid"]))
+
+
+def encoded(surfaces: Sequence[Surface]) -> bytes:
+    """Return the bytes that the page reads.
+
+    The length of the header (uint32); the header, JSON padded with spaces: link, colour, and numbers of vertices and triangles of each
+    surface; then of each surface vertices and normals (float32) and triangles (uint32), all little-endian.
+    """
+    rows = [{"link": one.link, "color": one.color, "vertices": len(one.vertices), "triangles": len(one.triangles)} for one in surfaces]
+    header = json.dumps(rows).encode()
+    header += b" " * (-len(header) % BLOCK)
+    pieces = [struct.pack("<I", len(header)), header]
+    for one in surfaces:
+        pieces += [one.vertices.astype("<f4").tobytes(), one.normals.astype("<f4").tobytes(), one.triangles.astype("<u4").tobytes()]
+    return b"".join(pieces)
+
+
+def _surface(shape: Shape, colors: Mapping[str, Color]) -> Surface:
+    made = MAKERS[shape.kind](shape)
+    vertices, normals = (made[0] @ shape.rotation.T + shape.position, made[1] @ shape.rotation.T)
+    return Surface(shape.link, colors.get(shape.part, palette.SOLIDS[0]), vertices, normals, made[2])
+
+
+Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame of the shape
+
+
+def _flat(corners: Array) -> Made:
+    """Triangles (t, 3, 3) with flat faces."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+def _box(shape: Shape) -> Made:
+    half = 0.5 * np.array(shape.size)
+    return _flat(facets(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half))
+
+
+def _convex(shape: Shape) -> Made:
+    return _flat(facets(np.empty((0, 3)) if shape.vertices is None else shape.vertices))
+
+
+def _turned(profile: Array, normals: Array) -> Made:
+    """Turn a profile (p, 2), radii and heights from below, about the z axis; `normals`: (p, 2), of the profile."""
+    angles = np.linspace(0.0, 2.0 * np.pi, ROUND + 1)
+    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
+
+    def around(pairs: Array) -> Array:
+        radius, height = pairs.T
+        return np.stack(np.broadcast_arrays(cosine * radius, sine * radius, height), axis=2).reshape(-1, 3)
+
+    rows, columns = np.meshgrid(np.arange(ROUND), np.arange(len(profile) - 1), indexing="ij")
+    first = (rows * len(profile) + columns).ravel()
+    beside = first + len(profile)
+    triangles = np.vstack([np.column_stack([first, beside, beside + 1]), np.column_stack([first, beside + 1, first + 1])])
+    return around(profile), around(normals), triangles
+
+
+def _capsule(shape: Shape) -> Made:
+    radius, half = shape.size[0], 0.5 * shape.size[1] if shape.kind == "capsule" else 0.0
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, ROUND // 2 + 1)
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    middle = len(angles) // 2
+    directions = np.insert(directions, middle, directions[middle], axis=0)  # the equator twice: of the lower and the upper half
+    lift = np.where(np.arange(len(directions)) <= middle, -half, half)
+    return _turned(radius * directions + np.column_stack([np.zeros(len(lift)), lift]), directions)
+
+
+def _cylinder(shape: Shape) -> Made:
+    radius, half = shape.size[0], 0.5 * shape.size[1]
+    profile = np.array([[0.0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0.0, half]])
+    return _turned(profile, np.array([[0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]))
+
+
+MAKERS: dict[str, Callable[[Shape], Made]] = {
+    "box": _box,
+    "convex": _convex,
+    "sphere": _capsule,
+    "capsule": _capsule,
+    "cylinder": _cylinder,
+}
