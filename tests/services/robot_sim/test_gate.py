@@ -495,6 +495,7 @@ def test_a_torque_that_drives_a_motor_into_its_limit_ends_in_a_hold_before_it(pa
         gated.command("torque", [20.0, 0.0, 0.0])
         gated.tick()
     assert "torque" in gated.told[-1][1]
+    assert gated.gate.mode == "hold"
     for _ in range(50):
         gated.tick()
     assert gated.q[0] <= LIMITS.upper[0] + 1e-6
@@ -514,6 +515,33 @@ def test_in_lockstep_an_age_is_counted_in_ticks_however_long_these_are() -> None
     with pytest.raises(Refused, match="4 ticks ago, limit 3") as caught:
         gate.admit(order(1, 6), 10, 0, ROBOT.home[WHERE])
     assert caught.value.reason == "age"
+
+
+def test_in_lockstep_a_command_is_in_force_for_three_ticks() -> None:
+    told: list[tuple[str, dict[str, float]]] = []
+    gate = Gate(PART, LIMITS, 0.05, report=lambda code, text, values: told.append((text, values)), ttl_ticks=LOCKED_TTL)
+    epoch, still = gate.take("controller", "c1"), np.zeros(N)
+    gate.arm(epoch)
+    gate.admit(Order("controller", epoch, 0, 10, "velocity", np.zeros(N), 100), 10, 0, still)
+    for k in (11, 12, 13):
+        assert gate.tick(k, 10**12, still, still).mode == "velocity"
+    assert gate.tick(14, 10**12, still, still).mode == "hold"
+    assert (gate.state, told) == ("hold", [(f"{PART}: no valid command for 4 ticks, limit 3", {"age": 4.0})])
+
+
+def test_the_report_of_a_command_that_is_too_old_says_by_how_much() -> None:
+    gated = Gated().owned()
+    gated.command(ref=0.05, ttl=100)
+    gated.gate.tick(1, 120_000_000, gated.q, gated.velocity)
+    assert gated.told == [("hold", f"{PART}: no valid command for 120 ms, ttl 100 ms")]
+
+
+def test_after_a_hold_the_first_position_is_compared_with_the_measured_one() -> None:
+    gated = Gated().owned()
+    gated.command("position", gated.q + 0.9 * MAX_START)
+    gated.gate.hold(gated.gate.epoch)
+    gated.gate.arm(gated.gate.epoch)
+    gated.command("position", gated.q - 0.9 * MAX_START)
 
 
 FINE = np.full(N, 0.01)
