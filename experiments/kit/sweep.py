@@ -103,8 +103,7 @@ class Sweep:
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the cells that are not in the folder yet; returns the findings."""
         self.require()
-        tracker = folder / TRACK if getattr(arguments, "track", None) else None
-        run_cells(partial(_run_trial, self.trial, tracker), self.cells(arguments), folder, arguments)
+        run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
         return self.results(folder)
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -119,14 +118,8 @@ class Sweep:
         return saved(self.plot(found), folder)
 
 
-def _run_trial(trial: Trial, tracker: Path | None, cell: Cell) -> dict[str, Any]:
-    """Run a trial; with a folder as tracker, what is learned in it is written there."""
-    if tracker is None:
-        return trial(cell.settings, cell.seed)
-    with tracked(tracker / cell.name):
-        values = trial(cell.settings, cell.seed)
-    track_values(values, tracker / cell.name)
-    return values
+def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
+    return trial(cell.settings, cell.seed)
 
 
 def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[dict[str, Any]]]:
@@ -153,7 +146,8 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
     """Run the cells that are not in `folder` yet; each is written to disk as soon as it is finished.
 
     `work` must be a function of a module, so that other processes can import it; it returns a dict of JSON values and arrays, which
-    depend on its cell alone.  A kill loses at most the cells that are running.
+    depend on its cell alone.  A kill loses at most the cells that are running.  With the option --track, what is learned in a cell and
+    the numbers that it returns are written as event files too.
 
     Raises:
         InvalidValue: two cells have one name, or the folder holds a cell of that name with other settings.
@@ -161,6 +155,8 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
     """
     _require_distinct(cells)
     left = _unfinished(cells, folder)
+    if getattr(arguments, "track", None):
+        work = partial(_tracked, work, folder / TRACK)
     failed: dict[str, str] = {}
     time_left = TimeLeft([cell.cost for cell in cells], [cell.cost for cell in left], time.monotonic())
     with Progress() as progress:
@@ -177,6 +173,13 @@ def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argpar
         raise CellsFailed(
             f"{len(failed)} of {len(cells)} cells failed, the others are finished (see {folder}/cells/*.failed.txt):\n{listed}"
         )
+
+
+def _tracked(work: Work, folder: Path, cell: Cell) -> dict[str, Any]:
+    with tracked(folder / cell.name):
+        values = work(cell)
+    track_values(values, folder / cell.name)
+    return values
 
 
 def _keep(done: Done, folder: Path) -> str:
