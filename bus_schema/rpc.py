@@ -209,6 +209,8 @@ class Stat(Reply, frozen=True, kw_only=True):
     numbers: dict[str, int | float | None]  # None: not measured
     rejected: dict[str, int]  # number of refused messages and calls, by reason
     words: dict[str, Text] = {}  # values that are not numbers, such as a hash
+    health: dict[str, int | float | None] = {}  # of the process, as `mobee status` shows it; None: not measured
+    warnings: list[Name] = []  # numbers of `health` that are or were beyond their limits in the last 30 s
 
 
 class Pulse(Reply, frozen=True, kw_only=True):

@@ -102,6 +102,17 @@ BENCHES = {
             "--stops": _number("stops under each flood (default: 20)"),
         },
     ),
+    "faults": Bench(
+        "a live system under schedules of faults: time to hold, recovery, and whether transitions are lost",
+        quick="two schedules",
+        options={
+            "--schedules": _number("how many (default: 20)"),
+            "--seed": _number("number of the first schedule (default: 1)", int),
+            "--seconds": _number("how long each lasts (default: 10)", positive_number, "S"),
+            "--period": _number("mean time between two faults (default: 4)", positive_number, "S"),
+            "--shrink": _number("performances to shrink a schedule that breaks a promise (default: none)"),
+        },
+    ),
     "plant": Bench(
         "the offline plant beside MuJoCo's stepper: one arm, reaching, three agents at the table, and the same hash twice",
         quick="one short round",

@@ -68,6 +68,8 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
             "uptime_s": stat.uptime if stat else None,
             "restarts": restarts.get(who),
             "rejected": stat.rejected if stat else {},
+            "health": dict(stat.health) if stat else {},
+            "warnings": stat.warnings if stat else [],
             "text": stat.text if stat else "",
         }
     return services
@@ -94,6 +96,7 @@ def _as_text(status: dict[str, Any]) -> str:
         )
     pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
     lines += [f"page  {page}" for page in pages]  # not cut to the width of the terminal
+    lines += _health_lines(status["services"])
     if status["parts"]:
         lines += ["", f"{'part':<16}{'gate':<9}{'mode':<10}{'epoch':>14}{'command age':>13}{'faults':>8}"]
         for part, state in sorted(status["parts"].items()):
@@ -110,6 +113,23 @@ def _as_text(status: dict[str, Any]) -> str:
                 f"{_say(numbers.get('interrupted')):>13}{'-' if mean is None else f'{mean:.2f}':>15}"
             )
     return "\n".join(lines)
+
+
+_HEALTH = {"rate": "rate Hz", "age_ms": "age ms", "gap_ms": "gap ms", "refused_rate": "ref. /s", "memory_mb": "MB", "files": "files"}
+_BEYOND = {"rate": "rate", "gap": "gap_ms", "refused": "refused_rate", "memory": "memory_mb", "files": "files"}  # column of a warning
+
+
+def _health_lines(services: dict[str, Any]) -> list[str]:
+    """Return a table of what each process needs and hears; a number beyond its limit is marked with !."""
+    known = {who: service for who, service in services.items() if service["health"]}
+    if not known:
+        return []
+    lines = ["", f"{'process':<16}{''.join(f'{title:>10}' for title in _HEALTH.values())}"]
+    for who, service in known.items():
+        marked = {_BEYOND.get(name, "") for name in service["warnings"]}
+        cells = (f"{'!' if name in marked else ''}{_say(service['health'].get(name))}" for name in _HEALTH)
+        lines.append(f"{who:<16}{''.join(f'{cell:>10}' for cell in cells)}")
+    return lines
 
 
 def _say(value: Any) -> str:

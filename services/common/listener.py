@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable
+from time import monotonic
 from typing import Any, TypeVar
 
 import zenoh
@@ -14,10 +15,12 @@ from zenoh.handlers import Callback
 
 from bus_schema.messages import Clock, Message, Tick, Turn
 from services.common.bus import NO_RUN, Bus, part_of
+from services.common.health import Health
 from services.common.inbox import CROWDED, Inbox, Newest
 
 _M = TypeVar("_M", bound=Message)
 _T = TypeVar("_T", Clock, Tick, Turn)
+MAX_CLOCK_RATE = 100.0  # messages per second of real time on `clock` in free mode; `tick` has every tick
 _known = threading.local()  # lives as long as Python knows the thread
 
 
@@ -30,6 +33,9 @@ class Listener:
         self.keeps_step = False  # set by a Participant in lockstep
         self.inject_test_delay: Callable[[], None] = lambda: None  # called before every tick, for tests of lockstep
         bus.control = "STEP" if locked else "LATEST"
+        self.health = Health()
+        self.expected_rate: float | None = None  # of the ticks that it hears or makes, Hz of real time; None: they have no fixed rate
+        self._beats_of: type[Message] | None = None  # the stream that gives the rate
         self._kept: list[Any] = []  # handles of tokens and subscriptions, which end with them
         self._on_run: list[Callable[[], None]] = []
         self._early: list[Callable[[], None]] = []  # handlers of past messages that came before the first clock message
@@ -117,11 +123,23 @@ class Listener:
         """Handle only those ticks that wait for this service; in lockstep, instead of `on_clock`."""
         self._on_time(Turn, handler, self.bus.who)
 
+    def _note_beat(self, time: Clock | Tick | Turn) -> None:
+        self.health.beats.note(monotonic())
+        if isinstance(time, Clock):  # a Tick is one too
+            rate = 1e9 * time.rate / time.dt
+            every = 1 if isinstance(time, Tick) else max(1, round(rate / MAX_CLOCK_RATE))
+            self.expected_rate = rate / every if time.mode == "free" else None
+
     def _on_time(self, cls: type[_T], handler: Callable[[_T], None], name: str = "*") -> None:
+        if self._beats_of is None or cls is Tick:
+            self._beats_of = cls
+
         def handle(sample: zenoh.Sample) -> None:
             time = self.bus.receive(cls, sample, any_run=True)
             if time is None:
                 return
+            if cls is self._beats_of:
+                self._note_beat(time)
             self.inject_test_delay()
             self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
             if time.run != self.bus.run:

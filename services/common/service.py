@@ -30,6 +30,7 @@ from services.common.bus import Bus
 from services.common.config import ServiceConfig, load_config
 from services.common.entry import explained, robot_of, set_up_log, wait_until_released
 from services.common.exit_codes import ENVIRONMENT, OK
+from services.common.health import WINDOW
 from services.common.inbox import CROWDED_WITH_CALLS, Inbox
 from services.common.listener import Listener
 from services.common.rate import NOT_MEASURED
@@ -114,6 +115,7 @@ class Service(Listener):
         self._last_stat: Stat | None = None
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._is_ready = False
+        inbox.at(time.monotonic() + WINDOW, self._check_health)
         self._router, self._router_seen = "", time.monotonic()
         self._watch_liveliness()
         self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
@@ -250,6 +252,11 @@ class Service(Listener):
             self.log.error("another %s answers at %s, of a new system: this service ends", who, self.config.endpoint)
             raise SystemExit(ENVIRONMENT)
 
+    def _check_health(self) -> None:
+        refused, waiting = self.bus.rejected.total() + self.inbox.dropped, self.inbox.waiting()
+        self.health.check(self.expected_rate, refused, waiting, lambda level, text: self.bus.event(level, "health", f"{self.who} {text}"))
+        self.inbox.at(time.monotonic() + WINDOW, self._check_health)
+
     def _stat(self, request: Empty, key: str) -> Stat:
         now = time.monotonic()
         if self._last_stat is None or now - self._stats[0] > STATS_PERIOD:
@@ -269,6 +276,8 @@ class Service(Listener):
             text=text,
             numbers={name: _measured(value) for name, value in numbers.items()},
             words=dict(self.words()),
+            health=self.health.numbers(self.inbox.waiting()),
+            warnings=sorted(self.health.bad),
             rejected={**self.bus.rejected, **({"flood": self.inbox.dropped} if self.inbox.dropped else {})},
         )
 

@@ -17,6 +17,7 @@ from bus_schema.rpc import Done, Empty, Pace, PartMeta, Place
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
 from services.common.emergency_stop import StopRecord
+from services.common.listener import MAX_CLOCK_RATE
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
 from services.robot_sim.choice import choose
@@ -28,7 +29,6 @@ from services.robot_sim.sensors import Phases, Sensors, part_meta
 from services.robot_sim.watch import Watch
 
 MIN_SPREAD_PERIOD = 0.0025  # s; in shorter ticks all parts are read at once, without waiting for their sampling times
-MAX_CLOCK_RATE = 100.0  # messages per second of real time on `clock` in free mode; `tick` has every tick
 IDLE_PERIOD = 1.0  # s between two checks of a run that is paused or over, in lockstep
 
 
@@ -62,6 +62,7 @@ class Node:
         self._clock_period = max(1, round(1.0 / (MAX_CLOCK_RATE * self._period)))  # ticks
         self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))
         self._rate = Rate(self._period)
+        self._end_pause()
         self._lockstep = Lockstep(service, config.participants, self._guard, config.ticks) if service.locked else None
         if warning := choose(config.backend, robot).warning:
             self._bus.event("warning", "no_physics", warning)
@@ -112,6 +113,7 @@ class Node:
 
     def _tick_locked(self, lockstep: Lockstep) -> None:
         begin = time.monotonic()
+        self._service.health.beats.note(begin)
         self._bus.k += 1
         self._bus.t += self._dt_ns
         self._guard.tick(self._bus.k)
@@ -130,6 +132,7 @@ class Node:
 
     def _tick(self, start: float) -> None:
         bus, backend = self._bus, self._backend
+        self._service.health.beats.note(start)
         bus.k += 1
         bus.t += self._dt_ns
         self._guard.tick(bus.k)
@@ -189,7 +192,7 @@ class Node:
         self._sensors.reset()
         if self._lockstep is not None:
             self._lockstep.begin()
-        self._pause = None
+        self._end_pause()
         self._bus.event("info", "new_run", f"reset by {request.who}: run {self._bus.run}")
         return Done(v=VERSION)
 
@@ -201,11 +204,12 @@ class Node:
             self._note_disturbance("paused")
             self._publish_tick("paused")
         self._pause = Pause(request.who, time.monotonic() + MAX_PAUSE)
+        self._service.expected_rate = None
         return Done(v=VERSION)
 
     def _resume(self, request: Empty, key: str) -> Done:
         self._require_pauser(request.who)
-        self._pause = None
+        self._end_pause()
         return Done(v=VERSION)
 
     def _require_pauser(self, who: str) -> None:
@@ -218,8 +222,12 @@ class Node:
         """Return whether time stands still; a pause that was forgotten ends by itself."""
         if self._pause is not None and time.monotonic() > self._pause.until:
             self._bus.event("warning", "pause_over", f"the pause by {self._pause.by} lasted {MAX_PAUSE:g} s: the robot goes on")
-            self._pause = None
+            self._end_pause()
         return self._pause is not None
+
+    def _end_pause(self) -> None:
+        self._pause = None
+        self._service.expected_rate = None if self._service.locked else 1.0 / self._period
 
     def _place(self, request: Place, key: str) -> Done:
         x, y, z = request.position

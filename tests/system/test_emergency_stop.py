@@ -18,7 +18,7 @@ import pytest
 
 from services.common.bus import Bus
 from services.common.session import open_client
-from tests.system.faults import Culprit, draw_stop_schedule
+from tests.system.faults import culprit, draw_stop_schedule
 from tests.system.live import AGENTS, PARTS, Launch, Watcher, launch, until
 
 pytestmark = pytest.mark.system
@@ -73,7 +73,8 @@ def campaign(folder: Path, seeds: range) -> None:
             schedule = draw_stop_schedule(seed)
             print(f"{seed}: {'; '.join(map(str, schedule))}", flush=True)
             with open_client(system.endpoint) as session:
-                stopped = Culprit(system, watchers[-1], Bus(session, "test", logging.getLogger("test"))).perform(schedule)
+                times = culprit(system, watchers[-1], Bus(session, "test", logging.getLogger("test"))).perform(schedule)
+            stopped = next(at for at, fault in zip(times, schedule, strict=True) if fault.kind == "stop")
             if any((fault.kind, fault.who) == ("kill", "launcher") for fault in schedule):
                 system.process.wait(20.0)
                 system = start(folder / f"after-{seed}", system.endpoint)

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from services.common.emergency_stop import Stop, StopRecord
+from bus_schema import VERSION, encode, encoding_of
+from bus_schema.messages import EStop
+from services.common.emergency_stop import Stop, StopLine, StopRecord
+from services.common.session import open_client
+from tests.services.harness import Rig, wait_for
 
 STOP = Stop("mobee", "a hand in the way", 1.8e9)
 
@@ -44,3 +48,23 @@ def test_each_endpoint_has_a_record_of_its_own(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     paths = {StopRecord.of_endpoint(endpoint).path for endpoint in ("tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448", "tcp/[::1]:7447")}
     assert len(paths) == 3 and all(path.is_relative_to(tmp_path) for path in paths)
+
+
+def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) -> None:
+    def message(sets: bool, reason: str) -> bytes:
+        return encode(EStop(v=VERSION, run="r", src="test", seq=0, k=0, t=0, tw=0, set=sets, source="test", reason=reason))
+
+    key, how = EStop.stream.key(), {"encoding": encoding_of(EStop)}
+    with open_client(bus.endpoint) as session:
+        line = StopLine(session)
+        wait_for(lambda: bus.session.put(key, message(True, "first"), **how) or line.heard(), "the first stop")
+        wait_for(lambda: not line.heard(), "silence")
+        for number in range(3000):
+            bus.session.put(key, message(False, f"no {number}"), **how)
+            bus.session.put(key, b"\xc1 garbage set\xc3", **how)
+        bus.session.put(key, message(True, "x" * 1_000_000), **how)  # longer than a reason may be
+        bus.session.put(key, message(True, "second"), **how)
+        heard: list[EStop] = []
+        wait_for(lambda: heard.extend(line.heard()) or heard, "the second stop")
+        assert [stop.reason for stop in heard] == ["second"]
+        assert line.heard() == []

@@ -104,7 +104,7 @@ def test_a_service_that_keeps_failing_is_given_up_and_the_robot_stopped(launch: 
     assert re.findall(r"starts again in ([\d.]+) s", launched.news) == ["0.2", "0.4", "0.8", "1.6", "3.2"]
     assert summary["restarts"]["one"] == 5
     assert ["no hardware at all" in fault for fault in summary["faults"]] == [True]
-    assert [stop.content()["set"] for stop in stops] == [True]
+    assert {stop.content()["set"] for stop in stops} == {True}  # repeated, since no robot_sim confirms it
     assert launched.children() == []
 
 

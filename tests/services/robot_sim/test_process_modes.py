@@ -78,6 +78,26 @@ def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench)
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
+def test_only_the_one_that_paused_it_can_let_it_go_on_while_that_one_runs(bench: Bench) -> None:
+    bench.rig.token("person", "p1")
+    bench.rig.call(keys.sim("pause"), Empty, Done, who="person")
+    for verb in ("resume", "pause"):
+        with pytest.raises(CallFailed) as caught:
+            bench.rig.call(keys.sim(verb), Empty, Done, who="another")
+        assert caught.value.code == "owned"
+    assert "paused by person, for at most" in bench.rig.stat("robot_sim").text
+    bench.rig.drop_token("person", "p1")
+
+    def resumed() -> bool:
+        try:
+            return bool(bench.rig.call(keys.sim("resume"), Empty, Done, who="another"))
+        except CallFailed:
+            return False
+
+    wait_for(resumed, "the resumption by another, once the first has ended")
+    wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
+
+
 def test_a_reset_is_a_new_run_at_home_in_which_nobody_owns_anything(bench: Bench) -> None:
     epoch = bench.arm("left_arm")
     bench.keep("left_arm", epoch, 0.4, lambda: elbow(0.6))

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A live system under schedules of faults: who holds how fast, when every part is back, and whether a transition is lost or mixed.
+
+Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine
+that does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, doubled or mixed; no motor
+is faster than the gate allows.  Each schedule is drawn from its number and performed on one running system; one that breaks a promise is
+shrunk.  Times are judged only if the load was low; the load is part of the result.  Run time: about 20 s for each schedule.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.kit.command_line import Progress
+from experiments.kit.live.faults import VITAL, Culprit, Fault, draw, shrunk
+from experiments.kit.live.launch import LaunchFailed
+from experiments.kit.live.system import System, running, stat_of, wait_for
+from experiments.kit.live.witness import Stop, Witness, compare_transitions, stop_after, violations
+from mobee.robot.load import load_robot
+from services.common.bus import Bus
+from services.common.session import open_client
+
+AGENTS = ("torso", "left_arm", "right_arm")
+SERVICES = (*VITAL, *(f"agent_{part}" for part in AGENTS))
+NOISE = np.deg2rad(0.2)  # rad, of the encoders
+HOLD_AT_MOST = {"kill": 30.0, "freeze": 120.0}  # ms, p95
+BACK_AT_MOST = 5.0  # s
+QUIET = 1.0  # load of the machine up to which times are judged; the system itself takes about that
+_BACK_PATIENCE = 40.0  # s
+_ALONE = 1.0  # s between a fault and the next, so that its effect can be told from that of the next
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How many schedules, the number of the first, how long each lasts [s], and the mean time between two faults [s]."""
+
+    schedules: int = 20
+    seed: int = 1
+    seconds: float = 10.0
+    period: float = 4.0
+    shrink: int = 0  # performances to shrink a schedule that breaks a promise
+
+
+QUICK = Settings(schedules=2)
+
+
+class _Patient:
+    """One system that is disturbed schedule by schedule."""
+
+    def __init__(self, system: System, session: Any) -> None:
+        self.system, self._session, self._robot = system, session, load_robot("icub")
+        self.witness = Witness()
+        self.witness.attach(session)
+        pids = {who: wait_for(lambda who=who: stat_of(session, who), 60.0, f"{who} answers").pid for who in SERVICES}  # type: ignore[misc]
+        bus = Bus(session, "bench", logging.getLogger("bench"))
+        self._culprit = Culprit(session, system.endpoint, pids, bus, lambda part: None, AGENTS[0])
+        self._wait_until_back()
+
+    def _wait_until_back(self) -> None:
+        """Wait until all parts follow commands."""
+        wait_for(lambda: self.witness.all_armed(len(self._robot.parts)), _BACK_PATIENCE, "every part follows commands again")
+
+    def disturb(self, schedule: Sequence[Fault]) -> dict[str, Any]:
+        """Perform a schedule; return what was measured and which promises were broken."""
+        self.witness.take_states()
+        times, broken = self._culprit.perform(schedule), list[str]()
+        over = max(at + fault.duration for at, fault in zip(times, schedule, strict=True))
+        time.sleep(_ALONE)  # the last fault has its effect
+        try:
+            self._wait_until_back()
+        except LaunchFailed as failed:
+            broken.append(str(failed))
+        if self.system.process.poll() is not None:
+            raise LaunchFailed(f"the launcher has ended: {(self.system.says.splitlines() or ['no message'])[-1]}")
+        states = self.witness.take_states()
+        back = max([0.0, *(moment.at - over for moments in states.values() for moment in moments if moment.gate != "armed")])
+        stops = [(fault.kind, stop) for fault, stop in self._stops(schedule, times, states)]
+        return {"back_s": back, "broken": [*broken, *violations(states, self._robot, NOISE)], "stops": stops}
+
+    def _stops(self, schedule: Sequence[Fault], times: Sequence[float], states: dict[str, Any]) -> list[tuple[Fault, Stop]]:
+        """How the parts stopped that depend on a service that was killed or frozen alone."""
+        found = []
+        for n, (fault, at) in enumerate(zip(schedule, times, strict=True)):
+            following = times[n + 1] if n + 1 < len(times) else at + 10.0
+            earlier = max((times[i] + schedule[i].duration for i in range(n)), default=0.0)
+            alone = following - at > _ALONE and earlier + _ALONE < at
+            if not alone or fault.kind not in HOLD_AT_MOST or fault.who not in ("controller", "model") or 0.0 < fault.duration < 0.5:
+                continue
+            for moments in states.values():
+                if (stop := stop_after(moments, at, min(following, at + 2.0))) is not None:
+                    found.append((fault, stop))
+        return found
+
+
+def measure(settings: Settings) -> dict[str, Any]:
+    """Perform the schedules, and return all measurements and the verdict; raises LaunchFailed."""
+    rows: list[dict[str, Any]] = []
+    begun = time.monotonic()
+    with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:
+        with open_client(system.endpoint) as session:
+            patient = _Patient(system, session)
+            for n in range(settings.schedules):
+                progress.show(n / settings.schedules, f"schedule {settings.seed + n}")
+                rows.append(_performed(patient, settings.seed + n, settings))
+            time.sleep(1.0)  # what was published last is heard
+            kept = compare_transitions(patient.witness, system.run_dir, list(AGENTS))
+    return _result(settings, rows, kept, time.monotonic() - begun)
+
+
+def _performed(patient: _Patient, seed: int, settings: Settings) -> dict[str, Any]:
+    schedule = draw(seed, SERVICES, settings.seconds, settings.period)
+    result = patient.disturb(schedule)
+    if result["broken"] and settings.shrink:
+        schedule = shrunk(schedule, lambda shorter: bool(patient.disturb(shorter)["broken"]), settings.shrink)
+    return {"seed": seed, "schedule": [str(fault) for fault in schedule], "load": os.getloadavg()[0], **result}
+
+
+def _result(settings: Settings, rows: list[dict[str, Any]], kept: Any, seconds: float) -> dict[str, Any]:
+    stops = [each for row in rows for each in row.pop("stops")]
+    load = float(np.median([row["load"] for row in rows]))
+    held = {kind: _summary([1e3 * stop.hold for one, stop in stops if one == kind and stop.hold is not None]) for kind in HOLD_AT_MOST}
+    never = sum(stop.hold is None for _, stop in stops)
+    distance = {
+        kind: _summary([float(np.rad2deg(stop.distance)) for one, stop in stops if one == kind and stop.distance is not None])
+        for kind in HOLD_AT_MOST
+    }
+    back = _summary([row["back_s"] for row in rows])
+    broken = [f"schedule {row['seed']}: {line}" for row in rows for line in row["broken"]]
+    quiet = load <= QUIET
+    in_time = all(held[kind]["p95"] is None or held[kind]["p95"] <= most for kind, most in HOLD_AT_MOST.items())
+    unharmed = not broken and not never and kept.lost == kept.differing == kept.gaps == 0
+    return {
+        "schedules": settings.schedules,
+        "seed": settings.seed,
+        "seconds": seconds,
+        "faults": sum(len(row["schedule"]) for row in rows),
+        "load": load,
+        "hold_ms": held,
+        "never_held": never,
+        "stopping_distance_deg": distance,
+        "back_s": back,
+        "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "gaps": kept.gaps},
+        "broken": broken,
+        "rows": rows,
+        "times_judged": quiet,
+        "passed": unharmed and (not quiet or (in_time and back["max"] <= BACK_AT_MOST)),
+    }
+
+
+def _summary(values: list[float]) -> dict[str, Any]:
+    if not values:
+        return {"count": 0, "p50": None, "p95": None, "max": None}
+    p50, p95 = np.percentile(values, [50, 95])
+    return {"count": len(values), "p50": float(p50), "p95": float(p95), "max": max(values)}
+
+
+def report(result: dict[str, Any]) -> str:
+    """Format the measurements."""
+    kept = result["transitions"]
+    lines = [
+        f"{result['schedules']} schedules from number {result['seed']}, {result['faults']} faults in {result['seconds']:.0f} s; "
+        f"load of the machine {result['load']:.1f}",
+        f"{'':<30}{'count':>7}{'p50':>9}{'p95':>9}{'largest':>9}",
+    ]
+    for kind in HOLD_AT_MOST:
+        lines.append(f"{f'hold after a {kind} [ms]':<30}{_cells(result['hold_ms'][kind])}")
+        lines.append(f"{f'stopping distance, {kind} [deg]':<30}{_cells(result['stopping_distance_deg'][kind])}")
+    lines.append(f"{'all parts back [s]':<30}{_cells(result['back_s'])}")
+    lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['gaps']} gaps")
+    lines += result["broken"] or ["no promise broken"]
+    if not result["times_judged"]:
+        lines.append(f"times are not judged: the load was above {QUIET:g}")
+    return "\n".join(lines)
+
+
+def _cells(summary: dict[str, Any]) -> str:
+    numbers = (f"{'-' if summary[name] is None else format(summary[name], '.1f'):>9}" for name in ("p50", "p95", "max"))
+    return f"{summary['count']:>7}{''.join(numbers)}"

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a running system did while it was disturbed: from its stream of states and what agents publish, beside what is on disk."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bus_schema.messages import State, Transition
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from mobee.store import STORE, TransitionStore
+from services.common.observe import Heard, listen
+
+MOVES = np.deg2rad(2.0)  # rad/s; a part that is slower is at rest
+FACTOR = 1.05  # of the gate's limit: encoders are noisy
+
+
+@dataclass
+class Moment:
+    """A part at one tick."""
+
+    run: str
+    k: int
+    t: float  # s, bus clock
+    at: float  # s, robot_sim's monotonic clock, which is that of the machine
+    gate: str
+    mode: str
+    age: int  # ticks, of the command in force
+    q: Array
+    speed: float  # rad/s, of the fastest motor
+
+
+@dataclass
+class Witness:
+    """Records the states of all parts and the transitions that agents publish."""
+
+    parts: dict[str, list[Moment]] = field(default_factory=dict)
+    published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
+    unlike: list[str] = field(default_factory=list)  # two different transitions of one number
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def attach(self, session: Any) -> None:
+        """Begin to listen."""
+        listen(session, State.stream.keys(), self._note_state)
+        listen(session, Transition.stream.keys(), self._note_transition)
+
+    def _note_state(self, heard: Heard) -> None:
+        state = heard.content()
+        speed = max(map(abs, state["dq"]), default=0.0)
+        moment = Moment(
+            state["run"],
+            state["k"],
+            1e-9 * state["t"],
+            1e-9 * state["tw"],
+            state["gate"],
+            state["mode"],
+            state["cmd_age"],
+            np.array(state["q"]),
+            speed,
+        )
+        with self.lock:
+            self.parts.setdefault(heard.key.partition("/")[0], []).append(moment)
+
+    def _note_transition(self, heard: Heard) -> None:
+        made = heard.content()
+        key, values = (made["agent"], made["n"]), tuple(made[name] for name in ("s", "a", "s_next", "settled", "duration"))
+        with self.lock:
+            if self.published.setdefault(key, values) != values:
+                self.unlike.append(f"{key[0]} published two transitions {key[1]}")
+
+    def newest(self, part: str) -> Moment | None:
+        """The last state of a part."""
+        with self.lock:
+            return self.parts[part][-1] if self.parts.get(part) else None
+
+    def all_armed(self, count: int) -> bool:
+        """Whether all `count` parts follow commands now."""
+        with self.lock:
+            return len(self.parts) == count and all(states[-1].gate == "armed" for states in self.parts.values())
+
+    def take_states(self) -> dict[str, list[Moment]]:
+        """Return the states so far, and keep only the last of each part."""
+        with self.lock:
+            taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
+        return taken
+
+
+@dataclass(frozen=True)
+class Stop:
+    """How a part came to rest after a fault: times [s] from the fault, and the distance [rad]; None: not within the time looked at."""
+
+    hold: float | None
+    rest: float | None
+    distance: float | None
+
+
+def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
+    """Return how a part stopped after a fault at a monotonic time; None if it was not moving on command then."""
+    before = [state for state in states if state.at <= fault]
+    if not before or before[-1].gate != "armed" or before[-1].mode == "hold" or before[-1].speed < MOVES:
+        return None
+    after = [state for state in states if fault < state.at <= until and state.run == before[-1].run]
+    held = next((state for state in after if state.mode == "hold"), None)
+    rest = next((state for state in after if state.speed < MOVES and held is not None and state.at >= held.at), None)
+    distance = None if rest is None else float(np.abs(rest.q - before[-1].q).max())
+    return Stop(None if held is None else held.at - fault, None if rest is None else rest.at - fault, distance)
+
+
+def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
+    """Return a line for each broken promise in the states of one schedule; `noise`: largest of the encoders, rad.
+
+    Within a run time never goes back, no motor is faster than the gate allows, and a part moves only if it is armed or comes to rest.
+    """
+    found = []
+    for part, moments in states.items():
+        limit = np.array([motor.max_velocity for motor in robot.motor_table[robot.part(part).slice]])
+        for before, after in zip(moments[:-1], moments[1:], strict=True):
+            if before.run != after.run:
+                continue
+            if after.k <= before.k:
+                found.append(f"{part}: tick {after.k} after tick {before.k}")
+                continue
+            excess = np.abs(after.q - before.q) - FACTOR * limit * (after.t - before.t + 0.01) - 2.0 * noise
+            if (excess > 0.0).any():
+                found.append(f"{part}: {np.rad2deg(excess.max()):.2f} deg too far in {after.t - before.t:.3f} s at tick {after.k}")
+    return found
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The transitions of all agents on disk, compared with those that they published."""
+
+    kept: int
+    lost: int  # published and not kept
+    differing: int  # kept otherwise than published
+    gaps: int  # numbers that are missing or twice
+
+
+def compare_transitions(witness: Witness, run_dir: Path, agents: list[str]) -> Kept:
+    """Compare what was published with the store of a run."""
+    kept = lost = differing = gaps = 0
+    with TransitionStore(run_dir / STORE, "", read_only=True) as store:
+        on_disk = {
+            agent: {one.n: (one.s, one.a, one.s_next, one.settled, one.duration) for one in store.load(agent)} for agent in store.agents()
+        }
+        counts = {agent: len(store.times(agent)) for agent in on_disk}
+    for agent, made in on_disk.items():
+        kept += counts[agent]
+        gaps += counts[agent] - len(made)
+    with witness.lock:
+        for (agent, n), values in witness.published.items():
+            if agent in agents:
+                found = on_disk.get(agent, {}).get(n)
+                lost += found is None
+                differing += found is not None and found != values
+    return Kept(kept, lost, differing + len(witness.unlike), gaps)

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The health of a process: rate, age and gaps of the ticks that it hears, refused messages, memory, open files; and which is bad."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+WINDOW = 5.0  # s over which rate, gap and refusals are measured
+SETTLED = 30.0  # s after the start; the memory of that time is what growth is compared with
+RECOVERED = 30.0  # s within its limit after which a value is good again, so that one at its limit is not reported all the time
+SLOW = 0.8  # share of the expected rate
+LONG_GAP = 0.15  # s in real time, beyond the period
+GROWTH, GROWN = 1.5, 100.0  # memory: factor and MB beyond that of the start
+MANY_FILES = 0.8  # share of the files that the process may open
+MANY_REFUSED = 10.0  # a second
+CROWD = 500  # waiting messages and calls
+
+Numbers = Mapping[str, float | None]
+
+
+class Beats:
+    """Counts events that should come at a fixed rate, by the monotonic clock."""
+
+    def __init__(self, now: float) -> None:
+        self._begun, self._count, self._gap = now, 0, 0.0
+        self._last: float | None = None
+        self.rate: float | None = None  # Hz, of the last whole window
+        self.gap: float | None = None  # s, the longest in it
+
+    def note(self, now: float) -> None:
+        """Note an event."""
+        if self._last is not None and now - self._last > self._gap:
+            self._gap = now - self._last
+        self._last = now
+        self._count += 1
+
+    def age(self, now: float) -> float | None:
+        """Time since the last event, s; None if there was none."""
+        return None if self._last is None else now - self._last
+
+    def end_window(self, now: float) -> None:
+        """Begin a new window."""
+        if self._last is not None:
+            self.rate, self.gap = self._count / (now - self._begun), max(self._gap, now - self._last)
+        self._begun, self._count, self._gap = now, 0, 0.0
+
+
+class Health:
+    """Measures this process; call `check` once in WINDOW.  `files_limit`: of open files, None where it is not known."""
+
+    def __init__(self, files_limit: int | None = None) -> None:
+        now = time.monotonic()
+        self.beats = Beats(now)
+        self._files_limit = files_limit if files_limit is not None else _files_limit()
+        self._begun, self._checked, self._memory_then = now, now, None
+        self._refused, self._refused_rate = 0, 0.0
+        self.bad: dict[str, float] = {}  # what is or was beyond its limit: its name, and the time [s] of the last check that found it
+
+    def numbers(self, waiting: int) -> Numbers:
+        """Rate [Hz], age and longest gap [ms] of the ticks, refusals a second, memory [MB], open files, threads, waiting messages."""
+        age, gap = self.beats.age(time.monotonic()), self.beats.gap
+        return {
+            "rate": self.beats.rate,
+            "age_ms": None if age is None else 1e3 * age,
+            "gap_ms": None if gap is None else 1e3 * gap,
+            "refused_rate": self._refused_rate,
+            "memory_mb": _memory(),
+            "files": _files(),
+            "threads": threading.active_count(),
+            "waiting": waiting,
+        }
+
+    def check(self, expected: float | None, refused: int, waiting: int, report: Callable[[str, str], None]) -> None:
+        """Compare the numbers of the last window with their limits.
+
+        `expected`: rate of the ticks, Hz, None in lockstep or without a clock; `refused`: number of messages since the start; `report` is
+        called with level and text when something becomes bad, and when it is good again.
+        """
+        now = time.monotonic()
+        self.beats.end_window(now)
+        self._refused_rate = max(0, refused - self._refused) / max(now - self._checked, 1e-3)
+        self._refused, self._checked = refused, now
+        memory = _memory()
+        if self._memory_then is None and now - self._begun > SETTLED:
+            self._memory_then = memory
+        for name, text in self._judged(expected, waiting, memory).items():
+            if name not in self.bad:
+                report("warning", text)
+            self.bad[name] = now
+        for name in [name for name, found in self.bad.items() if now - found > RECOVERED]:
+            del self.bad[name]
+            report("info", f"{name} has been within its limit for {RECOVERED:g} s")
+
+    def _judged(self, expected: float | None, waiting: int, memory: float | None) -> dict[str, str]:
+        bad, rate, gap, files = {}, self.beats.rate, self.beats.gap, _files()
+        if expected is not None and rate is not None and rate < SLOW * expected:
+            bad["rate"] = f"hears {rate:.0f} ticks a second of {expected:.0f}"
+        if expected is not None and gap is not None and gap > LONG_GAP + 1.0 / expected:
+            bad["gap"] = f"heard no tick for {1e3 * gap:.0f} ms"
+        if self._refused_rate > MANY_REFUSED:
+            bad["refused"] = f"refuses {self._refused_rate:.0f} messages a second"
+        if waiting > CROWD:
+            bad["waiting"] = f"{waiting} messages and calls wait"
+        before = self._memory_then
+        if memory is not None and before is not None and memory > max(GROWTH * before, before + GROWN):
+            bad["memory"] = f"has {memory:.0f} MB of memory, {before:.0f} MB after its start"
+        if files is not None and self._files_limit is not None and files > MANY_FILES * self._files_limit:
+            bad["files"] = f"has {files} files open of {self._files_limit}"
+        return bad
+
+
+def _memory() -> float | None:
+    """Resident memory of this process, MB; None where Linux's /proc is not there."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _files() -> int | None:
+    try:
+        return len(os.listdir("/proc/self/fd"))
+    except OSError:
+        return None
+
+
+def _files_limit() -> int | None:
+    try:
+        import resource
+    except ImportError:
+        return None
+    return resource.getrlimit(resource.RLIMIT_NOFILE)[0]

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of `mobee status`."""
+
+from __future__ import annotations
+
+import pytest
+
+from mobee_cli.status import _as_text
+
+HEALTH = {"rate": 99.8, "age_ms": 4.2, "gap_ms": 1131.0, "refused_rate": 0.0, "memory_mb": 61.4, "files": 31, "threads": 4, "waiting": 0}
+
+
+def service(**changes: object) -> dict[str, object]:
+    plain: dict[str, object] = {"state": "ready", "pid": 4242, "uptime_s": 12.3, "restarts": 0, "rejected": {}, "text": "100 ticks"}
+    return plain | {"health": HEALTH, "warnings": []} | changes
+
+
+def test_each_process_has_a_row_of_health_in_80_columns_and_what_is_bad_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    services = {"robot_sim": service(), "controller": service(warnings=["gap"]), "vision": service(state="down", health={})}
+    text = _as_text({"services": services, "parts": {}, "agents": {}})
+    print(text)
+    rows = {line.split()[0]: line.split()[1:] for line in text.split("process ")[1].splitlines()[1:]}
+    assert rows == {"robot_sim": ["100", "4", "1131", "0", "61", "31"], "controller": ["100", "4", "!1131", "0", "61", "31"]}
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_the_text_of_a_service_moves_no_cursor() -> None:
+    text = _as_text({"services": {"robot_sim": service(text="stop by a\nb\x1b[2J")}, "parts": {}, "agents": {}})
+    assert "stop by a b\\x1b[2J" in text and "\x1b" not in text
