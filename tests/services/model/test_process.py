@@ -47,3 +47,11 @@ def test_a_missing_world_is_refused_in_one_line(stage: Stage) -> None:
     assert "Did you mean 'table'?" in program.says
     assert "Traceback" not in program.says
     print(f"refused after {time.monotonic() - start:.1f} s")
+
+
+def test_a_second_model_that_is_started_by_hand_ends_and_the_first_goes_on(stage: Stage) -> None:
+    second = stage.rig.spawn("-m", "services.model", "--endpoint", stage.rig.endpoint)
+    assert second.wait(30.0) == 3
+    first = stage.rig.stat("model")
+    assert f"model runs already at {stage.rig.endpoint} (process {first.pid}), and two would both be obeyed" in second.says
+    assert stage.rig.instances("model") == {first.instance}
