@@ -13,7 +13,7 @@ import logging
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from experiments.kit.command_line import Progress
 from experiments.kit.live.faults import VITAL, Culprit, Fault, draw, shrunk
 from experiments.kit.live.launch import LaunchFailed
 from experiments.kit.live.system import System, running, stat_of, wait_for
-from experiments.kit.live.witness import Stop, Witness, compare_transitions, stop_after, violations
+from experiments.kit.live.witness import Witness, compare_transitions, stop_after, survived, violations
 from mobee.robot.load import load_robot
 from services.common.bus import Bus
 from services.common.session import open_client
@@ -36,6 +36,8 @@ HOLD_AT_MOST = {"kill": 30.0, "freeze": 120.0}  # ms, p95
 BACK_AT_MOST = 5.0  # s
 QUIET = 1.0  # load of the machine up to which times are judged; the system itself takes about that
 _BACK_PATIENCE = 40.0  # s
+_ENDED = {"agent": "an agent", "model": "the model"}
+_NOTICED = 0.5  # s; a process that is frozen for less may be late only
 _ALONE = 1.0  # s between a fault and the next, so that its effect can be told from that of the next
 
 
@@ -83,22 +85,32 @@ class _Patient:
             raise LaunchFailed(f"the launcher has ended: {(self.system.says.splitlines() or ['no message'])[-1]}")
         states = self.witness.take_states()
         back = max([0.0, *(moment.at - over for moments in states.values() for moment in moments if moment.gate != "armed")])
-        stops = [(fault.kind, stop) for fault, stop in self._stops(schedule, times, states)]
-        return {"back_s": back, "broken": [*broken, *violations(states, self._robot, NOISE)], "stops": stops}
+        alone = list(_alone(schedule, times))
+        stops = [
+            (fault.kind, stop)
+            for fault, at, until in alone
+            if fault.kind in HOLD_AT_MOST and fault.who in ("controller", "model") and not 0.0 < fault.duration < _NOTICED
+            for moments in states.values()
+            if (stop := stop_after(moments, at, min(until, at + 2.0))) is not None
+        ]
+        with self.witness.lock:
+            actions = [
+                ("model" if fault.who == "model" else "agent", lasted)
+                for fault, at, until in alone
+                if fault.kind == "kill" and (fault.who == "model" or fault.who.startswith("agent_"))
+                for part, changes in self.witness.motions.items()
+                if fault.who != f"agent_{part}" and (lasted := survived(changes, at, until)) is not None
+            ]
+        return {"back_s": back, "broken": [*broken, *violations(states, self._robot, NOISE)], "stops": stops, "actions": actions}
 
-    def _stops(self, schedule: Sequence[Fault], times: Sequence[float], states: dict[str, Any]) -> list[tuple[Fault, Stop]]:
-        """How the parts stopped that depend on a service that was killed or frozen alone."""
-        found = []
-        for n, (fault, at) in enumerate(zip(schedule, times, strict=True)):
-            following = times[n + 1] if n + 1 < len(times) else at + 10.0
-            earlier = max((times[i] + schedule[i].duration for i in range(n)), default=0.0)
-            alone = following - at > _ALONE and earlier + _ALONE < at
-            if not alone or fault.kind not in HOLD_AT_MOST or fault.who not in ("controller", "model") or 0.0 < fault.duration < 0.5:
-                continue
-            for moments in states.values():
-                if (stop := stop_after(moments, at, min(following, at + 2.0))) is not None:
-                    found.append((fault, stop))
-        return found
+
+def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[Fault, float, float]]:
+    """Yield each fault whose effect can be told from that of others, with its time and the time until which it is alone."""
+    for n, (fault, at) in enumerate(zip(schedule, times, strict=True)):
+        following = times[n + 1] if n + 1 < len(times) else at + 10.0
+        earlier = max((times[i] + schedule[i].duration for i in range(n)), default=0.0)
+        if following - at > _ALONE and earlier + _ALONE < at:
+            yield fault, at, following
 
 
 def measure(settings: Settings) -> dict[str, Any]:
@@ -126,6 +138,7 @@ def _performed(patient: _Patient, seed: int, settings: Settings) -> dict[str, An
 
 def _result(settings: Settings, rows: list[dict[str, Any]], kept: Any, seconds: float) -> dict[str, Any]:
     stops = [each for row in rows for each in row.pop("stops")]
+    actions = [each for row in rows for each in row.pop("actions")]
     load = float(np.median([row["load"] for row in rows]))
     held = {kind: _summary([1e3 * stop.hold for one, stop in stops if one == kind and stop.hold is not None]) for kind in HOLD_AT_MOST}
     never = sum(stop.hold is None for _, stop in stops)
@@ -148,6 +161,10 @@ def _result(settings: Settings, rows: list[dict[str, Any]], kept: Any, seconds: 
         "never_held": never,
         "stopping_distance_deg": distance,
         "back_s": back,
+        "actions_survived": {
+            who: {"survived": sum(lasted for one, lasted in actions if one == who), "of": sum(one == who for one, _ in actions)}
+            for who in ("agent", "model")
+        },
         "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "gaps": kept.gaps},
         "broken": broken,
         "rows": rows,
@@ -175,6 +192,8 @@ def report(result: dict[str, Any]) -> str:
         lines.append(f"{f'hold after a {kind} [ms]':<30}{_cells(result['hold_ms'][kind])}")
         lines.append(f"{f'stopping distance, {kind} [deg]':<30}{_cells(result['stopping_distance_deg'][kind])}")
     lines.append(f"{'all parts back [s]':<30}{_cells(result['back_s'])}")
+    for who, those in result["actions_survived"].items():
+        lines.append(f"actions of other parts that survived the end of {_ENDED[who]}: {those['survived']} of {those['of']}")
     lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['gaps']} gaps")
     lines += result["broken"] or ["no promise broken"]
     if not result["times_judged"]:

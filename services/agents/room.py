@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
 from mobee.errors import InUse, NoRoom
 from services.common.service import Service
@@ -13,12 +13,6 @@ from services.common.service import Service
 _T = TypeVar("_T")
 PERIOD = 1.0  # s between two attempts
 PREDECESSOR = 15.0  # s for which another process may write this agent's data: an agent without a router ends after 10 s
-
-
-class Appends(Protocol):
-    """A store to which something is appended."""
-
-    append: Callable[..., None]
 
 
 class Room:
@@ -51,8 +45,8 @@ class Room:
             self.waits_for = ""
         return result
 
-    def patient(self, store: Appends) -> None:
-        """Let a store wait for room whenever something is appended to it."""
+    def patient(self, store: Any) -> None:
+        """Let a store wait for room whenever something is appended to it by `append`."""
         append = store.append
         store.append = lambda *data: self.when_there_is(lambda: append(*data))
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 WINDOW = 5.0  # s over which rate, gap and refusals are measured
@@ -18,8 +18,6 @@ GROWTH, GROWN = 1.5, 100.0  # memory: factor and MB beyond that of the start
 MANY_FILES = 0.8  # share of the files that the process may open
 MANY_REFUSED = 10.0  # a second
 CROWD = 500  # waiting messages and calls
-
-Numbers = Mapping[str, float | None]
 
 
 class Beats:
@@ -56,11 +54,12 @@ class Health:
         now = time.monotonic()
         self.beats = Beats(now)
         self._files_limit = files_limit if files_limit is not None else _files_limit()
-        self._begun, self._checked, self._memory_then = now, now, None
+        self._begun = self._checked = now
+        self._memory_then: float | None = None  # MB
         self._refused, self._refused_rate = 0, 0.0
         self.bad: dict[str, float] = {}  # what is or was beyond its limit: its name, and the time [s] of the last check that found it
 
-    def numbers(self, waiting: int) -> Numbers:
+    def numbers(self, waiting: int) -> dict[str, int | float | None]:
         """Rate [Hz], age and longest gap [ms] of the ticks, refusals a second, memory [MB], open files, threads, waiting messages."""
         age, gap = self.beats.age(time.monotonic()), self.beats.gap
         return {

@@ -173,7 +173,7 @@ class Culprit:
         elif kind == "arm" and isinstance(taken := self._call(keys.drive(self._part, "take"), Take, Taken, instance="i1_forged"), Taken):
             self._call(keys.drive(self._part, "arm"), WithEpoch, Driven, epoch=taken.epoch)
 
-    def _call(self, key: str, request: Any, reply: type[Reply], **fields: object) -> Reply | None:
+    def _call(self, key: str, request: Any, reply: type[Reply], **fields: Any) -> Reply | None:
         with suppress(rpc.CallFailed):
             return rpc.call(self._session, "controller", key, request, reply, timeout=0.2, **fields)
         return None

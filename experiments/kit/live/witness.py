@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from bus_schema.messages import State, Transition
+from bus_schema.messages import Motion, State, Transition
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
 from services.common.observe import Heard, listen
 
 MOVES = np.deg2rad(2.0)  # rad/s; a part that is slower is at rest
+FRESH = 0.5  # s; an older state says nothing about now
 FACTOR = 1.05  # of the gate's limit: encoders are noisy
 
 
@@ -41,6 +43,7 @@ class Witness:
     """Records the states of all parts and the transitions that agents publish."""
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
+    motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, with their time
     published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
     unlike: list[str] = field(default_factory=list)  # two different transitions of one number
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -48,6 +51,7 @@ class Witness:
     def attach(self, session: Any) -> None:
         """Begin to listen."""
         listen(session, State.stream.keys(), self._note_state)
+        listen(session, Motion.stream.keys(), self._note_motion)
         listen(session, Transition.stream.keys(), self._note_transition)
 
     def _note_state(self, heard: Heard) -> None:
@@ -67,6 +71,13 @@ class Witness:
         with self.lock:
             self.parts.setdefault(heard.key.partition("/")[0], []).append(moment)
 
+    def _note_motion(self, heard: Heard) -> None:
+        motion = heard.content()
+        with self.lock:
+            changes = self.motions.setdefault(heard.key.partition("/")[0], [])
+            if not changes or changes[-1][1:] != (motion["status"], motion["action_id"]):
+                changes.append((1e-9 * motion["tw"], motion["status"], motion["action_id"]))
+
     def _note_transition(self, heard: Heard) -> None:
         made = heard.content()
         key, values = (made["agent"], made["n"]), tuple(made[name] for name in ("s", "a", "s_next", "settled", "duration"))
@@ -81,8 +92,10 @@ class Witness:
 
     def all_armed(self, count: int) -> bool:
         """Whether all `count` parts follow commands now."""
+        since = time.monotonic() - FRESH
         with self.lock:
-            return len(self.parts) == count and all(states[-1].gate == "armed" for states in self.parts.values())
+            newest = [states[-1] for states in self.parts.values()]
+        return len(newest) == count and all(one.gate == "armed" and one.at > since for one in newest)
 
     def take_states(self) -> dict[str, list[Moment]]:
         """Return the states so far, and keep only the last of each part."""
@@ -110,6 +123,22 @@ def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
     rest = next((state for state in after if state.speed < MOVES and held is not None and state.at >= held.at), None)
     distance = None if rest is None else float(np.abs(rest.q - before[-1].q).max())
     return Stop(None if held is None else held.at - fault, None if rest is None else rest.at - fault, distance)
+
+
+def survived(changes: list[tuple[float, str, str]], fault: float, until: float) -> bool | None:
+    """Return whether the action that was under way at a monotonic time has survived until a later one; None if there was none.
+
+    It has if it still moves, waits for the model, or has ended with an outcome.
+    """
+    before = [change for change in changes if change[0] <= fault]
+    if not before or before[-1][1] != "moving":
+        return None
+    for _, status, action in (change for change in changes if fault < change[0] <= until):
+        if action != before[-1][2] or status in ("held", "idle"):
+            return False
+        if status in ("settled", "timeout"):
+            return True
+    return True
 
 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:

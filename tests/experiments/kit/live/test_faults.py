@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from experiments.kit.live.faults import KINDS, Fault, _frozen, _stuttering, _without_disk, draw, shrunk
-from experiments.kit.live.witness import Moment, Witness, compare_transitions, stop_after, violations
+from experiments.kit.live.witness import Moment, Witness, compare_transitions, stop_after, survived, violations
 from mobee.robot.load import load_robot
 from mobee.store import STORE, Transition, TransitionStore
 
@@ -64,6 +64,22 @@ def test_a_stop_has_a_time_to_hold_a_time_to_rest_and_a_distance() -> None:
     assert stop_after([moment(k) for k in range(20)], 100.055, 101.0) is None  # at rest before
     never = stop_after([moment(k, speed=0.3) for k in range(20)], 100.055, 101.0)
     assert never is not None and never.hold is None
+
+
+@pytest.mark.parametrize(
+    ("after", "expected"),
+    [
+        ([], True),
+        ([(2.0, "suspended", "a"), (3.0, "moving", "a"), (4.0, "settled", "a"), (5.0, "moving", "b")], True),
+        ([(2.0, "suspended", "a"), (2.2, "held", "a")], False),
+        ([(2.0, "idle", "")], False),
+        ([(2.0, "moving", "b")], False),
+        ([(11.0, "held", "a")], True),  # later
+    ],
+)
+def test_an_action_survives_a_fault_if_it_has_an_outcome_or_goes_on(after: list[tuple[float, str, str]], expected: bool) -> None:
+    assert survived([(0.5, "settled", "z"), (0.9, "moving", "a"), *after], 1.0, 10.0) is expected
+    assert survived([(0.5, "settled", "z"), *after], 1.0, 10.0) is None
 
 
 def test_a_jump_and_a_tick_that_goes_back_are_violations_and_a_new_run_is_none() -> None:
