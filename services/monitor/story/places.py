@@ -24,7 +24,7 @@ def space_of(settings: str, robot: Robot) -> Space | None:
     """Return the space of a `Learned` message; None if this robot cannot make it."""
     try:
         return space_from(json.loads(settings), robot)
-    except (MobeeError, ValueError, TypeError):  # of another robot or version: its numbers cannot be placed
+    except (MobeeError, ValueError, TypeError, RecursionError):  # of another robot or version: its numbers cannot be placed
         return None
 
 

@@ -90,7 +90,7 @@ class Learning:
             self._made_from[part] = settings
             try:
                 space = space_from(json.loads(settings), self._robot)
-            except (MobeeError, ValueError, TypeError):  # of another robot or version: its numbers cannot be placed
+            except (MobeeError, ValueError, TypeError, RecursionError):  # of another robot or version: its numbers cannot be placed
                 self._drawn[part] = None
             else:
                 self._drawn[part] = Drawn(space, plane_layout(space) * (1.0, -1.0), np.asarray(space.goals >= 0))

@@ -77,5 +77,5 @@ def _read(path: Path) -> Iterator[Entry]:
             try:
                 when, name, value = json.loads(line)
                 yield Entry(float(when), str(name), value)
-            except (ValueError, TypeError):
+            except (ValueError, TypeError, RecursionError):
                 raise MobeeError(f"{path}:{number}: not a line of a story; was the file edited?") from None

@@ -191,7 +191,7 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             asked = json.loads(body)
             page, verb, arguments = str(asked["page"]), str(asked["verb"]), dict(asked.get("arguments", {}))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             self._answer(HTTPStatus.BAD_REQUEST, False, "the request is not valid")
             return
         try:
