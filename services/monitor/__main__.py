@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 from services.common.config import load_config
@@ -13,7 +12,7 @@ from services.monitor.config import Config
 from services.monitor.node import MonitorNode
 from services.monitor.viewer.output import open_output
 
-LAST_WORDS = 0.4  # s in which open pages learn that the system has ended
+LAST_WORDS = 2.0  # s for which the end waits until open pages have shown that the system has ended
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -32,8 +31,8 @@ def main(argv: Sequence[str] | None = None) -> None:
                 service.run()
             finally:
                 nodes[0].end()
-                if output.server is not None and output.server.site.pages.open():
-                    time.sleep(LAST_WORDS)
+                if output.server is not None:
+                    output.server.let_pages_show(LAST_WORDS)
 
 
 if __name__ == "__main__":

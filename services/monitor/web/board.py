@@ -27,6 +27,11 @@ class Board:
         self._version = 0
         self._record = record
 
+    @property
+    def version(self) -> int:
+        """The number of the newest change."""
+        return self._version
+
     def put(self, name: str, value: Any) -> None:
         """Set a value, given as plain JSON data; an equal value is no change."""
         text = json.dumps(value, separators=(",", ":"))

@@ -57,23 +57,28 @@ class Frames(Protocol):
 
 @dataclass
 class Pages:
-    """The open pages, by the ids that they chose, and how late each is."""
+    """The open pages, by the ids that they chose: how late each is, and which version of the board it has shown."""
 
     seen: dict[str, float] = field(default_factory=dict)  # monotonic clock of the last request
+    shown: dict[str, int] = field(default_factory=dict)
     late: dict[str, dict[str, float]] = field(default_factory=dict)  # s of robot time: of the page, of its 3D view
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def note(self, page: str, late: dict[str, float]) -> None:
+    def note(self, page: str, shown: int, late: dict[str, float]) -> None:
         """Note a request of a page."""
         with self.lock:
-            self.seen[page], self.late[page] = time.monotonic(), late
+            self.seen[page], self.shown[page], self.late[page] = time.monotonic(), shown, late
 
     def open(self) -> set[str]:
         """Return the pages that asked for something lately; the others are forgotten."""
         with self.lock:
             for page in [page for page, when in self.seen.items() if time.monotonic() - when > GONE]:
-                del self.seen[page], self.late[page]
+                del self.seen[page], self.shown[page], self.late[page]
             return set(self.seen)
+
+    def have_shown(self, version: int) -> bool:
+        """Whether every open page has shown a version of the board."""
+        return all(self.shown.get(page, version) >= version for page in self.open())
 
 
 @dataclass(frozen=True)
@@ -121,6 +126,12 @@ class PageServer:
         self._ends = threading.Event()
         threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True, name="page").start()
         threading.Thread(target=self._tend, daemon=True, name="tend").start()
+
+    def let_pages_show(self, patience: float) -> None:
+        """Wait until every open page has shown what is on the board now, at most for `patience` s."""
+        version, give_up = self.site.board.version, time.monotonic() + patience
+        while not self.site.pages.have_shown(version) and time.monotonic() < give_up:
+            time.sleep(0.02)
 
     def close(self) -> None:
         """End the server."""
@@ -219,9 +230,10 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_news(self, query: dict[str, str]) -> None:
         site, page, now = self._site, query.get("page", "")[:40], self._site.time()
         shown = {name: round(max(0.0, now - float(query[name])), 2) for name in ("body", "viewer") if query.get(name)}
+        after = int(query.get("after", 0))
         if page:
-            site.pages.note(page, shown)
-        text = site.board.news(int(query.get("after", 0)), NEWS_PATIENCE)
+            site.pages.note(page, after, shown)
+        text = site.board.news(after, NEWS_PATIENCE)
         late = json.dumps({"late": shown})
         self._send(HTTPStatus.OK, "application/json", f"{text[:-1]},{late[1:]}".encode())
 

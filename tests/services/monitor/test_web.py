@@ -118,6 +118,20 @@ def test_news_say_how_late_the_page_is(served: tuple[PageServer, Asked]) -> None
     assert served[0].site.pages.open() == {"p"}
 
 
+def test_the_end_waits_until_open_pages_have_shown_it(served: tuple[PageServer, Asked]) -> None:
+    server, board = served[0], served[0].site.board
+    board.put("status", "runs")
+    ask(server, "GET", "/news?after=0&page=p")
+    board.put("status", "ended")
+    threading.Timer(0.2, ask, (server, "GET", "/news?after=2&page=p")).start()
+    assert not server.site.pages.have_shown(2)
+    begin = time.monotonic()
+    server.let_pages_show(20.0)
+    assert time.monotonic() - begin < 15.0
+    assert server.site.pages.have_shown(2)
+    board.put("status", "gone")  # an answer to the page that still waits
+
+
 def test_a_record_is_read_as_it_was_written_also_if_its_end_was_cut_off(tmp_path: Path) -> None:
     times = iter((0.0, 0.5, 1.0))
     record = Record(tmp_path / "story.jsonl", lambda: next(times))
