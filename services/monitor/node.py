@@ -211,6 +211,7 @@ class MonitorNode:
         now, seen = time.monotonic(), self._seen
         seen.clock_age = None if self._ticked is None else now - self._ticked
         seen.gates, seen.why_held, seen.services = self._known.gates, self._why_held, set(self._service.alive)
+        seen.known = {*seen.known, *seen.services}
         held = {part for part, motion in self._known.motions.items() if motion.status in ("held", "suspended")}
         self._held_since = {part: self._held_since.get(part, now) for part in held}
         seen.held_for = {part: now - since for part, since in self._held_since.items()}

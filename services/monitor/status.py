@@ -25,6 +25,7 @@ class Seen:
     why_held: Mapping[str, str] = field(default_factory=dict)  # the controller's reason
     stop: EStop | None = None  # while it is set
     services: Collection[str] = ()  # that are up
+    known: Collection[str] = ()  # that have been up: a scenario may have no model or controller
     patience: float = STALE  # s of real time for which the clock may stand still
     ended: bool = False  # the monitor was asked to end
 
@@ -65,7 +66,7 @@ def banner(seen: Seen) -> dict[str, Any] | None:
             "fault", "The robot does not answer", f"No tick of its clock for {seen.clock_age:.0f} s.", "mobee status shows what runs"
         )
     for who in ("model", "controller"):
-        if who not in seen.services:
+        if who in seen.known and who not in seen.services:
             return _said("fault", f"The {who} is gone", "The whole robot holds.", "The launcher starts it again; if not: mobee status")
     held = [part for part, since in seen.held_for.items() if since > HELD]
     if held:

@@ -17,10 +17,9 @@ from typing import Any
 
 import psutil
 
-from experiments.live_picture import find_chromium
+from experiments.live_picture import WITHOUT_GRAPHICS, find_chromium
 
 PATIENCE = 60.0  # s for what takes a second on a free machine
-WITHOUT_GRAPHICS = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 CYCLE = 0.01  # s between two checks of a limited browser
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.live_picture import DRAW_IN_SOFTWARE, find_chromium
+from experiments.live_picture import find_chromium
 from mobee.robot.load import load_robot
 
 pytest.importorskip("rerun")
@@ -28,6 +28,7 @@ from services.monitor.web.server import PageServer, Site  # noqa: E402  # only w
 pytestmark = [pytest.mark.system, pytest.mark.skipif(find_chromium() is None, reason="Rerun's view: no Chromium")]
 
 PATIENCE = 150.0  # s for what takes some seconds on a free machine
+DRAW_IN_SOFTWARE = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
 SIZE = {"width": 400, "height": 300}  # pixels
 BRIGHT = 60  # of 255: brighter than the ground
 

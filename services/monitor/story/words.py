@@ -36,7 +36,8 @@ def joint_words(name: str, part: str, robot: Robot) -> str:
         if prefix and name.startswith(prefix) and len(name) > len(prefix):
             name = name.removeprefix(prefix)
             break
-    return re.sub(r"(?<=[a-z])(?=\d+$)", " ", name.replace("_", " "))
+    words = re.sub(r"(?<=[a-z])(?=\d+$)", " ", name.replace("_", " "))
+    return f"joint {words}" if words.isdecimal() else words
 
 
 def ordinal(n: int) -> str:

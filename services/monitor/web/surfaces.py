@@ -5,31 +5,32 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.rendering import palette
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot, Shape
 from mobee.robot.urdf.hull import facets
 
+COLOR: Color = (168, 174, 184)  # of a solid; the page adds that of the part's agent
 ROUND = 20  # corners of a circle
 BLOCK = 4  # bytes to which the header is padded: the arrays that follow are read in place
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles of one colour that move with a link.
+    """Triangles of one colour that move with a link of a part, by its number; -1: of no part.
 
     `vertices`: (v, 3) m, in the root frame with every joint at zero.  `normals`: (v, 3), of length 1.  `triangles`: (t, 3) indices, the
     corners anticlockwise as seen from outside.
     """
 
     link: int
+    part: int
     color: Color
     vertices: Array
     normals: Array
@@ -38,17 +39,20 @@ class Surface:
 
 def surfaces_of(robot: Robot) -> Callable[[], bytes]:
     """Return a function that returns the solids of a robot, encoded; they are made when the first page asks for them."""
-    colors = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
-    return cache(lambda: encoded([_surface(shape, colors) for shape in robot.shapes if shape.role == "solid"]))
+    parts = list(robot.parts)
+    return cache(lambda: encoded([_surface(shape, parts) for shape in robot.shapes if shape.role == "solid"]))
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:
     """Return the bytes that the page reads.
 
-    The length of the header (uint32); the header, JSON padded with spaces: link, colour, and numbers of vertices and triangles of each
-    surface; then of each surface vertices and normals (float32) and triangles (uint32), all little-endian.
+    The length of the header (uint32); the header, JSON padded with spaces: link, part, colour, and numbers of vertices and triangles
+    of each surface; then of each surface vertices and normals (float32) and triangles (uint32), all little-endian.
     """
-    rows = [{"link": one.link, "color": one.color, "vertices": len(one.vertices), "triangles": len(one.triangles)} for one in surfaces]
+    rows = [
+        {"link": one.link, "part": one.part, "color": one.color, "vertices": len(one.vertices), "triangles": len(one.triangles)}
+        for one in surfaces
+    ]
     header = json.dumps(rows).encode()
     header += b" " * (-len(header) % BLOCK)
     pieces = [struct.pack("<I", len(header)), header]
@@ -57,10 +61,11 @@ def encoded(surfaces: Sequence[Surface]) -> bytes:
     return b"".join(pieces)
 
 
-def _surface(shape: Shape, colors: Mapping[str, Color]) -> Surface:
+def _surface(shape: Shape, parts: Sequence[str]) -> Surface:
     made = MAKERS[shape.kind](shape)
     vertices, normals = (made[0] @ shape.rotation.T + shape.position, made[1] @ shape.rotation.T)
-    return Surface(shape.link, colors.get(shape.part, palette.SOLIDS[0]), vertices, normals, made[2])
+    part = parts.index(shape.part) if shape.part in parts else -1
+    return Surface(shape.link, part, COLOR, vertices, normals, made[2])
 
 
 Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame of the shape

@@ -56,7 +56,7 @@ def test_words() -> None:
     assert [ordinal(n) for n in (1, 2, 3, 4, 11, 12, 13, 21, 102, 111)] == "1st 2nd 3rd 4th 11th 12th 13th 21st 102nd 111th".split()
     assert joint_words("l_shoulder_pitch", "left_arm", ROBOT) == "shoulder pitch"
     assert joint_words("torso_yaw", "torso", ROBOT) == "yaw"
-    assert joint_words("arm_0", "arm", load_robot("katana")) == "0"
+    assert joint_words("arm_0", "arm", load_robot("katana")) == "joint 0"
     assert [listed(words) for words in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
     assert [percent(share) for share in (0.0, 0.001, 0.5, 0.999, 1.0)] == ["0 %", "under 1 %", "50 %", "over 99 %", "100 %"]
 
@@ -209,7 +209,7 @@ STOP = EStop(**HEADER, set=True, source="robot_sim", reason="emergency stop by p
         (Seen(clock_age=0.0, mode="free", services=ALL, gates={"left_arm": "fault"}), "fault", "FAULT: left arm"),
         (Seen(clock_age=9.0, mode="paused", services=ALL), "paused", "Paused"),
         (Seen(clock_age=9.0, mode="free", services=ALL), "fault", "The robot does not answer"),
-        (Seen(clock_age=0.0, mode="free", services=("robot_sim", "model")), "fault", "The controller is gone"),
+        (Seen(clock_age=0.0, mode="free", services=("robot_sim", "model"), known=ALL), "fault", "The controller is gone"),
         (Seen(clock_age=0.0, mode="free", services=()), "fault", "The robot is gone"),
         (Seen(clock_age=0.0, mode="free", services=ALL, held_for={"torso": 3.0}), "hold", "HOLD: torso"),
         (Seen(clock_age=0.0, mode="free", services=ALL, ended=True), "ended", "The system has ended"),
@@ -220,6 +220,10 @@ def test_what_stops_the_robot_is_said_with_what_to_do(seen: Seen, level: str, ti
     assert said is not None
     assert (said["level"], said["title"]) == (level, title)
     assert said["text"] and said["todo"]
+
+
+def test_a_scenario_without_model_and_controller_is_well() -> None:
+    assert banner(Seen(clock_age=0.0, mode="free", services=("robot_sim", "port_filter"), known=("robot_sim", "port_filter"))) is None
 
 
 def test_nothing_is_said_when_all_is_well_also_if_a_part_holds_for_a_moment() -> None:

@@ -89,16 +89,21 @@ export class BodyPicture {
     return (shape.vertices || []).map((v) => at(...v));
   }
 
+  // Points that a picture must hold: of the robot, of all places, of targets.
+  extent() {
+    const seen = [];
+    for (const shape of this.robot.shapes) if (!shape.field) seen.push(...this.points(shape, (p) => this.moved(shape.link, p)));
+    for (const where of Object.values(this.places)) seen.push(...where.points.map((p) => this.moved(where.link, p)));
+    for (const thing of this.objects) if (thing.role === "target") seen.push(thing.position);
+    return seen.length ? seen : [[0, 0, 0], [0, 0, 0.3]];
+  }
+
   // Fit what is drawn into the canvas; kept until the view or the size changes, so that the picture does not swim.
   fit(width, height) {
     const key = `${width} ${height} ${this.view} ${this.robot.name} ${Object.keys(this.places)}`;
     if (this.frame && this.frame.key === key) return;
     this.camera = this.axes();
-    const seen = [];
-    for (const shape of this.robot.shapes) if (!shape.field) seen.push(...this.points(shape, (p) => this.moved(shape.link, p)));
-    for (const where of Object.values(this.places)) seen.push(...where.points.map((p) => this.moved(where.link, p)));
-    for (const thing of this.objects) if (thing.role === "target") seen.push(thing.position);
-    if (!seen.length) seen.push([0, 0, 0], [0, 0, 0.3]);
+    const seen = this.extent();
     const us = seen.map((p) => dot(p, this.camera[0]));
     const vs = seen.map((p) => dot(p, this.camera[1]));
     const [u0, u1, v0, v1] = [Math.min(...us), Math.max(...us), Math.min(...vs), Math.max(...vs)];
@@ -356,7 +361,7 @@ function arrow(ink, [x0, y0], [x1, y1]) {
 }
 
 // The convex hull of points in the plane (monotone chain).
-function outlineOf(points) {
+export function outlineOf(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const half = (list) => {
     const chain = [];

@@ -3,7 +3,11 @@
 
 const MARGIN = { left: 40, right: 10, top: 22, bottom: 30 };
 const LEGEND = 20; // pixels
-const OTHERS = { least_tried: ["least tried", "#b9c4cf", []], random: ["random", "#7c8a99", [2, 3]] };
+const WIDE = 600; // pixels: the legend is written out
+const OTHERS = {
+  least_tried: ["least tried", "tried, if least tried first", "#b9c4cf", []],
+  random: ["random", "tried, if at random", "#7c8a99", [2, 3]],
+};
 
 export function sharpened(canvas) {
   const ratio = window.devicePixelRatio || 1;
@@ -38,8 +42,9 @@ export function drawCurves(canvas, curves, baselines, colors, titles, waiting) {
 }
 
 function drawLegend(ink, width) {
-  const entries = [["tried at least once", "#e9edf2", [], 2.2], ["predictable", "#e9edf2", [4, 4], 1.6]];
-  for (const [text, color, dash] of Object.values(OTHERS)) entries.push([`${text}: tried`, color, dash, 1.4]);
+  const wide = width > WIDE;
+  const entries = [[wide ? "share of its actions tried" : "tried", "#e9edf2", [], 2.2], ["predictable", "#e9edf2", [4, 4], 1.6]];
+  for (const [short, long, color, dash] of Object.values(OTHERS)) entries.push([wide ? long : short, color, dash, 1.4]);
   let at = 10;
   ink.textAlign = "left";
   for (const [text, color, dash, thick] of entries) {
@@ -49,20 +54,18 @@ function drawLegend(ink, width) {
     ink.lineWidth = thick;
     line(ink, [[at, 11], [at + 20, 11]]);
     ink.fillStyle = "#c2ccd6";
-    ink.fillText(text, at + 25, 15);
-    at += 40 + ink.measureText(text).width;
+    ink.fillText(text, at + 24, 15);
+    at += (wide ? 36 : 32) + ink.measureText(text).width;
   }
   ink.setLineDash([]);
 }
 
 function drawPlot(ink, width, height, curve, others, color, title) {
-  const [begun, newest] = [curve[0][0], curve.at(-1)[0]];
-  const grows = newest - begun;
-  const least = begun > newest / 4 ? begun : 0; // an agent that goes on after an earlier run
-  const most = grows > newest / 4 ? nice(Math.max(8, newest)) : newest + Math.max(2, Math.round(grows / 4));
+  const newest = curve.at(-1)[0];
+  const most = nice(Math.max(8, newest));
   const ends = [curve.at(-1)[1], ...Object.values(others).map((points) => points.at(-1)[1])];
   const top = Math.min(1, nice(100 * Math.max(0.05, ...ends)) / 100);
-  const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * (n - least)) / (most - least);
+  const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * n) / most;
   const y = (share) => height - MARGIN.bottom - ((height - MARGIN.top - MARGIN.bottom) * share) / top;
   ink.strokeStyle = "#262f3a";
   ink.fillStyle = "#98a5b3";
@@ -75,7 +78,7 @@ function drawPlot(ink, width, height, curve, others, color, title) {
     if (height > 120 || step % 2 === 0) ink.fillText(`${+(100 * share).toFixed(1)} %`, MARGIN.left - 5, y(share) + 4);
   }
   for (let step = 0; step <= steps; step++) {
-    const n = least + ((most - least) * step) / steps;
+    const n = (most * step) / steps;
     ink.textAlign = step === steps ? "right" : "center";
     ink.fillText(`${Math.round(n)}`, x(n) + (step === steps ? 6 : 0), height - MARGIN.bottom + 13);
   }
@@ -86,11 +89,11 @@ function drawPlot(ink, width, height, curve, others, color, title) {
   ink.rect(MARGIN.left, 0, width - MARGIN.left, height);
   ink.clip();
   for (const [name, points] of Object.entries(others)) {
-    const [, shade, dash] = OTHERS[name] || [name, "#98a5b3", []];
+    const [, , shade, dash] = OTHERS[name] || ["", "", "#98a5b3", []];
     ink.strokeStyle = shade;
     ink.setLineDash(dash);
     ink.lineWidth = 1.4;
-    line(ink, points.filter(([n]) => n >= least).map((point) => [x(point[0]), y(Math.min(top, point[1]))]));
+    line(ink, points.map((point) => [x(point[0]), y(Math.min(top, point[1]))]));
   }
   ink.strokeStyle = `rgb(${color})`;
   for (const [column, dash, thick] of [[1, [], 2.2], [2, [4, 4], 1.6]]) {
@@ -98,7 +101,7 @@ function drawPlot(ink, width, height, curve, others, color, title) {
     ink.lineWidth = thick;
     const points = curve.map((point) => [x(point[0]), y(Math.min(top, point[column]))]);
     line(ink, points);
-    if (points.length === 1) dot(ink, points[0], `rgb(${color})`);
+    dot(ink, points.at(-1), `rgb(${color})`);
   }
   ink.restore();
   ink.setLineDash([]);

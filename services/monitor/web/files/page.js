@@ -23,7 +23,7 @@ const picture = new BodyPicture($("body"), $("tip"), {
     say(place ? "A place is picked: H lets the nearest hand reach for it." : `The ${name} is picked: H lets the nearest hand reach for it; or drag it.`);
   },
 });
-const view = new View({ frame: $("viewer"), canvas: $("scene"), note: $("loading"), button: $("other-view") });
+const view = new View({ frame: $("viewer"), canvas: $("scene"), legend: $("view-legend"), note: $("loading"), button: $("other-view") });
 const move = new MovePanel($("move"), { send, state });
 
 // ---- calls
@@ -90,6 +90,7 @@ const shows = {
     move.build(robot);
     showLegend();
     view.open(robot);
+    isFramed = false;
     if (restarted) view.reload();
   },
   status(status) {
@@ -116,6 +117,8 @@ const shows = {
     picture.places = places;
     picture.touch();
     showLegend();
+    view.scene.paint(Object.fromEntries(Object.keys(places).map((part) => [part, colorOf(part)])));
+    isFramed = false;
   },
   left(left) {
     picture.left = left;
@@ -198,6 +201,7 @@ function showState() {
   $("pause").firstChild.textContent = state.status.mode === "paused" ? "Go on " : "Pause ";
   for (const button of document.querySelectorAll("[data-do=stop], [data-do=pause], [data-do=tab-move]")) button.hidden = state.past;
   if (!state.cards.length) showCards();
+  arrange();
 }
 
 // ---- the story
@@ -218,7 +222,7 @@ function showCards() {
   const silent = (state.status.agents || []).filter((name) => !known.has(name));
   const cards = state.cards.map(keptCard);
   for (const name of silent) cards.push(waiting(name, "Its agent is up. Waiting for its first decision."));
-  if (!cards.length) cards.push(waiting("No agent moves this robot", state.robot ? "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders." : "Waiting for the robot."));
+  if (!cards.length) cards.push(waiting("No agent moves this robot", noAgent()));
   $("cards").replaceChildren(...cards);
   for (const one of state.cards) {
     const { made, text, plotted } = kept.get(one.part);
@@ -233,6 +237,23 @@ function keptCard(one) {
   const text = JSON.stringify([one, picture.chosen === one.part, state.control.taken]);
   if (kept.get(one.part)?.text !== text) kept.set(one.part, { made: card(one), text });
   return kept.get(one.part).made;
+}
+
+function noAgent() {
+  if (!state.robot) return "Waiting for the robot.";
+  if (state.past) return "Nobody explored in this run.";
+  if (!state.status.services?.includes("controller")) return "Nor a controller: your own program drives it, and is seen here.";
+  return "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders.";
+}
+
+// Without agents there is nothing to know: the page begins with what a person can do.
+let isArranged = false;
+function arrange() {
+  const agents = state.status.agents?.length || Object.keys(state.curves).length;
+  $("wonders-title").textContent = agents ? "What it wonders about" : "The robot";
+  if (isArranged || !state.robot || !state.status.services?.includes("controller")) return;
+  isArranged = true;
+  if (!agents && !state.past) tab("move");
 }
 
 function waiting(name, text) {
@@ -292,6 +313,16 @@ function chooseNext() {
 }
 
 function showLegend() {
+  const marks = Object.keys(picture.places).length ? [["transparent; box-shadow: 0 0 0 1.5px #fff", "where an action leads"]] : [];
+  if (state.robot?.shapes.some((one) => one.field)) marks.push(["#ff463c88", "field of the skin that is touched: it pushes the robot away"]);
+  marks.push(["#ff785a", "contact"]);
+  $("view-legend").replaceChildren(
+    ...marks.map(([color, text]) => {
+      const spot = node("i", "");
+      spot.style.cssText = `background: ${color}`;
+      return node("span", "", spot, text);
+    }),
+  );
   const entries = Object.entries(picture.places).map(([part, where]) => {
     const ramp = node("i", "ramp");
     ramp.style.background = `linear-gradient(90deg, rgb(26,34,44), rgb(${colorOf(part)}))`;
@@ -308,9 +339,11 @@ function showLegend() {
 
 function showCurves() {
   if ($("knows").hidden) return;
-  const colors = Object.fromEntries(Object.keys(state.curves).map((part) => [part, colorOf(part)]));
-  const titles = Object.fromEntries(Object.keys(state.curves).map((part) => [part, title(part)]));
-  drawCurves($("curves"), state.curves, state.baselines, colors, titles, "The curve begins when an agent has ended its first action.");
+  const parts = state.cards.map((one) => one.part).filter((part) => part in state.curves);
+  const curves = Object.fromEntries(parts.map((part) => [part, state.curves[part]]));
+  const colors = Object.fromEntries(parts.map((part) => [part, colorOf(part)]));
+  const titles = Object.fromEntries(parts.map((part) => [part, title(part)]));
+  drawCurves($("curves"), curves, state.baselines, colors, titles, "The curve begins when an agent has ended its first action.");
 }
 
 // ---- keys and buttons
@@ -354,6 +387,7 @@ const byName = { ...Object.fromEntries(Object.values(actions).map(([name, , act]
 function look(name) {
   picture.look(name);
   view.scene.turn(name);
+  isFramed = false;
   redraw();
 }
 
@@ -437,6 +471,7 @@ function marks() {
 
 let drawn = null; // s of robot time of the newest body that was drawn
 let isDue = false;
+let isFramed = false; // the 3D view sees the whole robot and all places
 function redraw() {
   if (isDue) return;
   isDue = true;
@@ -444,6 +479,8 @@ function redraw() {
     isDue = false;
     picture.draw();
     if (!picture.body || !picture.robot) return;
+    if (!isFramed) view.scene.fit(picture.extent());
+    isFramed = true;
     if (!$("scene").hidden) view.scene.draw(picture.body, picture.objects, marks(), picture.fields);
     drawn = picture.body.t;
   });

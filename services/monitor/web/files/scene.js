@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the robot in perspective, shaded, by a depth buffer in JavaScript: it needs no graphics card, and a frame costs milliseconds.
 
+import { outlineOf } from "./body.js";
+
 const FIELD_OF_VIEW = 42; // degrees, of the smaller side
 const SHADES = 64; // of a colour
 const LIGHT = unit([-0.55, 0.8, 0.5]); // where the light comes from: to the right, up and back as the camera sees it
 const RESOLUTIONS = [0.5, 0.75, 1, 1.5, 2]; // pixels that are computed for each of the page's, along a side
 const ENOUGH = 9; // ms of a frame below which a finer picture is computed
 const TOO_MUCH = 20; // ms of a frame above which a coarser one is
+const TINT = 0.4; // share of an agent's colour in that of its part
+const FILLED = 0.86; // of the picture
 const TRAIL = 60; // places of a hand
 const OBJECT_ROUND = 20; // corners of a circle
 
@@ -29,8 +33,39 @@ export class SceneView {
     this.trails = {};
     this.home = { eye: robot.eye, target: robot.target };
     this.turn("oblique");
+    this.shown = null;
     const data = await (await fetch("surfaces")).arrayBuffer();
     this.surfaces = surfacesIn(data);
+    this.paint(this.colors || {});
+  }
+
+  // Let the parts that agents move, `colors` by name, have something of their colours.
+  paint(colors) {
+    this.colors = colors;
+    for (const one of this.surfaces) {
+      const tint = colors[this.robot.parts[one.part]?.name];
+      one.shades = shadesOf(tint ? one.color.map((channel, i) => (1 - TINT) * channel + TINT * tint[i]) : one.color);
+    }
+  }
+
+  // Move the camera so that it sees these points, from where it looks now.
+  fit(points) {
+    if (this.isMoved || !this.camera || !points.length) return;
+    const [width, height] = [this.canvas.clientWidth || 1, this.canvas.clientHeight || 1];
+    const axes = cameraAxes(this.camera);
+    const slope = Math.tan(radians(FIELD_OF_VIEW / 2));
+    const limits = [slope * Math.max(1, width / height), slope * Math.max(1, height / width)].map((one) => one * FILLED);
+    const target = [0, 1, 2].map((i) => {
+      const along = points.map((p) => p[i]);
+      return (Math.min(...along) + Math.max(...along)) / 2;
+    });
+    let distance = 0;
+    for (const p of points) {
+      const d = sub(p, target);
+      for (const i of [0, 1]) distance = Math.max(distance, dot(d, axes[2]) + Math.abs(dot(d, axes[i])) / limits[i]);
+    }
+    Object.assign(this.camera, { target, distance });
+    this.redraw();
   }
 
   turn(name) {
@@ -45,7 +80,8 @@ export class SceneView {
       side: [radians(front + 90), radians(6)],
     };
     const [azimuth, elevation] = views[name];
-    this.camera = { azimuth, elevation, distance, target: [...target] };
+    this.camera = { azimuth, elevation, distance: this.camera?.distance || distance, target: this.camera?.target || [...target] };
+    this.isMoved = false;
   }
 
   listen() {
@@ -57,6 +93,7 @@ export class SceneView {
     });
     this.canvas.addEventListener("pointermove", (event) => {
       if (!start) return;
+      this.isMoved = true;
       this.camera.azimuth = start.azimuth - 0.008 * (event.clientX - start.x);
       this.camera.elevation = Math.min(1.55, Math.max(-0.6, start.elevation + 0.006 * (event.clientY - start.y)));
       this.redraw();
@@ -67,6 +104,7 @@ export class SceneView {
       (event) => {
         if (!this.camera) return;
         event.preventDefault();
+        this.isMoved = true;
         const farthest = 6 * Math.hypot(...sub(this.home.eye, this.home.target));
         this.camera.distance = Math.min(farthest, Math.max(0.05, this.camera.distance * Math.exp(0.001 * event.deltaY)));
         this.redraw();
@@ -110,12 +148,9 @@ export class SceneView {
     }
     this.pixels.set(this.ground);
     this.depth.fill(0);
-    const { azimuth, elevation, distance, target } = this.camera;
-    const back = [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
-    const right = [-Math.sin(azimuth), Math.cos(azimuth), 0];
-    const up = cross(back, right);
-    this.axes = [right, up, back];
-    this.eye = target.map((one, i) => one + distance * back[i]);
+    const { distance, target } = this.camera;
+    this.axes = cameraAxes(this.camera);
+    this.eye = target.map((one, i) => one + distance * this.axes[2][i]);
     this.focal = (0.5 * Math.min(w, h)) / Math.tan(radians(FIELD_OF_VIEW / 2));
     this.near = 0.05 * distance;
   }
@@ -178,7 +213,12 @@ export class SceneView {
     for (const shape of this.robot.shapes) {
       if (!shape.field || !(fields || touched.has(shape.name))) continue;
       const m = body.links[shape.link] || STILL;
-      ink.strokeStyle = ink.fillStyle = touched.has(shape.name) ? "rgba(255,70,60,0.35)" : "rgba(90,200,220,0.10)";
+      ink.strokeStyle = ink.fillStyle = touched.has(shape.name) ? "rgba(255,70,60,0.24)" : "rgba(90,200,220,0.10)";
+      if (shape.vertices) {
+        const at = (v) => this.project(apply(m, shape.position.map((p, i) => p + dot(shape.rotation[i], v))));
+        polygon(ink, outlineOf(shape.vertices.map(at)));
+        continue;
+      }
       const half = shape.kind === "capsule" ? shape.size[1] / 2 : 0;
       const ends = [-half, half].map((z) => this.project(apply(m, shape.position.map((p, i) => p + shape.rotation[i][2] * z))));
       ink.lineWidth = this.focal * shape.size[0] * (ends[0][2] + ends[1][2]);
@@ -242,18 +282,29 @@ function surfacesIn(data) {
   return header.map((one) => {
     const vertices = take(Float32Array, 3 * one.vertices);
     const normals = take(Float32Array, 3 * one.vertices);
-    return surface(one.link, one.color, vertices, normals, take(Uint32Array, 3 * one.triangles));
+    return surface(one.link, one.part, one.color, vertices, normals, take(Uint32Array, 3 * one.triangles));
   });
 }
 
-function surface(link, color, vertices, normals, triangles) {
+function surface(link, part, color, vertices, normals, triangles) {
+  return { link, part, color, vertices, normals, triangles, shades: shadesOf(color), screen: new Float32Array((4 * vertices.length) / 3) };
+}
+
+function shadesOf(color) {
   const shades = new Uint32Array(SHADES);
   for (let i = 0; i < SHADES; i++) {
     const bright = i / (SHADES - 1);
     const white = 90 * Math.max(0, bright - 0.75) ** 1.5;
     shades[i] = rgb(...color.map((channel) => Math.min(255, channel * (0.22 + 0.95 * bright) + white)));
   }
-  return { link, vertices, normals, triangles, shades, screen: new Float32Array((4 * vertices.length) / 3) };
+  return shades;
+}
+
+// Right, up and back of a camera.
+function cameraAxes({ azimuth, elevation }) {
+  const back = [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
+  const right = [-Math.sin(azimuth), Math.cos(azimuth), 0];
+  return [right, cross(back, right), back];
 }
 
 function thingSurface({ kind, size, color }) {
@@ -275,7 +326,7 @@ function thingSurface({ kind, size, color }) {
         triangles.push(first, first + 1, first + 2, first, first + 2, first + 3);
       }
     }
-    return surface(0, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
+    return surface(0, -1, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
   }
   const [radius, half] = [size[0], kind === "sphere" ? 0 : size[1] / 2];
   const flat = kind === "cylinder";
@@ -295,7 +346,7 @@ function thingSurface({ kind, size, color }) {
       if (i < OBJECT_ROUND && j < profile.length - 1) triangles.push(first, beside, beside + 1, first, beside + 1, first + 1);
     });
   }
-  return surface(0, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
+  return surface(0, -1, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
 }
 
 function pose({ rotation: r, position: p }) {
@@ -367,6 +418,12 @@ function stroke(ink, points) {
   ink.beginPath();
   points.forEach(([x, y], i) => (i ? ink.lineTo(x, y) : ink.moveTo(x, y)));
   ink.stroke();
+}
+
+function polygon(ink, points) {
+  ink.beginPath();
+  points.forEach(([x, y], i) => (i ? ink.lineTo(x, y) : ink.moveTo(x, y)));
+  ink.fill();
 }
 
 function disc(ink, x, y, radius) {

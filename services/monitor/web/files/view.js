@@ -16,10 +16,11 @@ function viewerAddress() {
 }
 
 export class View {
-  constructor({ frame, canvas, note, button }) {
+  constructor({ frame, canvas, legend, note, button }) {
     this.scene = new SceneView(canvas);
     this.frame = frame;
     this.canvas = canvas;
+    this.legend = legend;
     this.note = note;
     this.button = button;
     this.rerunTime = null; // s of robot time that Rerun shows
@@ -70,7 +71,7 @@ export class View {
     this.frame.hidden = true;
     this.frame.removeAttribute("src");
     this.frame.contentWindow?.location.replace("about:blank"); // without an address alone it would go on
-    this.canvas.hidden = false;
+    this.canvas.hidden = this.legend.hidden = false;
     this.rerunTime = null;
     this.button.firstChild.textContent = "Rerun's view ";
     this.say(why);
@@ -80,7 +81,7 @@ export class View {
     if (kind === "loading") this.say(`Rerun's view loads: ${Math.round(100 * share)} %`);
     if (kind === "ready") this.say("Rerun's view draws its first picture.");
     if (kind === "shown") {
-      this.canvas.hidden = true;
+      this.canvas.hidden = this.legend.hidden = true;
       this.button.firstChild.textContent = "Light view ";
       this.say("");
     }
