@@ -99,7 +99,7 @@ class AgentNode:
 
     def _explore(self, request: Explore, key: str) -> Done:
         """Choose the next actions by another explorer, and record that."""
-        valid = (*EXPLORERS, self._config.explorer)
+        valid = (*EXPLORERS, self._agent.settings["explorer"])
         if request.explorer not in valid:  # a call imports no code
             raise CallRefused("explorer", f"no explorer {request.explorer!r}; valid: {', '.join(valid)}")
         try:

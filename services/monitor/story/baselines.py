@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bus_schema.messages import Learned
 from mobee.arrays import Array, Ints
@@ -36,14 +37,14 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
     An action that it has not tried reaches its goal with the share of all its tries that did, and else stays.
     """
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
-    missed = np.zeros(known.tries.shape)
+    (count, actions), missed = known.tries.shape, np.zeros(known.tries.shape)
     for one in learned.surprises:
-        if one.s < len(space) and one.a < missed.shape[1] and one.s_next < len(space):
+        if one.s < count and one.a < actions and one.s_next < count:
             found.setdefault((one.s, one.a), []).append((one.s_next, one.share))
             missed[one.s, one.a] += one.share
     width = 1 + max((len(rows) for rows in found.values()), default=1)
-    states = np.repeat(np.arange(len(space))[:, None, None], missed.shape[1], axis=1).repeat(width, axis=2)
-    shares = np.zeros(states.shape)
+    states = np.tile(np.arange(count)[:, None, None], (1, actions, width))
+    shares = np.zeros((count, actions, width))
     states[:, :, 0], shares[:, :, 0] = np.where(known.exists, space.goals, 0), np.clip(1.0 - missed, 0.0, 1.0)
     for (s, a), rows in found.items():
         for place, (state, share) in enumerate(rows, start=1):
@@ -55,7 +56,7 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
     return Outcomes(states, np.cumsum(shares, axis=2))
 
 
-def baselines(outcomes: Outcomes, exists: Array, start: int, transitions: int) -> dict[str, Curve]:
+def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transitions: int) -> dict[str, Curve]:
     """Simulate the explorers BASELINES from a state on; returns the curve of each.
 
     `exists`: (S, A), which are state-actions at all.
@@ -85,7 +86,7 @@ def baselines(outcomes: Outcomes, exists: Array, start: int, transitions: int) -
     return curves
 
 
-def _shares(counts: Ints, exists: Array) -> tuple[float, float]:
+def _shares(counts: NDArray[np.int32], exists: NDArray[np.bool_]) -> tuple[float, float]:
     tries = counts.sum(axis=3)
     predictable = (tries >= PREDICTABLE_TRIES) & (counts.max(axis=3) >= PREDICTABLE_SHARE * tries)
     return float((tries > 0)[:, exists].mean()), float(predictable[:, exists].mean())

@@ -263,7 +263,7 @@ function waiting(name, text) {
 }
 
 function card(one) {
-  const facts = one.n === undefined ? "" : `${one.n} transitions, ${share(one.tried)} of ${one.actions} actions tried, ${share(one.predictable)} predictable`;
+  const facts = one.n === undefined ? "" : `${one.n} transition${one.n === 1 ? "" : "s"}, ${share(one.tried)} of ${one.actions} actions tried, ${share(one.predictable)} predictable`;
   const plot = node("canvas", "");
   plot.title = "Surprise of the last 60 transitions, −ln p in nats; amber: it did not get where it wanted";
   const small = node("small", "", facts);
