@@ -6,9 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bus_schema.messages import MotionStatus
+from bus_schema.messages import GateState, MotionStatus
 from mobee.arrays import Array
 from mobee.control import Settle, SettleTest
+
+LONGEST_SUSPENSION = 10.0  # s of the bus clock; a service is back within 5 s
+MOST_SUSPENSIONS = 5  # of one action: a part that is held again and again would never settle
 
 
 @dataclass
@@ -29,13 +32,13 @@ class Action:
         self.owner: Owner | None = None
         self.id = ""
         self.target: Array | None = None  # (n_part,) rad, to which the action may continue after a suspension
-        self.suspended_at = 0.0  # s
+        self._suspended_at, self._suspensions = 0.0, 0  # s, of the last one; number in this action
         self.status: MotionStatus = "held"
         self.since_k = self.start_k = 0
 
     def start(self, action_id: str, k: int, t: float, target: Array | None = None) -> None:
         """Start an action whose goal was set at tick k, time t [s]; `target`: of an action that may be suspended."""
-        self.id, self.start_k, self.target = action_id, k, target
+        self.id, self.start_k, self.target, self._suspensions = action_id, k, target, 0
         self.settle_again(k, t)
 
     @property
@@ -48,9 +51,22 @@ class Action:
         """Whether the action has not ended: the part moves, or will move again."""
         return self.status in ("moving", "suspended")
 
+    def may_continue(self, t: float, gate: GateState) -> bool:
+        """Return whether the action of a part that is in hold at time t [s] may continue when the part is under control again.
+
+        A short hold leaves the part at rest on the path to its goal.  After an emergency stop or a fault, and after a long hold, nobody
+        should find it moving to an old one.
+        """
+        if self.target is None or gate in ("estop", "fault"):
+            return False
+        if self.status == "moving":
+            return self._suspensions < MOST_SUSPENSIONS
+        return self.status == "suspended" and t - self._suspended_at <= LONGEST_SUSPENSION
+
     def suspend(self, k: int, t: float) -> None:
         """Let the part rest at tick k, time t [s], without ending the action."""
-        self._test, self.suspended_at = None, t
+        self._test, self._suspended_at = None, t
+        self._suspensions += 1
         self._set_status("suspended", k)
 
     def settle_again(self, k: int, t: float) -> None:

@@ -28,7 +28,6 @@ from services.controller.goals import GoalServer
 from services.controller.law import RobotLaw
 from services.controller.publish import CommandPublisher, Counters, MotionPublisher
 from services.controller.reaches import Reaches
-from services.controller.suspension import Suspensions
 
 
 class ControllerNode:
@@ -47,7 +46,6 @@ class ControllerNode:
         self._commands = CommandPublisher(service, config.ttl, self._law, self._actions, self._drives)
         self._reaches = Reaches(service.bus, robot, self._law, self._actions)
         self._goals = GoalServer(service, robot, self._law, self._actions, self._reaches, self._commands)
-        self._suspensions = Suspensions()
         self._tick: Tick | None = None  # waits for its forces
         self._timer: Timer | None = None  # free mode: end of that wait
         self._mark()
@@ -123,7 +121,6 @@ class ControllerNode:
     def _supervise(self, tick: Tick, fresh: bool) -> None:
         """Arm the parts that can be armed; a part that is not under control has no action and rests where it is."""
         self._drives.watch_stop(tick.parts)
-        self._suspensions.note_forces(tick, fresh)
         for part, action in self._actions.items():
             state = tick.parts[part]
             lacking = "no fresh forces" if not fresh else "no fresh state" if tick.t - state.t > MAX_STATE_AGE else ""
@@ -139,7 +136,7 @@ class ControllerNode:
     def _lose(self, part: str, tick: Tick, state: PartStatus, why: str) -> None:
         """Suspend the action of a part that is not under control, or end it."""
         action = self._actions[part]
-        may_continue = self._suspensions.may_continue(action, tick, state) and not self._drives.is_stopped
+        may_continue = action.may_continue(tick.t * 1e-9, state.gate) and not self._drives.is_stopped
         if may_continue and action.status == "moving":
             action.suspend(tick.k, tick.t * 1e-9)
             self._law.clear_client_forces(part)
@@ -151,7 +148,7 @@ class ControllerNode:
         """Go on with a part that is under control again, from rest: with its suspended action, or without an action."""
         action = self._actions[part]
         self._law.rest(part)
-        if action.status == "suspended" and action.target is not None and self._suspensions.is_of_the_model(action, tick):
+        if action.status == "suspended" and action.target is not None:
             self._law.set_attractor(part, action.target)
             action.settle_again(tick.k, tick.t * 1e-9)
             return
@@ -191,7 +188,6 @@ class ControllerNode:
     def _new_run(self) -> None:
         self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare_robots)
         self._drives.forget()
-        self._suspensions = Suspensions()
         self._tick = None
         self._commands.begin_tick()
         self._law.reset()
