@@ -4,6 +4,7 @@
 const MARGIN = { left: 40, right: 10, top: 22, bottom: 30 };
 const LEGEND = 20; // pixels
 const WIDE = 600; // pixels: the legend is written out
+const NARROW = 180; // pixels of a plot, with room for its title only
 const OTHERS = {
   least_tried: ["least tried", "tried, if least tried first", "#b9c4cf", []],
   random: ["random", "tried, if at random", "#7c8a99", [2, 3]],
@@ -109,7 +110,7 @@ function drawPlot(ink, width, height, curve, others, color, title) {
   ink.fillStyle = `rgb(${color})`;
   ink.fillText(title, MARGIN.left, 13);
   const gain = newest > 20 && others.random?.length ? others.random.at(-1)[1] : 0;
-  if (gain > 0) {
+  if (gain > 0 && width > NARROW) {
     ink.fillStyle = "#c2ccd6";
     ink.textAlign = "right";
     ink.fillText(`${(curve.at(-1)[1] / gain).toFixed(1)} × random`, width - MARGIN.right, 13);

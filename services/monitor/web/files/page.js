@@ -268,7 +268,7 @@ function card(one) {
   plot.title = "Surprise of the last 60 transitions, −ln p in nats; amber: it did not get where it wanted";
   const small = node("small", "", facts);
   small.title = "Predictable: tried at least twice, and at least 80 % of the tries ended alike";
-  const made = node("article", `card${picture.chosen === one.part ? " chosen" : ""}`, node("h3", "", one.title, small, plot));
+  const made = node("article", `card${picture.chosen === one.part ? " chosen" : ""}`, node("h3", "", node("span", "", one.title), small, plot));
   made.dataset.part = one.part;
   made.style.setProperty("--hue", `rgb(${colorOf(one.part)})`);
   made.title = "Click: show the places of this part only";

@@ -34,9 +34,11 @@ export class SceneView {
     this.home = { eye: robot.eye, target: robot.target };
     this.turn("oblique");
     this.shown = null;
-    const data = await (await fetch("surfaces")).arrayBuffer();
-    this.surfaces = surfacesIn(data);
+    const answer = await fetch("surfaces");
+    if (!answer.ok) throw new Error(answer.statusText);
+    this.surfaces = surfacesIn(await answer.arrayBuffer());
     this.paint(this.colors || {});
+    this.redraw();
   }
 
   // Let the parts that agents move, `colors` by name, have something of their colours.

@@ -33,7 +33,13 @@ export class View {
 
   // Begin with a robot; Rerun loads after the story and only if a graphics card draws it.
   async open(robot) {
-    await this.scene.open(robot);
+    try {
+      await this.scene.open(robot);
+    } catch (error) {
+      console.debug(error);
+      setTimeout(() => this.open(robot), 1000); // the system ends or is starting again
+      return;
+    }
     if (!this.frame.src && !this.isAsked) setTimeout(() => this.isFast() && this.load(), 1500);
   }
 
