@@ -410,6 +410,20 @@ class EStop(Message, frozen=True, kw_only=True):
     reason: Text
 
 
+class Served(Message, frozen=True, kw_only=True):
+    """A call that the sender has answered, except `stat` and `config`: the request and the reply as they were sent."""
+
+    stream: ClassVar[Stream] = Stream(
+        "served/{service}", "CONTROL", writer="every service, after each call, if there is a subscriber", readers="recorder"
+    )
+
+    key: Text  # of the call
+    request: bytes  # msgpack
+    request_type: Name
+    reply: bytes  # msgpack
+    reply_type: Name  # Failure: the call was refused
+
+
 class ObjectTruth(Struct, frozen=True, forbid_unknown_fields=True):
     """Pose of an object in the simulator."""
 

@@ -7,6 +7,7 @@ import inspect
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from types import ModuleType
 
 from msgspec import Struct
 
@@ -34,11 +35,10 @@ def with_tables(page: str) -> str:
     return _MARKED.sub(lambda match: f"{match[1]}{tables[match[2]]()}{match[3]}", page)
 
 
-def structs(module: object) -> list[type[Struct]]:
+def structs(module: ModuleType) -> list[type[Struct]]:
     """Return the messages, or requests and replies, of a module, and the structs inside them, in the order of the source."""
-    found = [cls for _, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Struct) and cls not in BASES]
-    own = [cls for cls in found if inspect.getmodule(cls) is module]
-    return sorted(own, key=lambda cls: inspect.getsourcelines(cls)[1])
+    own = (cls for cls in vars(module).values() if isinstance(cls, type) and cls.__module__ == module.__name__)
+    return [cls for cls in own if issubclass(cls, Struct) and cls not in BASES]
 
 
 def streams() -> list[type[Message]]:

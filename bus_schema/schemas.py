@@ -47,10 +47,7 @@ def schemas_of(key: str) -> dict[str, dict[str, Any]]:
 @cache
 def _types() -> dict[str, type[Struct]]:
     """All messages, requests and replies, and the structs inside them, by name, in the order of the source."""
-    found = [
-        cls for module in (messages, rpc) for _, cls in vars(module).items() if isinstance(cls, type) and cls.__module__ == module.__name__
-    ]
-    return {cls.__name__: cls for cls in found if issubclass(cls, Struct) and cls not in page.BASES}
+    return {cls.__name__: cls for module in (messages, rpc) for cls in page.structs(module)}
 
 
 def _is_stream(cls: type[Struct]) -> TypeGuard[type[Message]]:

@@ -37,12 +37,14 @@ VERBS = {
     "doctor": "check this machine and installation, and name what mends them",
     "completion": "print the script with which a shell completes this command",
     "conform": "test a robot_sim of your own against the contract of the bus",
-    "replay": "show the page of a run again, with a time line",
+    "record": "record every message of a running system",
+    "replay": "play a run again: on its page, or into a controller or model",
     "film": "make a film of a run: the robot and its story",
 }
 
 EXTRAS = {
     "zenoh": "live",
+    "mcap": "live",
     "msgspec": "live",
     "tyro": "live",
     "shtab": "live",

@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--headless", action="store_true", help="start without the page")
     shown.add_argument("--page", action="store_true", help="start with the page, also if the scenario has none, as kinematic and lockstep")
+    parser.add_argument("--no-record", dest="record", action="store_false", help="start without the recorder of all messages")
     parser.add_argument("--duration", type=positive_number, metavar="S", help="end S seconds after all services are ready")
     parser.add_argument("--ticks", type=positive_whole, metavar="N", help="lockstep only (shared.mode=lock): end after N ticks")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
@@ -46,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
             settings=tuple(arguments.settings),
             headless=arguments.headless,
             page=arguments.page,
+            record=arguments.record,
             duration=arguments.duration,
             ticks=arguments.ticks,
             json=arguments.json,

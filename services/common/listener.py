@@ -102,7 +102,7 @@ class Listener:
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
         """Subscribe to a key; `direct`: without a thread per subscriber, which takes time and could reorder two streams in lockstep."""
-        self._kept.append(self.bus.session.declare_subscriber(key, Callback(_stay_known(offer), indirect=False) if self._direct else offer))
+        self._kept.append(self.bus.session.declare_subscriber(key, Callback(stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Handle the newest tick; at the first tick of a run, the handlers of `on_run` are called before."""
@@ -165,7 +165,7 @@ class Listener:
             self.bus.guarded(cls.__name__, lambda: handler(message))
 
 
-def _stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
+def stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
     """Wrap a callback so that Python keeps its state for the calling thread of Zenoh.
 
     Python allocates a state when a foreign thread calls it, and frees it when the call ends, which costs more than the callback.  A claim

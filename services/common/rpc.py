@@ -9,9 +9,11 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import zenoh
+from msgspec import Struct
 from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
+from bus_schema.messages import Served
 from bus_schema.rpc import Empty, Failure, Reply, Request
 from mobee.errors import MobeeError
 from services.common.bus import Bus
@@ -123,6 +125,8 @@ def _failure(key: str, answer: zenoh.Reply) -> CallFailed:
 _Q = TypeVar("_Q", bound=Request)
 
 REMEMBERED = 256  # replies kept for repeated calls
+LARGEST_PUBLISHED = 1_000_000  # bytes; a larger request is refused, and its content is not recorded
+_NOT_PUBLISHED = ("/rpc/stat", "/rpc/config")  # calls that the launcher and tools repeat, and that change nothing
 
 
 class CallRefused(Exception):
@@ -134,10 +138,11 @@ class CallRefused(Exception):
 
 
 class Answering:
-    """Decodes requests, calls their handlers, and replies."""
+    """Decodes requests, calls their handlers, replies, and publishes each call for the recorder."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
+        self._served = bus.publisher(Served, bus.who)
         self._replies: OrderedDict[tuple[str, str], tuple[type[Reply], bytes]] = OrderedDict()
 
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
@@ -149,12 +154,12 @@ class Answering:
             except (Refused, CallRefused) as refused:
                 code = refused.reason if isinstance(refused, Refused) else refused.code
                 self.bus.reject(code, f"{key}: {refused}")
-                _reply_failure(query, code, str(refused))
+                self._fail(query, key, cls, code, str(refused))
                 return
             except MobeeError:
                 raise
             except Exception as error:  # as in Bus.guarded
-                _reply_failure(query, "handler", self.bus.report_defect(key, error))
+                self._fail(query, key, cls, "handler", self.bus.report_defect(key, error))
                 return
             query.reply(key, payload, encoding=encoding_of(reply_type))
 
@@ -174,10 +179,19 @@ class Answering:
         if call not in self._replies:
             reply = handler(request, key)
             self._replies[call] = (type(reply), encode(reply))
+            self._publish(query, key, cls, *self._replies[call])
             if len(self._replies) > REMEMBERED:
                 self._replies.popitem(last=False)
         return self._replies[call]
 
+    def _fail(self, query: zenoh.Query, key: str, cls: type[Request], code: str, text: str) -> None:
+        failure = encode(Failure(v=VERSION, code=code, text=text[:2000]))
+        query.reply_err(failure, encoding=encoding_of(Failure))
+        self._publish(query, key, cls, Failure, failure)
 
-def _reply_failure(query: zenoh.Query, code: str, text: str) -> None:
-    query.reply_err(encode(Failure(v=VERSION, code=code, text=text[:2000])), encoding=encoding_of(Failure))
+    def _publish(self, query: zenoh.Query, key: str, cls: type[Request], reply_type: type[Struct], reply: bytes) -> None:
+        if key.endswith(_NOT_PUBLISHED) or not self._served.heard:
+            return
+        request = b"" if query.payload is None else query.payload.to_bytes()
+        if len(request) <= LARGEST_PUBLISHED:
+            self._served.put(key=key, request=request, request_type=cls.__name__, reply=reply, reply_type=reply_type.__name__)

@@ -32,6 +32,25 @@ _COMMON = {
 _ONE_THREAD = "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), app: (handover: rx), net: (handover: rx))"
 
 
+_NOT_HELD_UP: dict[str, object] = {
+    "qos/network": [
+        {
+            "id": "observers",
+            "link_protocols": ["tcp"],
+            "flows": ["egress"],
+            "messages": ["put"],
+            "overwrite": {"congestion_control": "drop"},
+        }
+    ],
+    "transport/link/tx/queue/size/real_time": 16,  # batches of 64 kB: for observers that get no processor for a moment
+    "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
+}
+"""Settings of a router at which the services that depend on each other have a local endpoint: whoever connects by TCP only observes.
+
+A router with one thread would wait in vain until a full queue has room, because the same thread empties it.
+"""
+
+
 class BusUnreachable(Exception):
     """Raised if there is no router at the endpoint; the message has the endpoint and the remedy."""
 
@@ -98,6 +117,8 @@ def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -
         "transport/unicast/accept_timeout": 5000,  # ms
         "transport/unicast/max_sessions": _MOST_CONNECTIONS,
     }
+    if local_endpoint:
+        settings |= _NOT_HELD_UP
     _allow_many_descriptors()
     try:
         return zenoh.open(_config(NAMESPACE, lease, settings))

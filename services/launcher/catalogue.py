@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 AGENT = "agent_"
+RECORDER = "recorder"
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ _NICE_PICTURES = 10  # niceness of services that may be late
 _NICE_PLANS = 9  # of agents: after the control chain, before pictures
 
 _ENTRIES = {
-    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, participates=False),
-    "model": Entry("services.model", "services.model.config:Config", 1),
+    "robot_sim": Entry("services.robot_sim", "services.robot_sim.config:Config", 0, after=(RECORDER,), participates=False),
+    "model": Entry("services.model", "services.model.config:Config", 1, after=(RECORDER,)),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
     "renderer": Entry(
@@ -63,6 +64,9 @@ _ENTRIES = {
         vital=False,
         participates=False,
         needs={"rerun": "viz", "icub_models": "viz"},
+    ),
+    RECORDER: Entry(  # it lowers its own priority when it is ready: others wait for its start
+        "services.recorder", "services.recorder.config:Config", -1, vital=False, participates=False, needs={"mcap": "live"}
     ),
 }
 

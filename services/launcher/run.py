@@ -33,6 +33,7 @@ from services.common.session import (
     open_router,
     spare_threads,
 )
+from services.launcher.catalogue import RECORDER
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
@@ -66,6 +67,7 @@ class Options:
     settings: tuple[str, ...] = ()  # table.field=value
     headless: bool = False  # without the monitor
     page: bool = False  # with the monitor, also if the scenario has none
+    record: bool = True  # with the recorder, if the scenario has a robot
     duration: float | None = None  # s after all services are ready; None: until a stop is requested
     ticks: int | None = None  # lockstep: number of ticks after which the run ends
     json: bool = False
@@ -94,7 +96,11 @@ def refused_now(options: Options) -> int:
 def _read(options: Options) -> Scenario:
     settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
     return read_scenario(
-        options.scenario, settings, leave_out=["monitor"] if options.headless else [], with_also=["monitor"] if options.page else []
+        options.scenario,
+        settings,
+        leave_out=[*(["monitor"] if options.headless else []), *([] if options.record else [RECORDER])],
+        with_also=["monitor"] if options.page else [],
+        record=options.record,
     )
 
 
@@ -306,7 +312,7 @@ def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
             vital=part.entry.vital,
             may_end=part.entry.may_end,
             patience=part.config.patience if scenario.is_locked else 0.0,
-            environment={LOCAL_ENDPOINT: local} if local else {},
+            environment={LOCAL_ENDPOINT: local} if local and part.entry.vital else {},  # nothing waits for the others
         )
         for part in scenario.parts
     ]

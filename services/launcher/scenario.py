@@ -15,7 +15,7 @@ from msgspec import Struct, structs, to_builtins
 
 from services.common.config import ConfigError, ServiceConfig, WorldConfig, convert, line_of, nearest
 from services.common.worlds import effective_world, is_path
-from services.launcher.catalogue import NAMES, Entry, entry_of
+from services.launcher.catalogue import NAMES, RECORDER, Entry, entry_of
 
 SHIPPED = Path(__file__).parent / "scenarios"
 
@@ -68,11 +68,16 @@ def shipped() -> dict[str, Path]:
 
 
 def read_scenario(
-    name_or_path: str, settings: Sequence[str] = (), leave_out: Sequence[str] = (), with_also: Sequence[str] = ()
+    name_or_path: str,
+    settings: Sequence[str] = (),
+    leave_out: Sequence[str] = (),
+    with_also: Sequence[str] = (),
+    record: bool = False,
 ) -> Scenario:
     """Read the scenario with a shipped name or at a path; each of `settings`, "table.field=value", replaces a value of the file.
 
-    `leave_out`, `with_also`: services that are not started, and that are started if the file does not name them too.
+    `leave_out`, `with_also`: services that are not started, and that are started if the file does not name them too.  `record`: the
+    recorder too, if there is a robot.
 
     Raises ConfigError with one line: the place, the field, and the nearest valid name.
     """
@@ -91,6 +96,8 @@ def read_scenario(
     _place_files(data, path.parent)
     for who in with_also if isinstance(data.get("services"), dict) else ():
         data["services"].setdefault(who, {})
+    if record and isinstance(data.get("services"), dict) and _has_robot(data["services"]):
+        data["services"].setdefault(RECORDER, {})
     origins = _override(data, settings)
 
     def place(field: str) -> str:
@@ -122,6 +129,12 @@ def _place_files(data: dict[str, Any], folder: Path) -> None:
             value = table.get(name) if isinstance(table, dict) else None
             if isinstance(value, str) and is_path(value) and not Path(value).exists() and (folder / value).exists():
                 table[name] = str(folder / value)
+
+
+def _has_robot(services: dict[str, Any]) -> bool:
+    """Return whether a scenario has the shipped robot_sim: a recording is of little use without its ticks."""
+    sim = services.get("robot_sim")
+    return isinstance(sim, dict) and "module" not in sim
 
 
 def _find(name_or_path: str) -> Path:

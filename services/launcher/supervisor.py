@@ -98,7 +98,7 @@ class Supervisor:
     def _check(self, child: Child, now: float) -> None:
         if child.phase == "waiting":
             before = (self.children[who] for who in child.program.after if who in self.children)
-            if all(other.phase in ("ready", "ended") for other in before):
+            if all(other.phase in ("ready", "ended") or (other.failures and not other.program.vital) for other in before):
                 child.release()
         elif child.phase == "failed" and now >= child.again_at:
             child.restarts += 1

@@ -70,10 +70,12 @@ def launch(
     duration: float | None = None,
     ticks: int | None = None,
     endpoint: str | None = None,
+    record: bool = False,
 ) -> Launch:
     endpoint, runs, errors = endpoint or free_endpoint(), folder / "runs", folder / "launcher.err"
     argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", endpoint, "--runs", str(runs), "--json"]
     argv += ["--headless"] if headless else []
+    argv += [] if record else ["--no-record"]
     argv += ["--duration", str(duration)] if duration else []
     argv += ["--ticks", str(ticks)] if ticks else []
     for setting in settings:

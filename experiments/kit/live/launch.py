@@ -47,7 +47,18 @@ def summary_of(
     is temporary.  `watch` is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", free_endpoint()]
+        argv = [
+            sys.executable,
+            "-m",
+            "mobee_system",
+            "launch",
+            scenario,
+            "--headless",
+            "--no-record",
+            "--json",
+            "--endpoint",
+            free_endpoint(),
+        ]
         argv += ["--runs", str(runs or scratch)]
         argv += [] if duration is None else ["--duration", str(duration)]
         argv += [] if ticks is None else ["--ticks", str(ticks)]

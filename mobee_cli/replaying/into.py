@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plays a recorded run in lockstep into its controller or model, and compares what it says with what it said, to the last bit.
+
+The service gets in every tick what it got then, and its recorded messages tell when: a call that it had answered before it answered the
+tick is made before, one that it had answered after, after.  Everything that is read from the recording has its recorded bytes.  Epochs
+of goals are the only exception: a controller counts them from the time of its start, so that the recorded ones are translated.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from bus_schema.messages import Served
+from bus_schema.rpc import Driven, PartMeta, Taken
+from mobee.errors import MobeeError
+from mobee_cli.replaying.differences import OF_THE_RUN, Difference, compare
+from mobee_cli.replaying.stage import PATIENCE, Stage, Stopped
+from mobee_cli.replaying.ticks import Item, TickOf
+from services.recorder.reader import Recorded
+
+START = 30.0  # s until the service has answered tick 0
+START_PERIOD = 0.1  # s between two repetitions of tick 0, as of robot_sim
+TOKEN_PATIENCE = 3.0  # s within which the service must know a token that was declared
+_NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """What a service reads and says in a tick, by types of messages."""
+
+    with_tick: tuple[str, ...]  # from the model, after the tick: it answers the tick when it has these
+    after: tuple[str, ...]  # from others, before the next tick
+    says: tuple[str, ...]  # what is compared
+    answers: Callable[[Item], bool]  # whether a message ends its work on a tick
+
+
+def _is_controllers_answer(item: Item) -> bool:
+    return item.type == "StepDone" or (item.type == "Commands" and item.content()["answer"] is not None)
+
+
+ROLES: Mapping[str, Role] = {
+    "controller": Role(("Targets", "Forces"), ("EStop",), ("Motion", "Reach", "Commands", "StepDone"), _is_controllers_answer),
+    "model": Role((), ("Reach", "WorldObject"), ("Targets", "Forces"), lambda item: item.type == "Forces"),
+}
+
+
+@dataclass(slots=True)
+class Result:
+    """What a replay found."""
+
+    who: str
+    ticks: int = 0
+    messages: int = 0
+    calls: int = 0
+    seconds: float = 0.0
+    difference: Difference | None = None
+    says: dict[str, int] = field(default_factory=dict)  # messages compared, by type
+
+
+def replay_into(stage: Stage, run: Iterable[TickOf], last: int) -> Result:
+    """Play the ticks of a run up to tick `last`; raises MobeeError if the run cannot be played, or the service does not answer."""
+    begin = time.monotonic()
+    replay = _Replay(stage, ROLES[stage.who])
+    for tick in run:
+        if tick.k > last or not replay.play(tick):
+            break
+    replay.result.seconds = time.monotonic() - begin
+    return replay.result
+
+
+class _Replay:
+    """A replay in progress."""
+
+    def __init__(self, stage: Stage, role: Role) -> None:
+        self._stage, self._role, self.result = stage, role, Result(stage.who)
+        self._epochs: dict[int, int] = {}  # of goals: recorded -> of this replay
+        self._drives: dict[str, deque[tuple[int, bytes]]] = {}  # key of a call to robot_sim -> ticks and recorded replies
+        self._said: dict[int, list[Item]] = {}  # by tick
+        self._answered = -1  # newest tick that the service has answered
+        self._open: TickOf | None = None  # the last tick, which is compared when the next one is answered
+        self._begun = False
+
+    def play(self, tick: TickOf) -> bool:
+        """Play a tick; returns False once a difference was found."""
+        self._note_drives(tick)
+        if not self._begun:
+            self._begin(tick)
+            return True
+        own = self._own(tick)
+        at = next((index for index, item in enumerate(own) if self._role.answers(item)), len(own))
+        self._publish(tick.of("Tick"))
+        self._call(own[:at])
+        for kind in ("", *self._role.with_tick):
+            self._publish([item for item in tick.of(kind, "model") if kind])
+        self._wait(tick.k)
+        self._call(own[at:])
+        self._after(tick)
+        found, self._open = self._compare(self._open), tick
+        return not found
+
+    # The start
+
+    def _begin(self, tick: TickOf) -> None:
+        """Start the service in tick 0, which is repeated until it is ready, and make the calls of the start."""
+        if tick.k != 0 or not tick.of("Tick"):
+            raise MobeeError(
+                "the recording does not begin at tick 0 of a run: its first file is needed, and a recorder that was there first"
+            )
+        if tick.of("Tick")[-1].content()["mode"] != "lock":
+            raise MobeeError(
+                'the recorded run was not in lockstep (shared.mode = "lock"), so its messages do not say when each was handled'
+            )
+        self._begun = True
+        self._tokens(tick)
+        for key, kind in (("*/rpc/drive/take", Taken), ("*/rpc/drive/arm", Driven), ("*/meta", PartMeta)):
+            self._stage.serve(key, self._answer_with(kind))
+        self._stage.start()
+        self._repeat_start(tick)
+        own = self._own(tick)
+        called = False
+        for item in own:
+            if item.type == "Served":
+                self._call([item])
+                called = True
+            elif called and item.type == "Motion":  # the service had handled tick 0 once more
+                self._repeat_start(tick)
+                called = False
+        self._after(tick, tokens=False)
+
+    def _repeat_start(self, tick: TickOf) -> None:
+        self._answered, give_up = -1, time.monotonic() + START
+        inputs = [tick.of("Tick")[-1], *(item for kind in self._role.with_tick for item in tick.of(kind, "model")[-1:])]
+        while self._answered < 0:
+            self._publish(inputs)
+            again = time.monotonic() + START_PERIOD
+            while self._answered < 0 and (left := again - time.monotonic()) > 0.0:
+                self._hear(left)
+            self._stage.check()
+            if time.monotonic() > give_up:
+                raise Stopped(f"{self._stage.who} did not answer tick 0 within {START:g} s")
+
+    # What the service gets
+
+    def _publish(self, items: Iterable[Item]) -> None:
+        for item in items:
+            self._stage.send(item.key, item.message.encoding, item.message.payload)
+
+    def _after(self, tick: TickOf, tokens: bool = True) -> None:
+        self._publish(item for item in tick.items if item.type in self._role.after and item.src != self._stage.who)
+        if tokens:
+            self._tokens(tick)
+
+    def _tokens(self, tick: TickOf) -> None:
+        for item in tick.items:
+            if not item.type:
+                token = item.content()
+                if token["who"] not in (self._stage.who, "router"):
+                    self._stage.token(token["who"], token["instance"], token["up"])
+
+    def _call(self, items: Sequence[Item]) -> None:
+        """Make the calls that the service had answered, except those that it had refused."""
+        for item in items:
+            if item.type != "Served":
+                continue
+            served = msgspec.msgpack.decode(item.message.payload, type=Served)
+            if served.reply_type == "Failure" or served.key.endswith(_NO_INPUT):
+                continue
+            request = msgspec.msgpack.decode(served.request)
+            if "epoch" in request:
+                request["epoch"] = self._epochs.get(request["epoch"], request["epoch"])
+            answer = self._answer_of(served, msgspec.msgpack.encode(request))
+            if served.reply_type == Taken.__name__:
+                self._epochs[_epoch(served.reply)] = _epoch(answer)
+            self.result.calls += 1
+
+    def _answer_of(self, served: Served, request: bytes) -> bytes:
+        """Make a call, again for a while if the service does not know yet a token that was declared just now."""
+        give_up = time.monotonic() + TOKEN_PATIENCE
+        while True:
+            encoding, answer = self._stage.call(served.key, served.request_type, request)
+            if f"/{served.reply_type}/" in encoding:
+                return answer
+            failure = msgspec.msgpack.decode(answer)
+            if failure.get("code") != "token" or time.monotonic() > give_up:
+                raise Stopped(f"{self._stage.who} refused {served.key} of tick {served.k}, which it had accepted: {failure.get('text')}")
+            time.sleep(0.02)
+
+    # What it asks robot_sim for
+
+    def _note_drives(self, tick: TickOf) -> None:
+        """Keep the replies of robot_sim to the service's calls, so that it gets them again."""
+        for item in tick.of("Served", "robot_sim"):
+            served = msgspec.msgpack.decode(item.message.payload, type=Served)
+            if msgspec.msgpack.decode(served.request).get("who") == self._stage.who and served.reply_type != "Failure":
+                replies = self._drives.setdefault(served.key, deque())
+                if tick.k == 0:
+                    replies.clear()  # the last try of the start is the one whose epoch holds
+                replies.append((tick.k, served.reply))
+
+    def _answer_with(self, kind: type[Struct]) -> Callable[[str, dict[str, Any]], tuple[type[Struct], bytes] | None]:
+        def answer(key: str, request: dict[str, Any]) -> tuple[type[Struct], bytes] | None:
+            replies = self._drives.get(key)
+            if not replies:
+                return None
+            return kind, (replies.popleft() if len(replies) > 1 else replies[0])[1]
+
+        return answer
+
+    # What it says
+
+    def _own(self, tick: TickOf) -> list[Item]:
+        return [item for item in tick.items if item.src == self._stage.who]
+
+    def _wait(self, k: int) -> None:
+        """Wait until the service has answered tick k."""
+        give_up = time.monotonic() + PATIENCE
+        while self._answered < k:
+            self._hear(give_up - time.monotonic())
+            if time.monotonic() > give_up:
+                self._stage.check()
+                raise Stopped(f"{self._stage.who} did not answer tick {k} within {PATIENCE:g} s")
+
+    def _hear(self, seconds: float) -> None:
+        item = self._stage.next(max(seconds, 0.0))
+        if item is None or item.type not in self._role.says:
+            return
+        k = item.content()["k"]
+        self._said.setdefault(k, []).append(item)
+        if self._role.answers(item):
+            self._answered = max(self._answered, k)
+
+    def _compare(self, tick: TickOf | None) -> bool:
+        """Compare what the service said in a tick whose last message has arrived; return whether it differs."""
+        if tick is None:
+            return False
+        then = [item for item in self._own(tick) if item.type in self._role.says]
+        now = self._said.pop(tick.k, [])
+        self.result.difference = compare(tick.k, [self._translated(item) for item in then], now, OF_THE_RUN)
+        self.result.ticks += 1
+        self.result.messages += len(then)
+        for item in then:
+            self.result.says[item.type] = self.result.says.get(item.type, 0) + 1
+        return self.result.difference is not None
+
+    def _translated(self, item: Item) -> Item:
+        """Return a recorded motion with the epoch of this replay."""
+        if item.type != "Motion":
+            return item
+        content = item.content()
+        epoch = self._epochs.get(content["epoch"], content["epoch"])
+        if epoch == content["epoch"]:
+            return item
+        old = item.message
+        payload = msgspec.msgpack.encode({**content, "epoch": epoch})
+        return Item(Recorded(old.key, old.encoding, payload, old.received, old.published), item.type, item.src)
+
+
+def _epoch(taken: bytes) -> int:
+    return int(msgspec.msgpack.decode(taken)["epoch"])

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plays a recording to a monitor of its own, which shows on its page what happened, at the pace of the robot's time."""
+
+from __future__ import annotations
+
+import json
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bus_schema import VERSION, encode, encoding_of, keys
+from bus_schema.messages import Clock, Geometry, Message, PartStatus, Served, State, Tick
+from bus_schema.rpc import ObjectState, World
+from mobee.errors import MobeeError
+from mobee.model.kinematics import quaternion_from_matrix
+from mobee.robot.load import load_robot
+from mobee_cli.replaying.stage import Stage
+from services.common.worlds import world_around
+from services.recorder.reader import Recorded, Recording
+
+STATE_PERIOD = 50_000_000  # ns of the robot's time between two states of its parts
+_HEADER = ("v", "run", "src", "seq", "k", "t", "tw")
+_MADE = ("Clock", "State")  # made from the ticks, because most recordings do not have them
+_tick = msgspec.msgpack.Decoder(Tick)
+
+
+class Player:
+    """A recording, and the monitor that sees it."""
+
+    def __init__(self, recording: Recording, port: int, folder: Path) -> None:
+        """`folder`: for the files of the monitor; raises MobeeError if the recording does not hold the settings of its run."""
+        settings = recording.settings()
+        if "robot_sim.toml" not in settings:
+            raise MobeeError("the recording holds no robot_sim.toml, the settings of the robot: was it made by `mobee launch`?")
+        given = tomllib.loads(settings["robot_sim.toml"])
+        self._recording, self._robot = recording, load_robot(given["robot"])
+        self._world = encode(_described(given.get("world", ""), given["robot"]))
+        self.stage = Stage("monitor", f"robot = {json.dumps(given['robot'])}\nweb_port = {port}\n", folder)
+        self._next_state = self._offset = self._last = 0  # ns of the robot's time
+
+    def play(self, speed: float) -> None:
+        """Publish all messages, `speed` times as fast as the robot's time passed; pauses of the robot are left out."""
+        self.stage.serve(keys.world_rpc("list"), lambda key, request: (World, self._world))
+        begin, first = time.monotonic(), -1
+        for message in self._recording:
+            if message.type == "Tick":
+                tick = _tick.decode(message.payload)
+                t = self._time_of(tick)
+                first = t if first < 0 else first
+                time.sleep(max(0.0, begin + 1e-9 * (t - first) / speed - time.monotonic()))
+                self.stage.check()
+                self._make(tick, t)
+            self._publish(message)
+
+    def _time_of(self, tick: Tick) -> int:
+        """Return the time of a tick, ns since the begin, in which runs follow one another."""
+        if self._offset + tick.t < self._last:
+            self._offset = self._last
+        self._last = self._offset + tick.t
+        return self._last
+
+    def _publish(self, message: Recorded) -> None:
+        if not message.type:
+            token = json.loads(message.payload)
+            if token["who"] not in ("monitor", "router"):
+                self.stage.token(token["who"], token["instance"], token["up"])
+        elif message.type == "Served":
+            served = msgspec.msgpack.decode(message.payload, type=Served)
+            if served.key == keys.world_rpc("list") and served.reply_type == World.__name__:
+                self._world = served.reply
+        elif message.type not in _MADE:
+            self.stage.send(message.key, message.encoding, message.payload)
+
+    def _make(self, tick: Tick, t: int) -> None:
+        """Publish what the monitor reads beside the ticks, which have the same content."""
+        header = {name: getattr(tick, name) for name in _HEADER}
+        self._send(Clock(**header, dt=tick.dt, mode=tick.mode, rate=tick.rate))
+        if t < self._next_state or tick.parts.keys() != self._robot.parts.keys():
+            return
+        self._next_state = t + STATE_PERIOD
+        for name, part in self._robot.parts.items():
+            status, still = _fields(tick.parts[name]), [0.0] * len(part)
+            self._send(State(**{**header, **status}, q=tick.q[part.slice], dq=still, tau=still), name)
+
+    def _send(self, message: Message, name: str = "") -> None:
+        self.stage.send(type(message).stream.key(name), encoding_of(type(message)), encode(message))
+
+
+def _fields(status: PartStatus) -> dict[str, Any]:
+    return {name: getattr(status, name) for name in PartStatus.__struct_fields__}
+
+
+def _described(world: str, robot: str) -> World:
+    """Return the objects of a world as the model lists them."""
+    objects = [
+        ObjectState(
+            name=one.name,
+            geometry=Geometry(kind=one.kind, size=list(one.size)),  # type: ignore[arg-type]  # no convex volumes in a world
+            position=one.position.tolist(),
+            quaternion=quaternion_from_matrix(one.rotation).tolist(),
+            role=one.role,
+            link=one.link or "",
+        )
+        for one in world_around(world, robot).objects.values()
+    ]
+    return World(v=VERSION, objects=objects)

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bus of its own on which one recorded service runs again, and everybody else is played from the recording."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, Self
+
+import msgspec
+
+from bus_schema import VERSION, encoding_of, keys
+from bus_schema.page import streams
+from mobee.errors import MobeeError
+from mobee_cli.replaying.ticks import Item
+from services.common.observe import alive
+from services.common.session import LOCAL_ENDPOINT, local_endpoint, open_router, spare_threads
+from services.common.tap import Raw, RawPublisher, answer_raw, call_raw, receive_raw
+from services.launcher.catalogue import entry_of
+from services.recorder.reader import Recorded
+
+READY = 60.0  # s until the service is ready
+PATIENCE = 10.0  # s for an answer of the service
+PLAYER = "replay"
+
+
+class Stopped(MobeeError):
+    """Raised if the service ends, or does not answer."""
+
+
+class Stage:
+    """The bus, the service, and what it has said."""
+
+    def __init__(self, who: str, settings: str, folder: Path) -> None:
+        """`who`: the service; `settings`: its settings file of the recorded run; `folder`: for that file and the log."""
+        self.who, self._folder, self._settings = who, folder, settings
+        self.said: SimpleQueue[Item] = SimpleQueue()  # messages of the service
+        self._tokens: dict[tuple[str, str], Any] = {}
+        self._kept: list[Any] = []
+        self._ready = False
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @contextmanager
+    def open(self, endpoint: str) -> Iterator[Self]:
+        """Open the bus."""
+        spare_threads()
+        with local_endpoint() as local, open_router(local or endpoint, lease=PATIENCE) as session:
+            self.session, self._endpoint = session, local or endpoint
+            self._publisher = RawPublisher(session)
+            self.token("router", PLAYER, up=True)
+            for key in {cls.stream.keys() for cls in streams()}:
+                self._kept.append(receive_raw(session, key, self._hear))
+            try:
+                yield self
+            finally:
+                self._end()
+
+    def start(self) -> None:
+        """Start the service with its settings, and wait until it is ready; raises Stopped."""
+        entry = entry_of(self.who, None)
+        assert entry is not None
+        file = self._folder / f"{self.who}.toml"
+        file.write_text(self._settings, encoding="utf-8")
+        argv = [sys.executable, "-m", "mobee_system.run", entry.module, "--config", str(file), "--endpoint", self._endpoint]
+        self._log = self._folder / f"{self.who}.log"
+        with self._log.open("wb") as log:
+            self._process = subprocess.Popen(
+                argv, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env={**os.environ, LOCAL_ENDPOINT: self._endpoint}
+            )
+        give_up = time.monotonic() + READY
+        while not self._has_token():
+            self.check()
+            if time.monotonic() > give_up:
+                raise Stopped(f"{self.who} is not ready within {READY:g} s; its log is {self._log}")
+            time.sleep(0.02)
+
+    def check(self) -> None:
+        """Raise Stopped if the service has ended."""
+        if self._process is not None and self._process.poll() is not None:
+            lines = self._log.read_text(errors="replace").strip().splitlines()
+            raise Stopped(f"{self.who} ended with code {self._process.returncode}: {(lines or ['its log is empty'])[-1]}")
+
+    def next(self, seconds: float) -> Item | None:
+        """Return the next message of the service; None if there is none in time."""
+        try:
+            return self.said.get(timeout=seconds)
+        except Empty:
+            return None
+
+    def send(self, key: str, encoding: str, payload: bytes) -> None:
+        """Publish a message."""
+        self._publisher.put(key, encoding, payload)
+
+    def token(self, who: str, instance: str, up: bool) -> None:
+        """Declare or drop a liveliness token."""
+        if up and (who, instance) not in self._tokens:
+            self._tokens[who, instance] = self.session.liveliness().declare_token(keys.alive(who, instance))
+        elif not up and (who, instance) in self._tokens:
+            self._tokens.pop((who, instance)).undeclare()
+
+    def serve(self, key: str, answer: Callable[[str, dict[str, Any]], tuple[type[msgspec.Struct], bytes] | None]) -> None:
+        """Answer the calls of the service on a key expression with replies of the recording."""
+
+        def reply(at: str, request: bytes) -> tuple[str, bytes] | None:
+            found = answer(at, msgspec.msgpack.decode(request))
+            return None if found is None else (encoding_of(found[0]), found[1])
+
+        self._kept.append(answer_raw(self.session, key, reply))
+
+    def call(self, key: str, kind: str, request: bytes) -> tuple[str, bytes]:
+        """Make a recorded call again and return encoding and bytes of the answer; raises Stopped if there is none."""
+        answer = call_raw(self.session, key, f"application/msgpack;icub/{kind}/{VERSION}", request, PATIENCE)
+        if answer is None:
+            self.check()
+            raise Stopped(f"{self.who} did not answer {key} within {PATIENCE:g} s; its log is {self._log}")
+        return answer
+
+    def _hear(self, raw: Raw) -> None:
+        recorded = Recorded(raw.key, raw.encoding, raw.payload, raw.received, raw.published)
+        self.said.put(Item(recorded, recorded.type, self.who))
+
+    def _has_token(self) -> bool:
+        return self.who in alive(self.session)
+
+    def _end(self) -> None:
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+            try:
+                self._process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()

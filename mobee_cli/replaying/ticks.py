@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The messages of a recorded run, tick by tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from mobee.errors import MobeeError
+from services.common.bus import NO_RUN
+from services.recorder.reader import Recorded, Recording
+
+SLACK = 20  # ticks after which a message of a tick is no longer expected: in free mode streams of low priority arrive late
+
+
+class _Header(Struct):
+    run: str = ""
+    src: str = ""
+    k: int = -1
+
+
+_header = msgspec.msgpack.Decoder(_Header)
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A recorded message, or a liveliness token (`type` empty)."""
+
+    message: Recorded
+    type: str
+    src: str
+
+    @property
+    def key(self) -> str:
+        """Its key on the bus."""
+        return self.message.key
+
+    def content(self) -> dict[str, Any]:
+        """Return the message as dicts, lists and values; raises MobeeError if it cannot be decoded."""
+        try:
+            decode = msgspec.msgpack.decode if self.type else msgspec.json.decode
+            return dict(decode(self.message.payload))
+        except (msgspec.MsgspecError, TypeError, ValueError, RecursionError) as error:
+            raise MobeeError(f"a message on {self.key} cannot be read: {error}") from None
+
+
+@dataclass(slots=True)
+class TickOf:
+    """All messages of one tick, in the order in which the recorder received them."""
+
+    k: int
+    items: list[Item] = field(default_factory=list)
+
+    def of(self, kind: str, src: str = "") -> list[Item]:
+        """Return the messages of a type, and of a sender if one is named."""
+        return [item for item in self.items if item.type == kind and src in ("", item.src)]
+
+
+def ticks(recording: Recording) -> Iterator[TickOf]:
+    """Yield the ticks of the first run of a recording; raises MobeeError if it has none.
+
+    A message without a tick of that run, such as a token or the stop of a client, belongs to the newest tick before it.  The last tick is
+    left out, because the end of the recording may have cut it.
+    """
+    run, newest, waiting = "", 0, {0: TickOf(0)}
+    last = -1  # tick that was yielded
+    for message in recording:
+        header = _header_of(message)
+        if message.type == "Tick":
+            run = run or header.run
+            if header.run != run:
+                break
+            newest = max(newest, header.k)
+        elif header.run not in ("", NO_RUN, run):
+            if run:
+                continue  # of a run before or after
+        k = header.k if header.run == run and run and header.k >= 0 else newest
+        if k <= last:
+            continue  # it arrived too late to be placed
+        waiting.setdefault(k, TickOf(k)).items.append(Item(message, message.type, header.src))
+        while waiting and (first := min(waiting)) < newest - SLACK:
+            last = first
+            yield waiting.pop(first)
+    if not run:
+        raise MobeeError("the recording holds no tick of a robot")
+    for k in sorted(waiting):
+        if k < newest:
+            yield waiting[k]
+
+
+def _header_of(message: Recorded) -> _Header:
+    if not message.type:
+        return _Header()
+    try:
+        return _header.decode(message.payload)
+    except msgspec.MsgspecError:
+        return _Header()

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`python -m services.recorder`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from services.common.config import load_config
+from services.common.entry import explained, robot_of
+from services.common.service import Service
+from services.common.session import spare_threads
+from services.recorder.config import Config
+from services.recorder.node import RecorderNode
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Record until a signal or a shutdown call."""
+    config = load_config(Config, argv, "services.recorder")
+    with explained("services.recorder"):
+        record("recorder", config)
+
+
+def record(who: str, config: Config) -> None:
+    """Record under a name of a service until a signal or a shutdown call; raises MobeeError or BusUnreachable if it cannot begin."""
+    robot = robot_of(config)
+    spare_threads()  # messages arrive one by one: handing each from thread to thread costs more than it
+    with Service(who, config, robot) as service:
+        node = RecorderNode(service, config, robot)
+        service.ready()
+        node.be_nice()
+        try:
+            service.run()
+        finally:
+            node.end()
+
+
+if __name__ == "__main__":
+    main()

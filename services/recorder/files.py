@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The MCAP files of a recording: one is written, the oldest are removed when all together are too large."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from mcap.writer import CompressionType, Writer
+
+FILES = 8  # of which a full recording consists
+_NAME = re.compile(r"messages-(\d{4,})\.mcap$")
+_CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """The messages of one key in one encoding; two that are equal are the same channel."""
+
+    topic: str
+    encoding: str  # of the messages: msgpack, json or cdr
+    about: str = ""  # the encoding string on the bus, of messages that are recorded as they are
+    schema: str = ""  # name; empty: none
+    schema_encoding: str = ""
+    definition: bytes = b""
+
+
+def parts_of(folder: Path) -> list[Path]:
+    """Return the files of the recording in a folder, the oldest first."""
+    found = {int(match[1]): path for path in folder.iterdir() if (match := _NAME.match(path.name))}
+    return [found[number] for number in sorted(found)]
+
+
+class Files:
+    """Writes messages; raises OSError where a file cannot be written."""
+
+    def __init__(self, folder: Path, largest: int, settings: Mapping[str, bytes]) -> None:
+        """`largest`: bytes of all files; `settings`: files that are attached to each file, by name."""
+        self._folder, self._largest, self._settings = folder, largest, settings
+        self._file: IO[bytes] | None = None
+        self._writer: Writer
+        self._channels: dict[Channel, int] = {}
+        self.begun = 0  # files
+
+    @property
+    def size(self) -> int:
+        """Bytes of all files."""
+        return sum(path.stat().st_size for path in parts_of(self._folder))
+
+    def write(self, channel: Channel, data: bytes, received: int, published: int, sequence: int = 0) -> None:
+        """Add a message; times in ns since 1970."""
+        if self._file is None:
+            self._begin()
+        number = self._channels.get(channel)
+        if number is None:
+            number = self._channels[channel] = self._register(channel)
+        self._writer.add_message(number, received, data, published, sequence)
+
+    def flush(self) -> None:
+        """Give everything to the operating system, so that it survives a kill of this process; begin a new file if this one is large."""
+        if self._file is None:
+            return
+        self._writer.flush()  # type: ignore[no-untyped-call]  # the package lacks the annotation
+        if self._file.tell() > self._largest / FILES:
+            self.close()
+            self._remove_oldest()
+
+    def close(self) -> None:
+        """End the file with its index."""
+        if self._file is not None:
+            file, self._file = self._file, None
+            with file:
+                self._writer.finish()  # type: ignore[no-untyped-call]  # as above
+
+    def _begin(self) -> None:
+        parts = parts_of(self._folder)
+        number = 1 + int(_NAME.match(parts[-1].name)[1]) if parts else 0  # type: ignore[index]  # all parts match
+        self._file = (self._folder / f"messages-{number:04}.mcap").open("xb")
+        self._channels.clear()
+        self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD)
+        self._writer.start(library="mobee")
+        now = time.time_ns()
+        for name, text in self._settings.items():
+            self._writer.add_attachment(now, now, name, "application/toml", text)
+        self.begun += 1
+
+    def _register(self, channel: Channel) -> int:
+        schema = self._writer.register_schema(channel.schema, channel.schema_encoding, channel.definition) if channel.schema else 0
+        return self._writer.register_channel(channel.topic, channel.encoding, schema, {"encoding": channel.about} if channel.about else {})
+
+    def _remove_oldest(self) -> None:
+        parts, share = parts_of(self._folder), self._largest / FILES
+        while len(parts) > 1 and sum(path.stat().st_size for path in parts) > self._largest - share:
+            parts.pop(0).unlink()

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs the recorder: takes what has arrived four times a second, and writes it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+from msgspec import Struct
+
+from bus_schema import encoding_of
+from bus_schema.messages import Camera, Clock, Contacts, Image, Message, Pose, State
+from bus_schema.page import streams
+from mobee.robot.robot import Robot
+from services.common.service import Service
+from services.common.tap import Raw, Tap
+from services.recorder.config import Config
+from services.recorder.files import Channel, Files
+from services.recorder.views import Views
+
+PERIOD = 0.05  # s between two looks at what has arrived: a message is received when it is seen
+FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
+RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
+CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
+NICENESS = 10
+ALIVE, JSON = "alive", "json"  # key and encoding of the liveliness tokens, which are no messages on the bus
+_MEGABYTE = 1_000_000
+
+
+class _Header(Struct):
+    """The sender of a message, and its number."""
+
+    src: str = ""
+    seq: int = 0
+
+
+_header = msgspec.msgpack.Decoder(_Header)
+
+
+FOR_SUBSCRIBERS: tuple[type[Message], ...] = (Clock, State, Pose, Contacts, Image, Camera)
+"""Streams that others need not publish if nobody reads them, and that follow from the ticks and the robot's world."""
+
+
+def recorded_keys(everything: bool) -> list[str]:
+    """Return the key expressions of the streams that are recorded."""
+    return [cls.stream.keys() for cls in streams() if everything or cls not in FOR_SUBSCRIBERS]
+
+
+class RecorderNode:
+    """Writes all messages as they are, and copies for viewers."""
+
+    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+        self._service, self._folder, self._keep_free = service, Path(config.run_dir), int(config.keep_free * _MEGABYTE)
+        self._files = Files(self._folder, int(config.largest * _MEGABYTE), _settings_in(self._folder))
+        self._views = Views(robot, config.pose_rate, config.json_rate)
+        self._channels: dict[tuple[str, str], tuple[Channel, str]] = {}  # of a key and an encoding, with the type of the messages
+        self._kinds = {encoding_of(cls): cls.__name__ for cls in streams()}
+        self._tokens: list[Raw] = []
+        self._messages = self._lost = 0
+        self._failed_at = self._flushed = 0.0  # monotonic clock
+        self._trouble = ""
+        self._last: dict[tuple[str, str], int] = {}  # number of the last message of each key and sender
+        self._tap = Tap(service.bus.session, recorded_keys(config.everything), CAPACITY)
+        service.describe = self._describe
+        service.on_alive(self._note_token)
+        self._repeat()
+
+    def be_nice(self) -> None:
+        """Let the main thread yield the processor to all services; called when the start, on which they wait, is over.
+
+        Not in lockstep, where no message is dropped, so that the others would have to wait for a recorder that gets no processor.
+        """
+        if self._service.locked:
+            return
+        os.nice(max(0, NICENESS - os.getpriority(os.PRIO_PROCESS, 0)))
+        if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes, it preempts no other process
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+    def end(self) -> None:
+        """Write what has arrived, and the index of the file."""
+        try:
+            self._write(self._tap.drain())
+            self._files.close()
+        except OSError as error:
+            self._service.log.error("the end of the recording is not written: %s", error.strerror)
+
+    def _repeat(self) -> None:
+        self._look()
+        self._service.inbox.at(time.monotonic() + PERIOD, self._repeat)
+
+    def _look(self) -> None:
+        arrived, now = self._tap.drain(), time.monotonic()
+        if self._trouble and now < self._failed_at + RETRY_PERIOD:
+            self._lost += len(arrived)
+            return
+        try:
+            self._require_space()
+            self._write(arrived)
+            if now >= self._flushed + FLUSH_PERIOD:
+                self._flushed = now
+                self._files.flush()
+        except OSError as error:
+            self._lost += len(arrived)
+            self._fail(f"nothing is recorded: {error.strerror or error}")
+            return
+        if self._trouble:
+            self._service.bus.event("info", "recording", f"recording again; {self._lost} messages were lost")
+            self._trouble = ""
+
+    def _require_space(self) -> None:
+        free = shutil.disk_usage(self._folder).free
+        if free < self._keep_free:
+            raise OSError(f"{self._folder} has {free / _MEGABYTE:.0f} MB left, and keep_free is {self._keep_free / _MEGABYTE:.0f}")
+
+    def _fail(self, trouble: str) -> None:
+        self._failed_at = time.monotonic()
+        if trouble.partition(":")[0] != self._trouble.partition(":")[0]:
+            self._service.bus.event("warning", "recording", trouble)
+        self._trouble = trouble
+
+    def _write(self, arrived: list[Raw]) -> None:
+        if self._tokens:
+            arrived = sorted([*self._tokens, *arrived], key=lambda message: message.published)
+            self._tokens = []
+        write, views = self._files.write, self._views
+        for message in arrived:
+            channel, kind = self._channels.get((message.key, message.encoding)) or self._new_channel(message)
+            sequence = self._number_of(message) if kind else 0
+            write(channel, message.payload, message.received, message.published, sequence)
+            if kind:
+                for copy, data in views.of(message, kind):
+                    write(copy, data, message.received, message.published, sequence)
+        self._messages += len(arrived)
+
+    def _number_of(self, message: Raw) -> int:
+        """Return the number that the sender gave to a message; count the messages between it and the last one."""
+        try:
+            header = _header.decode(message.payload)
+        except msgspec.MsgspecError:  # services refuse it; it is recorded all the same
+            return 0
+        stream = message.key, header.src
+        last, self._last[stream] = self._last.get(stream, -1), header.seq
+        if 0 <= last < header.seq - 1:
+            self._lost += header.seq - 1 - last
+        return header.seq & 0xFFFFFFFF
+
+    def _new_channel(self, message: Raw) -> tuple[Channel, str]:
+        """Return the channel of a key and an encoding, and the type of its messages; "" if the contract has none of this encoding."""
+        kind = self._kinds.get(message.encoding, "")
+        encoding = "msgpack" if message.encoding.startswith("application/msgpack") else message.encoding
+        found = self._channels[message.key, message.encoding] = Channel(message.key, encoding, message.encoding), kind
+        return found
+
+    def _note_token(self, who: str, instance: str, up: bool) -> None:
+        content = json.dumps({"who": who, "instance": instance, "up": up}).encode()
+        now = time.time_ns()
+        self._tokens.append(Raw(ALIVE, JSON, content, now, now))
+
+    def _describe(self) -> tuple[str, Mapping[str, float]]:
+        numbers = {"messages": self._messages, "lost": self._lost, "megabytes": self._files.size / _MEGABYTE, "files": self._files.begun}
+        lost = f", {self._lost} messages lost" if self._lost else ""
+        return self._trouble or f"{self._messages} messages, {numbers['megabytes']:.1f} MB{lost}", numbers
+
+
+def _settings_in(folder: Path) -> dict[str, bytes]:
+    """Return the settings files of a run, with which a recording can be played again."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.toml"))}
