@@ -2,14 +2,17 @@
 """Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
 Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014;
-fields are ours. Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
+fields are ours. The meshes that it draws are those of the installed icub-models.
+Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import tempfile
 import xml.etree.ElementTree as ET
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +22,11 @@ from experiments.robots.icub_volumes import BESIDE, BOXES, HEAD, LEFT_ARM, TRUNK
 from experiments.robots.xml_writer import box_turn, element, number, vector, write
 from mobee.arrays import Array
 from mobee.robot.bodies import to_six
+from mobee.robot.icub_urdf import models_folder, write_upper_body_urdf
+from mobee.robot.robot import Robot
+from mobee.robot.urdf.read import read_urdf
 from mobee.robot.xml.node import VERSION
+from mobee.robot.xml.volume import Z, align
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub.xml"
 HEADING = """
@@ -29,9 +36,12 @@ SPDX-FileCopyrightText: The MoBeE developers
 SPDX-License-Identifier: CC-BY-SA-4.0
 Kinematics, solids and masses derive from icub-models 3.2.0 (https://github.com/robotology/icub-models), (c) Istituto Italiano di
 Tecnologia, CC BY-SA 4.0 (https://creativecommons.org/licenses/by-sa/4.0/); this file is distributed under the same licence.
-Changed: zero-position form; boxes and capsules instead of meshes; added fields, motors, limits, couplings, constraints, markers.
+Changed: zero-position form; boxes and capsules touch instead of meshes, and are drawn as hands; covers are grey instead of red; added
+fields, motors, limits, couplings, constraints, markers.
 Origin of every number: README.md beside this file.
 """
+COVERS = (0.3, 0.34, 0.4, 1.0)  # colour of the URDF's red parts: red is the colour of contacts, and of the ball
+SKIN = "0.9 0.9 0.9 1"
 # A point on a joint's axis is free along the axis; the foot of these points draws the body's skeleton (thesis 2.3.1).
 ANCHORS = {
     "torso": (0.0, 0.0, 0.032),
@@ -70,6 +80,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
     base = element(torso, "link", name="root_link")
     add_shapes(base, model, "root_link", np.zeros(3))
     add_fields(base, "root_link", np.zeros(3))
+    add_visuals(base, model, "root_link", np.zeros(3))
     for first, second in BESIDE:
         element(root, "ignore", first=first, second=second, role="field")
     add_joints(torso, data, "root_link", np.zeros(3))
@@ -119,6 +130,8 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
     for source in carried:
         add_shapes(pan, data["models"]["icub_v2_5"], source, here)
     add_fields(pan, link, here)
+    for source in carried:
+        add_visuals(pan, data["models"]["icub_v2_5"], source, here)
     add_markers(pan, data, link, here)
     for source in carried if link.endswith("hand") else [link]:
         add_joints(pan, data, source, here)
@@ -230,6 +243,38 @@ def fields() -> list[Field]:
     mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
     arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
     return TRUNK + HEAD + arms
+
+
+def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
+    """Add what is drawn of a link, relative to a point: the mesh of the URDF's link of that name, which has the same zero pose.
+
+    Of a hand the solids are drawn, as the fingers of the mesh are one piece with the palm and do not move.
+    """
+    if "hand" in link:
+        for shape in model["primitives"]:
+            if shape["link"] == link:
+                rotation = align(Z, np.array(shape["axis"])) if shape["shape"] == "cylinder" else np.array(shape.get("R", np.eye(3)))
+                size = shape["size"] if shape["shape"] == "box" else [shape[name] for name in ("radius", "height") if name in shape]
+                text, rows = " ".join(map(number, size)), " ".join(number(value, 9) for value in rotation.ravel())
+                place = vector("px py pz", np.array(shape["center"]) - point)
+                element(parent, "visual", shape=shape["shape"], size=text, color=SKIN, **place, rotation=rows)
+        return
+    source = drawn()
+    for visual in source.visuals:
+        if source.links[visual.link] == link and visual.mesh is not None and visual.color is not None:
+            file = "package://iCub/" + Path(visual.mesh.file).relative_to(models_folder()).as_posix()
+            red, green, blue, _ = visual.color
+            color = COVERS if red > 1.5 * max(green, blue) else visual.color
+            scale, colors = (" ".join(map(number, values)) for values in (visual.mesh.scale, color))
+            rows = " ".join(number(value, 9) for value in visual.rotation.ravel())
+            element(parent, "visual", file=file, scale=scale, color=colors, **vector("px py pz", visual.position - point), rotation=rows)
+
+
+@cache
+def drawn() -> Robot:
+    """Return the URDF of icub-models."""
+    with tempfile.TemporaryDirectory() as folder:
+        return read_urdf(write_upper_body_urdf(Path(folder) / "icub.urdf"))
 
 
 def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:

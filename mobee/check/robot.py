@@ -16,6 +16,7 @@ from mobee.check.shapes import fields, identical_shapes
 from mobee.check.subject import Subject
 from mobee.check.touching import always_touching, foreign_solids, home_contacts, world_contacts
 from mobee.check.units import radians, size
+from mobee.check.visuals import missing_meshes
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 
@@ -38,6 +39,7 @@ CHECKS: tuple[Check, ...] = (
     constraints,
     unreachable_markers,
     masses,
+    missing_meshes,
     identical_shapes,
     names_differing_in_case,
     unusable_names,

@@ -15,6 +15,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.bodies import one_a_link
 from mobee.robot.pairs import joined_pairs, joined_untested
 from mobee.robot.robot import Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
+from mobee.robot.visual import Camera, Visual
 
 SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 
@@ -83,6 +84,8 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
         untested=joined_untested(bodies, shapes, (solid_pairs, field_pairs)),
         where=where,
         bodies=one_a_link(mass for body in bodies for mass in body.bodies),
+        visuals=tuple(visual for body in bodies for visual in body.visuals),
+        cameras={key: camera for body in bodies for key, camera in body.cameras.items()},
     )
 
 
@@ -119,6 +122,13 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         inertia = None if old.inertia is None else turn @ old.inertia @ turn.T
         return Body(link(old.link), old.mass, point(old.centre), inertia)
 
+    def visual(old: Visual) -> Visual:
+        return replace(old, position=point(old.position), rotation=turn @ old.rotation, link=link(old.link))
+
+    def camera(old: Camera) -> Camera:
+        moved = replace(old, position=point(old.position), rotation=turn @ old.rotation)
+        return replace(moved, name=one.name(old.name), link=link(old.link), hidden=frozenset(map(link, old.hidden)))
+
     def clause(old: Clause) -> Clause:
         a = np.zeros((len(old.b), all_motors))
         a[:, motors : motors + old.a.shape[1]] = old.a
@@ -135,6 +145,8 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         shapes=tuple(map(shape, robot.shapes)),
         clauses=tuple(map(clause, robot.clauses)),
         bodies=tuple(map(body, robot.bodies)),
+        visuals=tuple(map(visual, robot.visuals)),
+        cameras={one.name(key): camera(old) for key, old in robot.cameras.items()},
         untested={
             frozenset(map(link, pair)): f"{one.prefix}: {reason}" if one.prefix else reason for pair, reason in robot.untested.items()
         },
@@ -151,6 +163,7 @@ def _check_names(bodies: Sequence[Robot]) -> None:
         "links": [bodies[0].links[0], *(link for body in bodies for link in body.links[1:])],
         "markers": [key for body in bodies for key in body.markers],
         "shapes": [shape.name for body in bodies for shape in body.shapes],
+        "cameras": [key for body in bodies for key in body.cameras],
     }
     for kind, names in kinds.items():
         twice = [name for name, count in Counter(names).items() if count > 1]

@@ -13,6 +13,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.errors import UnknownName
+from mobee.robot.visual import Camera, Visual
 
 ShapeKind = Literal["sphere", "capsule", "cylinder", "box", "convex"]
 LinkPair = frozenset[int]
@@ -141,6 +142,8 @@ class Robot:
         untested: for every pair of links that is never tested, the reason.
         where: file and line of every element, as {("joint", name): "file:line"}.
         bodies: masses, at most one for each link, in the order of the links; () if the file has none.
+        visuals: what is drawn of the links, if it is not their solids.
+        cameras: those that the file names, by name; see `mobee.robot.cameras`.
     """
 
     name: str
@@ -157,6 +160,8 @@ class Robot:
     untested: Mapping[LinkPair, str] = field(default_factory=dict)
     where: Mapping[tuple[str, str], str] = field(default_factory=dict)
     bodies: tuple[Body, ...] = ()
+    visuals: tuple[Visual, ...] = ()
+    cameras: Mapping[str, Camera] = field(default_factory=dict)
 
     @cached_property
     def motors(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 
-_WITHOUT_EFFECT = ("where", "untested")  # fields of a robot that say where it was read from, and why
+_WITHOUT_EFFECT = ("where", "untested", "visuals", "cameras")  # fields of a robot that change nothing that it does
 _APPEARANCE = ("name", "color")  # fields of a world object; the name is its key
 _ADDED_LATER = ("zone_ends_at_home",)  # fields of a motor that are left out if False, so that robots keep their earlier digests
 DIGITS = 9  # decimals of lengths and angles: the same file read on another machine gives the same digest

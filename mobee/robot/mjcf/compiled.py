@@ -7,12 +7,13 @@ import re
 import xml.sax
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, RobotFileError
 from mobee.robot.urdf.frames import Frame
 from mobee.robot.xml.file import LineHandler, is_file, parse_content, read_content
@@ -47,9 +48,9 @@ def is_mjcf(path: Path) -> bool:
 class Compiled:
     """A model as MuJoCo compiles it, with every hinge and slide at zero; lists are in the order of MuJoCo's ids.
 
-    `model`: the MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`: frames in the world's frame. `anchors`, `axes`:
-    (joints, 3) of the joints in the same frame. `names[kind]`: of bodies, joints, geoms, sites, keys and so on; those without a name get
-    one from their kind and number. `lines[kind]`: of the file, 0 where MuJoCo does not record one.
+    `model`: the MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: frames in the world's frame. `anchors`,
+    `axes`: (joints, 3) of the joints in the same frame. `names[kind]`: of bodies, joints, geoms, sites, keys and so on; those without a
+    name get one from their kind and number. `lines[kind]`: of the file, 0 where MuJoCo does not record one.
     """
 
     path: Path
@@ -58,6 +59,7 @@ class Compiled:
     inertial: tuple[Frame, ...]
     geoms: tuple[Frame, ...]
     sites: tuple[Frame, ...]
+    cameras: tuple[Frame, ...]
     anchors: Array
     axes: Array
     names: dict[str, tuple[str, ...]]
@@ -67,13 +69,14 @@ class Compiled:
     equality_kinds: tuple[str, ...]  # connect, weld, joint, tendon, ...
     transmissions: tuple[str, ...]  # of actuators: joint, jointinparent, tendon, site, ...
     wraps: tuple[str, ...]  # elements of tendons: joint, site, sphere, ...
+    camera_modes: tuple[str, ...]  # fixed, track, ...
 
     def where(self, kind: str, index: int) -> str:
         """Return file and line of an element."""
         return f"{self.path}:{max(self.lines[kind][index], 1)}"
 
 
-KINDS = ("body", "joint", "geom", "site", "key", "equality", "actuator", "tendon")
+KINDS = ("body", "joint", "geom", "site", "key", "equality", "actuator", "tendon", "camera", "mesh")
 
 
 def compile_mjcf(path: Path) -> Compiled:
@@ -102,6 +105,8 @@ def compile_mjcf(path: Path) -> Compiled:
     moving = [kind in ("hinge", "slide") for kind in kinds]
     data.qpos[model.jnt_qposadr[moving]] = 0.0
     mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_camlight(model, data)
     names, lines = _named(model, mujoco), _lines(spec)
     return Compiled(
         path=path,
@@ -110,6 +115,7 @@ def compile_mjcf(path: Path) -> Compiled:
         inertial=_frames(data.xipos, data.ximat),
         geoms=_frames(data.geom_xpos, data.geom_xmat),
         sites=_frames(data.site_xpos, data.site_xmat),
+        cameras=_frames(data.cam_xpos, data.cam_xmat),
         anchors=data.xanchor.copy(),
         axes=data.xaxis.copy(),
         names=names,
@@ -119,7 +125,20 @@ def compile_mjcf(path: Path) -> Compiled:
         equality_kinds=_kinds(mujoco.mjtEq, "mjEQ_", model.eq_type),
         transmissions=_kinds(mujoco.mjtTrn, "mjTRN_", model.actuator_trntype),
         wraps=_kinds(mujoco.mjtWrap, "mjWRAP_", model.wrap_type),
+        camera_modes=_kinds(mujoco.mjtCamLight, "mjCAMLIGHT_", model.cam_mode),
     )
+
+
+@lru_cache(maxsize=2)
+def meshes_of(path: Path) -> dict[str, tuple[Array, Ints]]:
+    """Return the vertices (v, 3) m and triangles (t, 3) of each mesh of an MJCF file, in the frames of the geoms; errors: compile_mjcf."""
+    compiled = compile_mjcf(path)
+    model, found = compiled.model, {}
+    for mesh, name in enumerate(compiled.names["mesh"]):
+        vertices = slice(model.mesh_vertadr[mesh], model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh])
+        faces = slice(model.mesh_faceadr[mesh], model.mesh_faceadr[mesh] + model.mesh_facenum[mesh])
+        found[name] = model.mesh_vert[vertices].astype(np.float64), model.mesh_face[faces].astype(np.intp)
+    return found
 
 
 def _remedy(problem: str) -> str:
@@ -140,7 +159,7 @@ def _frames(positions: Array, rotations: Array) -> tuple[Frame, ...]:
 
 def _named(model: Any, mujoco: Any) -> dict[str, tuple[str, ...]]:
     """Return the names of all elements of each kind, each once."""
-    counts = (model.nbody, model.njnt, model.ngeom, model.nsite, model.nkey, model.neq, model.nu, model.ntendon)
+    counts = (model.nbody, model.njnt, model.ngeom, model.nsite, model.nkey, model.neq, model.nu, model.ntendon, model.ncam, model.nmesh)
     found = {}
     for kind, count in zip(KINDS, counts, strict=True):
         code = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
@@ -158,7 +177,7 @@ def _unused(name: str, taken: set[str]) -> str:
 
 def _lines(spec: Any) -> dict[str, tuple[int, ...]]:
     """Return the line of each element that the specification records, as its text "line 12" gives it."""
-    tables = {"body": spec.bodies, "joint": spec.joints, "geom": spec.geoms, "site": spec.sites, "key": spec.keys}
+    tables = {"body": spec.bodies, "joint": spec.joints, "geom": spec.geoms, "site": spec.sites, "key": spec.keys, "camera": spec.cameras}
     found = {}
     for kind, elements in tables.items():
         numbers = np.zeros(len(elements), dtype=int)

@@ -18,6 +18,7 @@ from mobee.robot.mjcf.compiled import Compiled, compile_mjcf
 from mobee.robot.mjcf.couplings import drives_of, held_joints, loops
 from mobee.robot.mjcf.motors import home_pose, read_motor
 from mobee.robot.mjcf.shapes import WITHOUT_BODY, read_solids
+from mobee.robot.mjcf.visuals import read_cameras, read_visuals
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.urdf.frames import Frame
 from mobee.robot.urdf.motors import Drive
@@ -80,6 +81,8 @@ def read_mjcf(path: Path, options: UrdfOptions | None = None) -> Robot:
         untested=untested_links(shapes, solid_pairs, rules),
         where=where,
         bodies=_bodies(compiled, skeleton),
+        visuals=read_visuals(compiled, skeleton.link_of),
+        cameras=read_cameras(compiled, skeleton.link_of),
     )
 
 

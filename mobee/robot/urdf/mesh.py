@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import re
 import stat
+import sysconfig
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -15,6 +16,7 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import RobotFileError
 from mobee.robot.urdf.mesh_dae import read_dae
+from mobee.robot.visual import MeshSource
 from mobee.robot.xml.file import is_file
 from mobee.robot.xml.node import Node
 
@@ -23,36 +25,66 @@ REMEDY = "Put the package's folder beside or above the URDF, or name where it li
 
 
 def find_mesh(node: Node) -> Path:
-    """Return the path of the file in a <mesh filename="...">.
-
-    `package://name/...` is searched from the URDF's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH;
-    a plain path starts at the URDF's folder. Raises RobotFileError with the places that were searched.
-    """
+    """Return the path of the file in a <mesh filename="...">; raises RobotFileError with the places that were searched."""
     given = node.text("filename")
+    if "\0" in given:
+        node.fail("filename", "holds a zero byte", "Write a path")
+    candidates = mesh_places(given, node.file)
+    if not candidates:
+        node.fail("filename", f"{given!r} cannot be followed", "Write package://, file:// or a path")
+    found = first_file(candidates)
+    if found is None:
+        scheme = given.partition("://")[0].lower() if "://" in given else ""
+        remedy = REMEDY if scheme in PACKAGES else "Correct the path" if scheme else "Give a path that starts at the URDF's folder"
+        node.fail("filename", f"no mesh {given!r} (looked at {searched(candidates)})", remedy)
+    return found
+
+
+def mesh_places(given: str, robot_file: Path) -> list[Path]:
+    """Return the paths that the name of a mesh in a robot's file can mean; none for an unknown scheme.
+
+    `package://name/...` is searched from the robot's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, then where pip
+    installs data; a plain path starts at the robot's folder.
+    """
     try:
         scheme, rest = urlsplit(given).scheme.lower(), given.partition("://")[2]
     except ValueError:  # brackets of an IPv6 address that is none
         scheme, rest = "?", ""
-    if "\0" in given:
-        node.fail("filename", "holds a zero byte", "Write a path")
     if "://" not in given:
-        candidates, remedy = [node.file.parent / given], "Give a path that starts at the URDF's folder"
-    elif scheme == "file":
-        candidates, remedy = [node.file.parent / unquote(rest)], "Correct the path"
-    elif scheme in PACKAGES:
+        return [robot_file.parent / given]
+    if scheme == "file":
+        return [robot_file.parent / unquote(rest)]
+    if scheme in PACKAGES:
         package, _, inner = rest.partition("/")
-        candidates, remedy = list(_in_packages(node.file, package, inner)), REMEDY
-    else:
-        node.fail("filename", f"{given!r} cannot be followed", "Write package://, file:// or a path")
-    for path in candidates:
-        if is_file(path):
-            return path
-    looked = ", ".join(str(path) for path in candidates[:6]) + (f" and {len(candidates) - 6} more" if len(candidates) > 6 else "")
-    node.fail("filename", f"no mesh {given!r} (looked at {looked})", remedy)
+        return list(_in_packages(robot_file, package, inner))
+    return []
 
 
-def _in_packages(urdf: Path, package: str, inner: str) -> Iterator[Path]:
-    for folder in urdf.resolve().parents:
+def mesh_name(mesh: MeshSource, path: Path) -> str:
+    """Return the name of a mesh for a robot's file at `path`: as it was if it means the same there, else from the folder of that file."""
+    found = first_file(mesh_places(mesh.file, mesh.robot_file))
+    same = first_file(mesh_places(mesh.file, path)) if mesh.file.partition("://")[0].lower() in PACKAGES else None
+    if found is None or same is not None:
+        return mesh.file
+    try:
+        return Path(os.path.relpath(found.resolve(), path.resolve().parent)).as_posix()
+    except ValueError:  # on another drive
+        return found.resolve().as_posix()
+
+
+def first_file(candidates: list[Path]) -> Path | None:
+    """Return the first of the paths that is a file."""
+    return next((path for path in candidates if is_file(path)), None)
+
+
+def searched(candidates: list[Path]) -> str:
+    """Return the paths as text for a message, six at most."""
+    more = f" and {len(candidates) - 6} more" if len(candidates) > 6 else ""
+    return ", ".join(str(path) for path in candidates[:6]) + more
+
+
+def _in_packages(robot_file: Path, package: str, inner: str) -> Iterator[Path]:
+    for folder in robot_file.resolve().parents:
         yield folder / package / inner
         if folder.name == package:
             yield folder / inner
@@ -62,6 +94,8 @@ def _in_packages(urdf: Path, package: str, inner: str) -> Iterator[Path]:
             yield Path(entry) / inner
     for entry in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         yield Path(entry) / "share" / package / inner
+    for scheme in dict.fromkeys((sysconfig.get_default_scheme(), sysconfig.get_preferred_scheme("user"))):
+        yield Path(sysconfig.get_path("data", scheme)) / "share" / package / inner  # of wheels, as icub-models
 
 
 LARGEST = 50_000_000  # bytes

@@ -19,6 +19,7 @@ from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_p
 from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown
 from mobee.robot.urdf.srdf import Home, Srdf, choose_home, find_srdf, homed, read_parts, read_srdf
 from mobee.robot.urdf.tree import Tree, UrdfJoint, read_tree
+from mobee.robot.urdf.visuals import read_visuals
 from mobee.robot.xml.node import Node, read_xml
 from mobee.robot.xml.pairs import without_ignored
 
@@ -107,6 +108,7 @@ def _finish(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, o
         untested=untested_links(body.shapes, solid_pairs, rules),
         where=where,
         bodies=read_bodies(tree, skeleton),
+        visuals=read_visuals(root, tree, skeleton),
     )
     return without_ignored(robot, [node for note in notes for node in note if node.tag == "ignore"])
 

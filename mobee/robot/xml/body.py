@@ -113,12 +113,17 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
     normal = direction(node, ("nx", "ny", "nz")) if given else X
     rotation = align(Z, normal)
     if "rotation" in node.attributes:
-        rotation = np.array(node.numbers("rotation", 9)).reshape(3, 3)
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
-            node.fail("rotation", "is not a rotation matrix", "Write a right-handed orthonormal 3 x 3 matrix row by row")
-        left, _, right = np.linalg.svd(rotation)  # the nearest exact rotation to the rounded one in the file
-        rotation = left @ right
+        rotation = read_rotation(node)
         normal = normal if given else rotation[:, 2]
     draft.note("marker", name, node)
     link = place.link if node.flag("turns", default=True) else place.carrier
     draft.markers[name] = Marker(name, link, place.start + node.vector(PLACE), rotation, normal)
+
+
+def read_rotation(node: Node) -> Array:
+    """Return the matrix (3, 3) of the attribute `rotation`, nine numbers row by row; raises RobotFileError."""
+    rotation: Array = np.array(node.numbers("rotation", 9)).reshape(3, 3)
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
+        node.fail("rotation", "is not a rotation matrix", "Write a right-handed orthonormal 3 x 3 matrix row by row")
+    left, _, right = np.linalg.svd(rotation)  # the nearest exact rotation to the rounded one in the file
+    return np.asarray(left @ right)

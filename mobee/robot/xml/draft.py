@@ -9,6 +9,7 @@ from mobee.arrays import Array
 from mobee.robot.join import Placed
 from mobee.robot.pairs_2014 import Element
 from mobee.robot.robot import Body, Joint, Marker, Shape
+from mobee.robot.visual import Camera, Visual
 from mobee.robot.xml.motors import MotorDraft
 from mobee.robot.xml.node import Node
 
@@ -31,6 +32,9 @@ class Draft:
     base_shapes: set[int] = field(default_factory=set)
     markers: dict[str, Marker] = field(default_factory=dict)
     bodies: list[Body] = field(default_factory=list)  # perhaps several for one link
+    visuals: list[Visual] = field(default_factory=list)
+    cameras: dict[str, Camera] = field(default_factory=dict)
+    hides: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)  # of each camera: its element, names of links
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
     others: list[tuple[Node, Placed]] = field(default_factory=list)  # included robots, and the elements that include them

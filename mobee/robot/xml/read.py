@@ -27,6 +27,7 @@ from mobee.robot.xml.motors import finish_joints, order_motors, read_clauses, re
 from mobee.robot.xml.node import Node, listed, nearest, read_xml, shown
 from mobee.robot.xml.pairs import IGNORE_ATTRIBUTES, without_ignored
 from mobee.robot.xml.versions import report, upgrade_robot
+from mobee.robot.xml.visual import CAMERA_ATTRIBUTES, VISUAL_ATTRIBUTES, finished_cameras, read_camera, read_visual
 from mobee.robot.xml.volume import AXIS, PLACE, STEP, VOLUME_TAGS, Z, align, direction, link_step, turn_about
 
 ROBOTS = Path(__file__).parents[1] / "robots"
@@ -75,6 +76,8 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
         untested=untested,
         where=draft.where,
         bodies=one_a_link(draft.bodies),
+        visuals=tuple(draft.visuals),
+        cameras=finished_cameras(draft),
     )
 
 
@@ -98,7 +101,7 @@ def _pairs(root: Node, draft: Draft, joints: tuple[Joint, ...]) -> tuple[Ints, I
 def _with_others(robot: Robot, draft: Draft) -> Robot:
     """Join the robot of this file, if it has a body, with those that it includes."""
     node, _ = draft.others[-1]
-    own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers or draft.bodies else []
+    own = [Placed("", robot)] if draft.parts or draft.shapes or draft.markers or draft.bodies or draft.visuals else []
     placed = own + [other for _, other in draft.others]
     if sum(len(one.robot.shapes) for one in placed) > MOST_SHAPES or sum(len(one.robot.joints) for one in placed) > MOST_JOINTS:
         node.fail("file", f"more than {MOST_SHAPES} shapes or {MOST_JOINTS} joints in all", "Include fewer or simpler robots")
@@ -109,7 +112,11 @@ def _with_others(robot: Robot, draft: Draft) -> Robot:
     return replace(joined, where={("robot", robot.name): robot.where[("robot", robot.name)], **joined.where})
 
 
-MOST = {"joint": MOST_JOINTS, "ignore": 20_000}  # of one tag, in a file; 1000 of the others. `write_xml` names every ignored pair
+MOST = {
+    "joint": MOST_JOINTS,
+    "ignore": 20_000,
+    "visual": 2000,
+}  # of one tag, in a file; 1000 of the others. `write_xml` names every ignored pair
 ROOT = "zeropositionkinematictree"
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
 KNOWN = {
@@ -122,6 +129,8 @@ KNOWN = {
     "motor": frozenset({"name", "idx", "unit", "minPos", "maxPos", "home", "velocity", "acceleration", "torque", "zoneEndsAtHome"}),
     "marker": frozenset({"name", *PLACE, "nx", "ny", "nz", "rotation", "turns"}),
     "mass": MASS_ATTRIBUTES,
+    "visual": VISUAL_ATTRIBUTES,
+    "camera": CAMERA_ATTRIBUTES,
     "constraintlist": frozenset[str](),
     "constraint": frozenset({"a", "q", "b", "negate"}),
     "robot": INCLUDE_ATTRIBUTES,
@@ -347,6 +356,8 @@ READERS: dict[str, Callable[[Node, Draft, Place], Place | None]] = {
     "joint": _read_joint,
     "marker": read_marker,
     "mass": read_mass,
+    "visual": read_visual,
+    "camera": read_camera,
     "constraintlist": _read_constraints,
     "ignore": _read_ignore,
     **dict.fromkeys(BODY_TAGS, read_shape),

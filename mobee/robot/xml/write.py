@@ -18,6 +18,7 @@ from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
 from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
 from mobee.robot.xml.pairs import ignore_elements
 from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world
+from mobee.robot.xml.visual import visual_elements
 from mobee.robot.xml.volume import height_and_angle
 
 DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
@@ -26,7 +27,8 @@ DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 def write_xml(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a zero-position XML file (robots/README.md) and return its path.
 
-    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses and clauses. Shapes may come in another order, and a
+    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses, clauses, visuals and cameras; meshes stay where
+    they are, and the file names them. Shapes may come in another order, and a
     convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
@@ -39,7 +41,7 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
             if clause.part == part.name:
                 element.append(_clause(robot, clause))
     base = ET.SubElement(root, "link", name=robot.links[0])
-    _write_link(robot, drives, base, 0, np.zeros(3))
+    _write_link(robot, drives, base, 0, np.zeros(3), Path(path))
     root.extend(ignore_elements(robot))
     return write_tree(root, Path(path))
 
@@ -85,7 +87,7 @@ def _clause(robot: Robot, clause: Clause) -> ET.Element:
     return element
 
 
-def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array) -> None:
+def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array, path: Path) -> None:
     """Write a link and everything mounted on it, in the order of the tree."""
     waiting = [(into, link, point, 2)]
     while waiting:
@@ -93,6 +95,7 @@ def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link:
         if depth > DEEPEST - 4:
             raise InvalidValue(f"link {robot.links[here]!r} is too deep in the tree: a file holds {DEEPEST} elements inside each other.")
         _write_body(robot, element, here, origin)
+        element.extend(visual_elements(robot, here, origin, path))
         for index, joint in enumerate(robot.joints):
             if joint.parent != here:
                 continue

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The cameras of a robot: those of its file, the eyes that markers make, and those that a person puts on a link."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue, UnknownName
+from mobee.robot.robot import Robot
+from mobee.robot.visual import Camera
+
+EYES = {"left": "left_eye", "right": "right_eye"}  # cameras, and the markers that make them
+OWN = 2  # cameras of a file that make pictures unless more are named
+VIEW = 50.0  # degrees, the vertical field of view of a camera whose file gives none
+UPRIGHT = 1e-3  # sine of the smallest angle between a direction of view and the vertical
+UP = np.array([0.0, 0.0, 1.0])  # at zero pose pictures stand upright
+GRAMMAR = "NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place [m] and a direction of view in its frame"
+
+
+def cameras_of(robot: Robot, asked: Sequence[str] = ()) -> dict[str, Camera]:
+    """Return the cameras that make pictures, by name, as in keys of the bus: of a-z, 0-9 and _.
+
+    They are the first two of the robot's file, or the eyes "left" and "right" at markers left_eye and right_eye, and those that `asked`
+    names: others of the file, or new ones on links and markers, see GRAMMAR.
+
+    Raises InvalidValue or UnknownName for one that cannot be made.
+    """
+    own = _named(robot.cameras.values()) or _eyes(robot)
+    first = dict(list(own.items())[:OWN])
+    return _named([*first.values(), *(own[text] if text in own else camera_on(robot, text) for text in asked if text not in first)])
+
+
+def _named(cameras: Iterable[Camera]) -> dict[str, Camera]:
+    """Return cameras by the names that they have on the bus, each once."""
+    found: dict[str, Camera] = {}
+    for camera in cameras:
+        name, count = key_of(camera.name), 2
+        while name in found:
+            name, count = f"{key_of(camera.name)}_{count}", count + 1
+        found[name] = camera
+    return found
+
+
+def _eyes(robot: Robot) -> dict[str, Camera]:
+    if not robot.markers.keys() >= set(EYES.values()):
+        return {}
+    # The eyes are inside the shapes of the head.
+    head = frozenset(shape.link for shape in robot.shapes if shape.part == "head")
+    found = {}
+    for name, at in EYES.items():
+        marker = robot.markers[at]
+        found[name] = Camera(name, marker.link, marker.position, upright(marker.normal), VIEW, head)
+    return found
+
+
+def camera_on(robot: Robot, text: str) -> Camera:
+    """Return the camera that a text describes, see GRAMMAR; raises InvalidValue or UnknownName.
+
+    In the frame of a marker z is the direction of view unless the text gives one; a link that is no marker has the axes of the root frame
+    at zero pose, and its origin is on its joint's axis.  A camera at the origin itself does not see the link that carries it.
+    """
+    name, equals, given = text.partition("=")
+    numbers = _numbers(text, given) if equals else []
+    offset, view = np.array(numbers[:3] or (0.0, 0.0, 0.0)), np.array(numbers[3:] or (0.0, 0.0, 1.0))
+    if name in robot.markers:
+        marker = robot.markers[name]
+        link, origin, rotation = marker.link, marker.position, marker.rotation
+        ahead = rotation @ view if len(numbers) == 6 else marker.normal
+    elif name in robot.links:
+        link = robot.links.index(name)
+        origin, rotation = robot.joints[link - 1].point if link else np.zeros(3), np.eye(3)
+        ahead = view if len(numbers) == 6 else np.array([1.0, 0.0, 0.0])
+    else:
+        raise UnknownName("link or marker", name, (*robot.links, *robot.markers))
+    length = float(np.linalg.norm(ahead))
+    if length < UPRIGHT:
+        raise InvalidValue(f"camera {text!r}: the direction of view has no length. Write {GRAMMAR}.")
+    hidden = frozenset() if offset.any() else frozenset({link})
+    return Camera(name, link, origin + rotation @ offset, upright(ahead / length), VIEW, hidden)
+
+
+def _numbers(text: str, given: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in given.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6) or not np.isfinite(numbers).all():
+        raise InvalidValue(f"camera {text!r}: {given!r} is neither three nor six numbers. Write {GRAMMAR}.")
+    return numbers
+
+
+def key_of(name: str) -> str:
+    """Return a name as it stands in a key of the bus."""
+    return re.sub(r"[^a-z0-9_]+", "_", name.lower()).strip("_") or "camera"
+
+
+def upright(ahead: Array) -> Array:
+    """Return the rotation (3, 3) of a camera that looks along a unit vector (3,), its picture upright; columns right, down, ahead.
+
+    Of a vertical view the picture's right is the root frame's -y, as of one that looks along x.
+    """
+    right = np.cross(ahead, UP)
+    length = float(np.linalg.norm(right))
+    right = right / length if length > UPRIGHT else np.array([0.0, -1.0, 0.0])
+    return np.stack([right, np.cross(ahead, right), ahead], axis=1)
+
+
+def camera_frame(camera: Camera, transforms: Array) -> tuple[Array, Array]:
+    """Return optical centre (3,) m and rotation (3, 3) of a camera in the root frame; `transforms`: (L, 4, 4), from link_transforms."""
+    link = transforms[camera.link]
+    return link[:3, :3] @ camera.position + link[:3, 3], link[:3, :3] @ camera.rotation
