@@ -1,38 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of convex volumes: a ray through the middle of each pixel, and the volume that it enters first.
+// Pictures of convex volumes and of surfaces: a ray through the middle of each pixel, and the volume that it enters first.
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include "interface.hpp"
+#include "picture.hpp"
 #include "vector.hpp"
 #include "volume.hpp"
 
 namespace mobee {
 
-// One volume; `half` as in Volume.  A hull is the set of points x in its own axes with normal . x <= offset for each of its planes.
-struct Convex {
-    Vec3 center;
-    Rotation rotation;
-    Vec3 half;
-    double bound;          // radius of the sphere about the centre that holds the volume
-    std::int64_t kind;     // of enum Kind
-    const double* planes;  // (count, 4): outward unit normal and offset, of hulls
-    std::int64_t count;
-};
-
-// The arguments from Python, see mobee/_core/rays.py.  The ray of column i and row j, with x = left + i * step and y = top + j * step:
-// in a perspective picture from `origin` along ahead + x * right + y * down, in a parallel one from origin + x * right + y * down along ahead.
-struct Picture {
-    const Convex* volumes;
-    float* depth;         // (height, width), filled: along ahead [m], infinite where there is nothing
-    std::int32_t* which;  // (height, width), filled: the number of the volume, -1 where there is nothing
-    float* normal;        // (height, width, 3), filled: outward, root frame, 0 where there is nothing
-    std::int64_t count, height, width, perspective;
-    Vec3 origin, right, down, ahead;
-    double left, top, step;
-    double nearest;       // a surface nearer than this is not drawn [m]
-};
+// The range of pixels along one axis of the picture in which a sphere can be visible; `aside`, `ahead`: its centre from the origin.
+Pixels pixels_of(const Picture& picture, double aside, double ahead, double radius, double first, std::int64_t size) {
+    double low = aside - radius, high = aside + radius;
+    if (picture.perspective != 0) {
+        const double distance = std::hypot(aside, ahead);
+        if (distance <= radius) return {0, size};
+        const double middle = std::atan2(aside, ahead), half = std::asin(radius / distance);
+        constexpr double quarter = 1.5707963267948966;
+        if (middle - half >= quarter || middle + half <= -quarter) return {0, 0};
+        low = middle - half <= -quarter ? -std::numeric_limits<double>::infinity() : std::tan(middle - half);
+        high = middle + half >= quarter ? std::numeric_limits<double>::infinity() : std::tan(middle + half);
+    }
+    const double last = static_cast<double>(size);
+    const double begin = std::floor((low - first) / picture.step), end = std::ceil((high - first) / picture.step) + 1.0;
+    return {static_cast<std::int64_t>(clamp(begin, 0.0, last)), static_cast<std::int64_t>(clamp(end, 0.0, last))};
+}
 
 namespace casting {
 
@@ -148,34 +142,13 @@ Entry enter(const Convex& volume, Vec3 start, Vec3 along) {
     return {};
 }
 
-struct Span {
-    std::int64_t begin, end;
-};
-
-// The range of pixels along one axis of the picture in which a sphere can be visible; `aside`, `ahead`: its centre from the origin.
-Span span_of(const Picture& picture, double aside, double ahead, double radius, double first, std::int64_t size) {
-    double low = aside - radius, high = aside + radius;
-    if (picture.perspective != 0) {
-        const double distance = std::hypot(aside, ahead);
-        if (distance <= radius) return {0, size};
-        const double middle = std::atan2(aside, ahead), half = std::asin(radius / distance);
-        constexpr double quarter = 1.5707963267948966;
-        if (middle - half >= quarter || middle + half <= -quarter) return {0, 0};
-        low = middle - half <= -quarter ? -infinity : std::tan(middle - half);
-        high = middle + half >= quarter ? infinity : std::tan(middle + half);
-    }
-    const double last = static_cast<double>(size);
-    const double begin = std::floor((low - first) / picture.step), end = std::ceil((high - first) / picture.step) + 1.0;
-    return {static_cast<std::int64_t>(clamp(begin, 0.0, last)), static_cast<std::int64_t>(clamp(end, 0.0, last))};
-}
-
 void draw(const Picture& picture, std::int32_t number) {
     const Convex& volume = picture.volumes[number];
     const Vec3 from = volume.center - picture.origin;
     const double ahead = dot(from, picture.ahead);
     if (ahead + volume.bound <= picture.nearest) return;
-    const Span columns = span_of(picture, dot(from, picture.right), ahead, volume.bound, picture.left, picture.width);
-    const Span rows = span_of(picture, dot(from, picture.down), ahead, volume.bound, picture.top, picture.height);
+    const Pixels columns = pixels_of(picture, dot(from, picture.right), ahead, volume.bound, picture.left, picture.width);
+    const Pixels rows = pixels_of(picture, dot(from, picture.down), ahead, volume.bound, picture.top, picture.height);
     const Vec3 start = into(volume.rotation, -from), forward = into(volume.rotation, picture.ahead);
     const Vec3 right = into(volume.rotation, picture.right), down = into(volume.rotation, picture.down);
     for (std::int64_t row = rows.begin; row < rows.end; ++row) {
@@ -196,7 +169,7 @@ void draw(const Picture& picture, std::int32_t number) {
 
 }  // namespace casting
 
-// Draw the volumes in their order; of two at the same depth the first is visible.
+// Draw the volumes in their order, then the surfaces; of two at the same depth the first is visible.
 MOBEE_CALL void mobee_cast(const Picture* picture) {
     for (std::int64_t pixel = 0; pixel < picture->height * picture->width; ++pixel) {
         picture->depth[pixel] = std::numeric_limits<float>::infinity();
@@ -204,8 +177,11 @@ MOBEE_CALL void mobee_cast(const Picture* picture) {
         for (int k = 0; k < 3; ++k) picture->normal[3 * pixel + k] = 0.0F;
     }
     for (std::int64_t number = 0; number < picture->count; ++number) casting::draw(*picture, static_cast<std::int32_t>(number));
+    for (std::int64_t number = 0; number < picture->surface_count; ++number) draw_surface(*picture, picture->surfaces[number]);
 }
 
 MOBEE_CALL std::int64_t mobee_convex_size() { return sizeof(Convex); }
+
+MOBEE_CALL std::int64_t mobee_surface_size() { return sizeof(Surface); }
 
 }  // namespace mobee

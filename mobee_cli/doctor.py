@@ -27,7 +27,7 @@ LEAST_CORES = 2
 EXTRAS = {
     "live": {"zenoh": "eclipse-zenoh", "msgspec": "msgspec", "tyro": "tyro"},
     "sim": {"mujoco": "mujoco-core", "pybullet": "pybullet", "icub_models": "icub-models"},
-    "viz": {"rerun": "rerun-sdk"},
+    "viz": {"rerun": "rerun-sdk", "trimesh": "trimesh", "collada": "pycollada", "fast_simplification": "fast-simplification"},
     "figures": {"matplotlib": "matplotlib"},
     "parquet": {"pyarrow": "pyarrow"},
     "reference": {"fcl": "python-fcl"},

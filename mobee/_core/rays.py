@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws convex volumes by one ray a pixel; declares core/rays.cpp."""
+"""Draws convex volumes by one ray a pixel, and surfaces of triangles; declares core/rays.cpp and core/triangles.cpp."""
 
 from __future__ import annotations
 
@@ -26,17 +26,33 @@ CONVEX = np.dtype(
     ],
     align=True,
 )
-"""`Convex` of core/rays.cpp; `planes` is an address, and the caller keeps the planes alive."""
+"""`Convex` of core/picture.hpp; `planes` is an address, and the caller keeps the planes alive."""
+
+SURFACE = np.dtype(
+    [
+        ("center", np.float64, 3),
+        ("rotation", np.float64, (3, 3)),
+        ("middle", np.float64, 3),
+        ("bound", np.float64),
+        ("corners", np.uint64),
+        ("normals", np.uint64),
+        ("triangles", np.uint64),
+        ("count", np.int64),
+        ("number", np.int64),
+    ],
+    align=True,
+)
+"""`Surface` of core/picture.hpp; the addresses are of float32 (v, 3), float32 (v, 3) and int32 (t, 3), which the caller keeps alive."""
 
 KINDS = ("sphere", "capsule", "cylinder", "box", "convex")
 
 
 class _Picture(ctypes.Structure):
-    """`Picture` of core/rays.cpp."""
+    """`Picture` of core/picture.hpp."""
 
     _fields_ = (
-        *((name, ADDRESS) for name in ("volumes", "depth", "which", "normal")),
-        *((name, INTEGER) for name in ("count", "height", "width", "perspective")),
+        *((name, ADDRESS) for name in ("volumes", "surfaces", "depth", "which", "normal")),
+        *((name, INTEGER) for name in ("count", "surface_count", "height", "width", "perspective")),
         *((name, REAL * 3) for name in ("origin", "right", "down", "ahead")),
         *((name, REAL) for name in ("left", "top", "step", "nearest")),
     )
@@ -63,21 +79,24 @@ class Rays:
 
 _cast = function("cast", ADDRESS)
 _convex_size = function("convex_size", result=INTEGER)
+_surface_size = function("surface_size", result=INTEGER)
 
 
-def cast(volumes: NDArray[np.void], rays: Rays) -> tuple[Floats, NDArray[np.int32], Floats]:
-    """Return the first volume that each ray hits, among volumes (N,) `CONVEX`.
+def cast(volumes: NDArray[np.void], surfaces: NDArray[np.void], rays: Rays) -> tuple[Floats, NDArray[np.int32], Floats]:
+    """Return the first volume or surface that each ray hits, among volumes (N,) `CONVEX` and surfaces (M,) `SURFACE`.
 
-    Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of the volumes (H, W), -1 where there is nothing;
-    and outward normals (H, W, 3), root frame.
+    Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of volumes, or numbers of surfaces, (H, W), -1 where
+    there is nothing; and outward normals (H, W, 3), root frame.
     """
     if volumes.dtype != CONVEX or CONVEX.itemsize != _convex_size():
         raise RuntimeError("the library's volumes have another layout than these")
+    if surfaces.dtype != SURFACE or SURFACE.itemsize != _surface_size():
+        raise RuntimeError("the library's surfaces have another layout than these")
     shape = rays.height, rays.width
     depth, which, normal = np.empty(shape, np.float32), np.empty(shape, np.int32), np.empty((*shape, 3), np.float32)
-    arrays = (address(array) for array in (volumes, depth, which, normal))
+    arrays = (address(array) for array in (volumes, surfaces, depth, which, normal))
     vectors = ((REAL * 3)(*vector) for vector in (rays.origin, *rays.axes))
     numbers = (rays.left, rays.top, rays.step, rays.nearest)
-    picture = _Picture(*arrays, len(volumes), *shape, rays.perspective, *vectors, *numbers)
+    picture = _Picture(*arrays, len(volumes), len(surfaces), *shape, rays.perspective, *vectors, *numbers)
     _cast(ctypes.addressof(picture))
     return depth, which, normal

@@ -104,8 +104,9 @@ class Raster:
 
     def __init__(self, camera: Camera, solids: Sequence[Solid] = ()) -> None:
         self.camera = camera
-        volumes, _kept = packed(solids)
-        self.depth, self.which, self.normal = cast(volumes, camera.rays())
+        packs = packed(solids)
+        self.depth, which, self.normal = cast(packs.volumes, packs.surfaces, camera.rays())
+        self.which = np.array([*packs.numbers, NOTHING], np.int32)[which]
         groups = np.array([*(solid.group for solid in solids), NOTHING])
         colors = np.array([*(solid.color for solid in solids), (0.0, 0.0, 0.0)], np.float32)
         self.group: NDArray[np.int64] = groups[self.which]

@@ -1,44 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coloured volumes of a picture, and their construction from a robot, a world and a path."""
+"""Coloured volumes and meshes of a picture, and their construction from a world and a path."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.rays import CONVEX, KINDS
+from mobee._core.rays import CONVEX, KINDS, SURFACE
 from mobee.arrays import Array
-from mobee.model.pose import Pose
 from mobee.model.world_object import WorldObject
 from mobee.rendering import palette
+from mobee.rendering.mesh import Mesh
 from mobee.robot.robot import ShapeKind
 from mobee.robot.urdf.hull import facets
 
 Color = tuple[float, float, float]  # red, green, blue in 0..1
+SolidKind = ShapeKind | Literal["mesh"]
 
 TRAIL_RADIUS, TIP_RADIUS = 0.005, 0.009  # m
 SHORTEST_PIECE = 0.006  # m, of a trail
 OLD, NEW = np.array([1.0, 0.90, 0.55]), np.array([0.96, 0.62, 0.0])  # colours of a trail
 TRAIL_VEIL = 0.35
-PALENESS = 0.72  # share of white in the colour of parts that do not matter
 GHOST_OPACITY = 0.35
 TRAIL_GROUP, FIRST_OBJECT_GROUP = -2, 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A coloured convex volume of a picture; `kind`, `size` and `vertices` as in a robot's Shape.
+    """A coloured convex volume of a picture, or a mesh; `kind`, `size` and `vertices` as in a robot's Shape.
 
     `position` (3,) m, `rotation` (3, 3): root frame.  `opacity`: below 1 the volume is transparent.  `veiled`: the share of its colour that
     shows through opaque volumes in front of it, 0 to 1.  `group`: there is no outline between solids of one group.
     `aside`: True if it may lie outside of the picture.
     """
 
-    kind: ShapeKind
+    kind: SolidKind
     size: tuple[float, ...]
     position: Array
     rotation: Array
@@ -48,6 +49,7 @@ class Solid:
     group: int = 0
     vertices: Array | None = None
     aside: bool = False
+    mesh: Mesh | None = None
 
     def extent(self, along: Array) -> float:
         """Return the distance [m] that the solid extends from its position in the direction `along`, a unit vector (3,)."""
@@ -56,6 +58,9 @@ class Solid:
             return self.size[0]
         if self.kind == "box":
             return 0.5 * float(np.abs(np.array([x, y, z])) @ np.array(self.size))
+        if self.kind == "mesh":
+            assert self.mesh is not None
+            return float((self.mesh.corners @ np.array([x, y, z])).max())
         if self.kind == "convex":
             assert self.vertices is not None
             return float((self.vertices @ np.array([x, y, z])).max())
@@ -76,20 +81,6 @@ def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 
         rotation = _rotation_with_z((end - start) / length) if length > 0.0 else np.eye(3)
         pieces.append(Solid("capsule", (radius, length), 0.5 * (start + end), rotation, color, veiled=veiled, group=group))
     return pieces
-
-
-def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
-    """Return the solid shapes of a robot in one pose, one group per link; parts that are not in `bright` are pale, none if it is None."""
-    shapes, parts = pose.robot.shapes, list(pose.robot.parts)
-    vivid = set(parts if bright is None else bright)
-    found = []
-    for shape in shapes:
-        if shape.role == "solid":
-            link = pose.transforms[shape.link]
-            color = _part_color(parts.index(shape.part) if shape.part in parts else 0, shape.part in vivid)
-            position, rotation = link[:3, :3] @ shape.position + link[:3, 3], link[:3, :3] @ shape.rotation
-            found.append(Solid(shape.kind, shape.size, position, rotation, color, group=shape.link, vertices=shape.vertices))
-    return found
 
 
 def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
@@ -124,8 +115,36 @@ def lowest(solids: Sequence[Solid]) -> float:
     return min(float(solid.position[2]) - solid.extent(down) for solid in solids)
 
 
-def packed(solids: Sequence[Solid]) -> tuple[NDArray[np.void], list[Array]]:
-    """Return solids as the rows that the core reads (N,) CONVEX, and the arrays that must be kept alive as long as these."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Packed:
+    """Solids as the core reads them: volumes (N,) CONVEX, then surfaces (M,) SURFACE; the number of each in the given order (N + M,).
+
+    `kept`: arrays that must be kept alive as long as these.
+    """
+
+    volumes: NDArray[np.void]
+    surfaces: NDArray[np.void]
+    numbers: list[int]
+    kept: list[Array]
+
+
+def packed(solids: Sequence[Solid]) -> Packed:
+    """Return solids as the core reads them."""
+    convex = [number for number, solid in enumerate(solids) if solid.mesh is None]
+    others = [number for number, solid in enumerate(solids) if solid.mesh is not None]
+    volumes, kept = _packed_volumes([solids[number] for number in convex])
+    surfaces = np.zeros(len(others), SURFACE)
+    for place, (row, number) in enumerate(zip(surfaces, others, strict=True), start=len(convex)):
+        solid = solids[number]
+        assert solid.mesh is not None
+        row["center"], row["rotation"], row["number"] = solid.position, solid.rotation, place
+        row["middle"], row["bound"] = solid.mesh.middle, solid.mesh.radius
+        row["corners"], row["normals"] = solid.mesh.corners.ctypes.data, solid.mesh.normals.ctypes.data
+        row["triangles"], row["count"] = solid.mesh.triangles.ctypes.data, len(solid.mesh.triangles)
+    return Packed(volumes, surfaces, convex + others, kept)
+
+
+def _packed_volumes(solids: Sequence[Solid]) -> tuple[NDArray[np.void], list[Array]]:
     table, kept = np.zeros(len(solids), CONVEX), []
     for row, solid in zip(table, solids, strict=True):
         row["center"], row["rotation"], row["kind"] = solid.position, solid.rotation, KINDS.index(solid.kind)
@@ -172,9 +191,3 @@ def _thinned(points: Array) -> Array:
     if np.any(kept[-1] != points[-1]):
         kept.append(points[-1])
     return np.array(kept)
-
-
-def _part_color(number: int, vivid: bool) -> Color:
-    white = 0.0 if vivid else PALENESS
-    red, green, blue = (white + (1.0 - white) * channel / 255.0 for channel in palette.SOLIDS[number % len(palette.SOLIDS)])
-    return red, green, blue

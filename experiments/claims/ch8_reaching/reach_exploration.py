@@ -41,9 +41,10 @@ from mobee.arrays import Array, Ints
 from mobee.learning.reaching.evaluation import NO_STATE
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.reaches import SCALE, hands_of
+from mobee.rendering.looks import robot_solids
 from mobee.rendering.picture import Picture
 from mobee.rendering.sheet import pictures_of
-from mobee.rendering.solid import Solid, ball, robot_solids
+from mobee.rendering.solid import Solid, ball
 
 STRATEGIES = ("intrinsic", "greedy", "random")
 CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which the agents are evaluated

@@ -9,9 +9,10 @@ import pytest
 import mobee
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.world_object import sphere
+from mobee.rendering.looks import looks_of, robot_solids
 from mobee.rendering.motion import Motion, motion_through, recorded
 from mobee.rendering.sheet import Strip, cloud_solids, filmstrip, marker_cloud, panels
-from mobee.rendering.solid import object_solids, robot_solids, trail_solids
+from mobee.rendering.solid import object_solids, trail_solids
 
 ARM = ["r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"]
 PALM = "right_palm"
@@ -57,14 +58,15 @@ def test_a_motion_knows_which_parts_moved(motion: Motion) -> None:
     assert motion.moved() == ("right_arm",)
 
 
-def test_solids_of_the_robot_are_where_its_links_carry_them(model: mobee.Model) -> None:
+def test_the_robot_is_drawn_where_its_links_carry_it_and_other_parts_are_pale(model: mobee.Model) -> None:
     pose = model.evaluate(model.robot.home)
-    solids = robot_solids(pose)
-    shapes = [shape for shape in model.robot.shapes if shape.role == "solid"]
-    assert len(solids) == len(shapes)
-    for solid, shape in zip(solids, shapes, strict=True):
-        link = pose.transforms[shape.link]
-        np.testing.assert_allclose(solid.position, link[:3, :3] @ shape.position + link[:3, 3], atol=1e-12)
+    looks = looks_of(model.robot)
+    solids = robot_solids(pose, ["right_arm"])
+    assert len(solids) == len(looks) > 0
+    for solid, look in zip(solids, looks, strict=True):
+        link = pose.transforms[look.link]
+        np.testing.assert_allclose(solid.position, link[:3, :3] @ look.solid.position + link[:3, 3], atol=1e-12)
+        assert look.part == "right_arm" and solid.color == look.solid.color or min(solid.color) >= min(look.solid.color)
 
 
 def test_targets_are_red_and_ghosts_are_seen_through(model: mobee.Model) -> None:

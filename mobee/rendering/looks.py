@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of a robot is drawn: the meshes and volumes that its file draws, and the solids of links for which it draws nothing."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from mobee.arrays import Array
+from mobee.errors import MobeeError, Simplified
+from mobee.model.pose import Pose
+from mobee.rendering import palette
+from mobee.rendering.mesh import Mesh, ellipsoid_piece, fair_most, mesh_of, read_pieces, smaller
+from mobee.rendering.solid import Color, Solid
+from mobee.robot.robot import Robot, per_robot
+from mobee.robot.visual import Channels, MeshSource, Visual
+
+BUDGET = 60_000  # triangles of a robot; larger meshes are made smaller until it is kept
+MOST_NAMED = 3  # meshes that a warning lists
+PALENESS = 0.72  # share of white in the colour of parts that do not matter
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A coloured volume or mesh on a link of a part, in the root frame at zero pose; `is_solid`: it is one of the robot's solids."""
+
+    link: int
+    part: str
+    solid: Solid
+    is_solid: bool
+
+    def at(self, transforms: Array, white: float = 0.0) -> Solid:
+        """Return it where its link is, with a share of white in its colour; `transforms`: (L, 4, 4), from link_transforms."""
+        link = transforms[self.link]
+        red, green, blue = (white + (1.0 - white) * channel for channel in self.solid.color)
+        position, rotation = link[:3, :3] @ self.solid.position + link[:3, 3], link[:3, :3] @ self.solid.rotation
+        return replace(self.solid, position=position, rotation=rotation, color=(red, green, blue))
+
+
+@per_robot
+def looks_of(robot: Robot) -> tuple[Look, ...]:
+    """Return what is drawn of a robot, its large meshes made smaller; warns in one line of meshes that cannot be read.
+
+    A link is drawn as its visuals; one that has none, or whose meshes cannot be read, as its solids.
+    """
+    meshes = _meshes(robot)
+    parts = _parts_of_links(robot)
+    looks = []
+    for visual in robot.visuals:
+        looks += _looks(visual, parts[visual.link], robot, meshes)
+    return (*looks, *solid_looks(robot, frozenset(look.link for look in looks)))
+
+
+def solid_looks(robot: Robot, without: Iterable[int] = ()) -> tuple[Look, ...]:
+    """Return the solids of all links but those in `without`, in the colours of their parts."""
+    skipped = frozenset(without)
+    found = []
+    for shape in robot.shapes:
+        if shape.role == "solid" and shape.link not in skipped:
+            color = _color_of_part(robot, shape.part)
+            solid = Solid(shape.kind, shape.size, shape.position, shape.rotation, color, group=shape.link, vertices=shape.vertices)
+            found.append(Look(shape.link, shape.part, solid, True))
+    return tuple(found)
+
+
+def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
+    """Return what is drawn of a robot in one pose, one group per link; parts that are not in `bright` are pale, none if it is None."""
+    vivid = set(pose.robot.parts if bright is None else bright)
+    return [look.at(pose.transforms, 0.0 if look.part in vivid else PALENESS) for look in looks_of(pose.robot)]
+
+
+def _meshes(robot: Robot) -> dict[MeshSource, tuple[Mesh, ...]]:
+    """Return the meshes that can be read, within the budget, each file read once."""
+    pieces, faults = {}, {}
+    for source in dict.fromkeys(visual.mesh for visual in robot.visuals if visual.mesh is not None):
+        try:
+            pieces[source] = read_pieces(source)
+        except MobeeError as error:
+            faults[source] = str(error)
+    if faults:
+        first, why = next(iter(faults.items()))
+        names = list(dict.fromkeys(source.name or source.file for source in faults))
+        listed = ", ".join(names[:MOST_NAMED]) + (f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else "")
+        text = f"{first.robot_file}:{first.line}: cannot draw {listed}: {why}. Solids are drawn instead, where nothing else is"
+        warnings.warn(text, Simplified, stacklevel=5)
+    counts = [len(piece.triangles) for visual in robot.visuals if visual.mesh in pieces for piece in pieces[visual.mesh]]
+    most = fair_most(counts, BUDGET)
+    return {source: tuple(mesh_of(smaller(piece, most)) for piece in some) for source, some in pieces.items()}
+
+
+def _looks(visual: Visual, part: str, robot: Robot, meshes: Mapping[MeshSource, tuple[Mesh, ...]]) -> list[Look]:
+    """Return what a visual draws: a mesh of several colours in these, else in the colour of the robot's file, the mesh's, or the part's."""
+    otherwise = _color_of_part(robot, part)
+    if visual.mesh is not None:
+        shown = meshes.get(visual.mesh, ())
+        several = len({mesh.color for mesh in shown}) > 1
+        colors = [mesh.color if several else visual.color or mesh.color for mesh in shown]
+        solids = [_mesh_solid(visual, mesh, color, otherwise) for mesh, color in zip(shown, colors, strict=True)]
+        return [Look(visual.link, part, solid, False) for solid in solids]
+    if visual.kind == "ellipsoid":
+        return [Look(visual.link, part, _mesh_solid(visual, mesh_of(ellipsoid_piece(visual.size)), visual.color, otherwise), False)]
+    assert visual.kind != "mesh"
+    color, opacity = _channels(visual.color, otherwise)
+    solid = Solid(visual.kind, visual.size, visual.position, visual.rotation, color, opacity, group=visual.link)
+    return [Look(visual.link, part, solid, False)]
+
+
+def _mesh_solid(visual: Visual, mesh: Mesh, given: Channels | None, otherwise: Color) -> Solid:
+    color, opacity = _channels(given, otherwise)
+    return Solid("mesh", (), visual.position, visual.rotation, color, opacity, group=visual.link, mesh=mesh)
+
+
+def _channels(given: Channels | None, otherwise: Color) -> tuple[Color, float]:
+    return (otherwise, 1.0) if given is None else (given[:3], given[3] if given[3] > 0.0 else 1.0)
+
+
+def _color_of_part(robot: Robot, part: str) -> Color:
+    names = list(robot.parts)
+    number = names.index(part) if part in names else 0
+    red, green, blue = (channel / 255.0 for channel in palette.SOLIDS[number % len(palette.SOLIDS)])
+    return red, green, blue
+
+
+def _parts_of_links(robot: Robot) -> list[str]:
+    """Return the part that moves each link; the base belongs to the first part."""
+    driven = {joint: motor.part for motor in robot.motor_table for joint, _, _ in motor.joints}
+    owner = [next(iter(robot.parts), "")]
+    for index, joint in enumerate(robot.joints):
+        owner.append(driven.get(index, owner[joint.parent]))
+    return owner
