@@ -19,7 +19,7 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 from services.common.worlds import world_around
 
 _NOTES = """Each motor moves through its range, then all motors together. Shapes in contact
-turn red, and arrows show the direction that separates them. The verb prints the
+are red, and arrows show the direction that separates them. The verb prints the
 address of a page, and ends with Ctrl-C; with --save it writes a file instead,
 for `rerun FILE`."""
 
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", help="shipped robot, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="shipped world, or path of a .xml file, to show around it")
     add_urdf_options(parser)
+    parser.add_argument("--solids", action="store_true", help="show the solids instead of what the file draws")
     parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a recording and end")
 
 
@@ -43,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     except MobeeError as error:
         hint = f" It is a world: `mobee view icub --world {arguments.file}`." if arguments.file in shipped_worlds() else ""
         raise UserError(f"{error}{hint}", BAD_INPUT) from None
-    return show(robot, world, save)
+    return show(robot, world, save, solids=arguments.solids)
 
 
 def require_recording(save: Path | None) -> None:
@@ -54,8 +55,11 @@ def require_recording(save: Path | None) -> None:
         raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: create it", BAD_INPUT)
 
 
-def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None) -> int:
-    """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges."""
+def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None, solids: bool = False) -> int:
+    """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges.
+
+    `solids`: show the solids in place of what the file draws.
+    """
     try:
         from services.monitor.viewer.view import view  # needs the viewer, which is an extra
     except ModuleNotFoundError as error:
@@ -63,7 +67,7 @@ def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequen
             raise
         raise UserError('a view needs rerun-sdk: pip install "mobee[viz]"', ENVIRONMENT) from None
     try:
-        view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True), stretches)
+        view(robot, world, save, lambda address: print(f"{robot.name} at {address}\nCtrl-C ends it.", flush=True), stretches, solids)
     except KeyboardInterrupt:
         if save is not None:
             raise

@@ -59,6 +59,3 @@ def of_object(kind: str, role: str, given: Sequence[float] | None = None) -> Rgb
         red, green, blue, opacity = (round(255 * channel) for channel in given)
         return red, green, blue, opacity
     return BALL if role == "target" else TABLE if kind == "box" else OTHER
-
-
-COVERS = "0.30 0.34 0.40 1"  # of the URDF's red parts

@@ -63,7 +63,7 @@ _ENTRIES = {
         nice=_NICE_PICTURES,
         vital=False,
         participates=False,
-        needs={"rerun": "viz", "icub_models": "viz"},
+        needs={"rerun": "viz"},
     ),
     RECORDER: Entry(  # it lowers its own priority when it is ready: others wait for its start
         "services.recorder", "services.recorder.config:Config", -1, vital=False, participates=False, needs={"mcap": "live"}

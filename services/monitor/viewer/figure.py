@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws a robot from its file without meshes: shapes are logged once, then one transform a link."""
+"""Draws a robot: its looks and shapes are logged once, then one transform a link."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import rerun as rr
@@ -12,7 +14,9 @@ from mobee.model.kinematics import link_transforms, quaternion_from_matrix
 from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.rendering import palette
+from mobee.rendering.looks import Look, looks_of
 from mobee.rendering.palette import Rgba
+from mobee.rendering.solid import Solid
 from mobee.robot.robot import Robot, Shape, ShapeKind
 from mobee.robot.urdf.hull import facets
 
@@ -61,23 +65,67 @@ def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
     )
 
 
+def drawn_looks(looks: Sequence[Look]) -> Iterator[tuple[str, rr.AsComponents]]:
+    """Yield the name of an entity and what it is, for looks of one link at zero pose; all its opaque meshes are one."""
+    opaque = [look.solid for look in looks if look.solid.mesh is not None and look.solid.opacity >= 1.0]
+    if opaque:
+        yield "mesh", _joined(opaque)
+    for number, look in enumerate(looks):
+        solid = look.solid
+        red, green, blue, opacity = (round(255.0 * channel) for channel in (*solid.color, solid.opacity))
+        color = (red, green, blue, opacity)
+        if solid.kind == "mesh":
+            if solid.opacity < 1.0:
+                yield f"mesh_{number}", _joined([solid], color)
+        else:
+            yield f"volume_{number}", drawn(solid.kind, solid.size, solid.position, solid.rotation, color, solid.vertices)
+
+
+def _joined(solids: Sequence[Solid], color: Rgba | None = None) -> rr.Mesh3D:
+    """Return meshes as one, each in its colour, or all in one colour."""
+    corners, normals, triangles, colors, count = [], [], [], [], 0
+    for solid in solids:
+        assert solid.mesh is not None
+        corners.append(solid.mesh.corners @ solid.rotation.T.astype(np.float32) + solid.position.astype(np.float32))
+        normals.append(solid.mesh.normals @ solid.rotation.T.astype(np.float32))
+        triangles.append(solid.mesh.triangles + count)
+        colors.append(np.tile(np.round(255.0 * np.array(solid.color)).astype(np.uint8), (len(corners[-1]), 1)))
+        count += len(corners[-1])
+    return rr.Mesh3D(
+        vertex_positions=np.vstack(corners),
+        triangle_indices=np.vstack(triangles),
+        vertex_normals=np.vstack(normals),
+        vertex_colors=np.vstack(colors) if color is None else None,
+        albedo_factor=color,
+    )
+
+
 TIMELINE = "time"
 NORMAL = 0.05  # m, the arrow of a marker
 PUSH, LONGEST = 5.0, 0.15  # length of a contact's arrow: in depths, and at most in m
 
 
 class Figure:
-    """Logs a robot and its world to a stream, then poses as time goes on."""
+    """Logs a robot and its world to a stream, then poses as time goes on.
 
-    def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None) -> None:
+    A link is shown as its file draws it, and its solids while they touch; `solids`: always as its solids.
+    """
+
+    def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None, solids: bool = False) -> None:
         self._stream, self._robot = stream, robot
         self._model = Model(robot, world)
         self._shapes = {shape.name: shape for shape in robot.shapes}
         self._parts = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
         self._touched: frozenset[str] = frozenset()
         self._pairs: frozenset[tuple[str, str]] = frozenset()
+        looks = [] if solids else [look for look in looks_of(robot) if not look.is_solid]
+        self._dressed = frozenset(look.link for look in looks)  # links whose solids are not shown while nothing touches them
+        for link in self._dressed:
+            for name, body in drawn_looks([look for look in looks if look.link == link]):
+                self._log(["robot", robot.links[link], "looks", name], body)
         for shape in robot.shapes:
-            self._log(self._path(shape), self._drawn(shape))
+            if not self._is_under(shape):
+                self._log(self._path(shape), self._drawn(shape))
         for name, thing in (world.objects if world else {}).items():
             color = palette.of_object(thing.kind, thing.role, thing.color)
             self._log(["world", name], drawn(thing.kind, thing.size, thing.position, thing.rotation, color))
@@ -111,8 +159,7 @@ class Figure:
     def _log_contacts(self, contacts: tuple[Contact, ...]) -> None:
         touched = frozenset(name for contact in contacts for name in (contact.first, contact.second)) & self._shapes.keys()
         for name in sorted(touched ^ self._touched):
-            shape = self._shapes[name]
-            self._stream.log(self._path(shape), recolored(shape.kind, self._color(shape, name in touched)))
+            self._show_touch(self._shapes[name], name in touched)
         pairs = frozenset((contact.first, contact.second) for contact in contacts)
         for contact in contacts:
             if (contact.first, contact.second) not in self._pairs:
@@ -130,6 +177,18 @@ class Figure:
             )
         self._touched, self._pairs = touched, pairs
 
+    def _show_touch(self, shape: Shape, touched: bool) -> None:
+        """Recolour a shape, or show a solid under a mesh while it touches."""
+        if not self._is_under(shape):
+            self._stream.log(self._path(shape), recolored(shape.kind, self._color(shape, touched)))
+        elif touched:
+            self._stream.log(self._path(shape), self._drawn(shape, palette.TOUCHED))
+        else:
+            self._stream.log(self._path(shape), rr.Clear(recursive=False))
+
+    def _is_under(self, shape: Shape) -> bool:
+        return shape.role == "solid" and shape.link in self._dressed
+
     def _log_markers(self, link: int) -> None:
         markers = [marker for marker in self._robot.markers.values() if marker.link == link]
         self._log(
@@ -143,8 +202,8 @@ class Figure:
             ),
         )
 
-    def _drawn(self, shape: Shape) -> rr.AsComponents:
-        return drawn(shape.kind, shape.size, shape.position, shape.rotation, self._color(shape, False), shape.vertices)
+    def _drawn(self, shape: Shape, color: Rgba | None = None) -> rr.AsComponents:
+        return drawn(shape.kind, shape.size, shape.position, shape.rotation, color or self._color(shape, False), shape.vertices)
 
     def _color(self, shape: Shape, touched: bool) -> Rgba:
         if shape.role == "field":

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.urdf import UrdfTree
 
 LARGEST_HISTORY = 4_000_000  # bytes of changes that a new viewer gets
 WANTED_FOR = 15.0  # s after its last request for which a viewer counts as open, and changes are kept for it
@@ -81,13 +80,6 @@ class Frames:
                 self._changes.log(path, *what, static=False)
         elif self._is_wanted:
             self._look.log(path, *what, static=False)
-
-    def log_tree(self, tree: UrdfTree) -> None:
-        """Log the meshes of a robot, which are static."""
-        for recording in (self._file, self._static.stream):
-            if recording is not None:
-                tree.log_urdf_to_recording(recording)
-        self._static.is_dirty = True
 
     def set_time(self, timeline: str, seconds: float) -> None:
         """Set the time of what is logged next."""

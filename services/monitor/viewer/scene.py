@@ -1,43 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The 3D scene: meshes or solids, fields, objects, the paths of the hands, and the poses in which actions ended."""
+"""The 3D scene: the robot, its fields, objects, the paths of the hands, and the poses in which actions ended."""
 
 from __future__ import annotations
 
-import tempfile
 from collections import deque
-from pathlib import Path
 
-import defusedxml.ElementTree
 import numpy as np
 import rerun as rr
-from rerun.urdf import UrdfTree
 
 from bus_schema.messages import ContactItem, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.arrays import Array
-from mobee.errors import MobeeError
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quaternion_from_matrix
 from mobee.rendering import palette
-from mobee.robot.icub_urdf import write_upper_body_urdf
+from mobee.rendering.looks import looks_of
 from mobee.robot.robot import Robot, Shape
 from services.monitor.viewer.blueprint import ROOT
-from services.monitor.viewer.figure import drawn
+from services.monitor.viewer.figure import drawn, drawn_looks
 from services.monitor.viewer.frames import Frames
 
 
-class Solids:
-    """Logs to a stream under robot/: what moves is one transform a link that has solids."""
+class Links:
+    """Logs what is drawn of each link to a stream under robot/, once; then one transform a link."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
-        colors = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
-        solids = [shape for shape in robot.shapes if shape.role == "solid"]
-        self._frames = {shape.link: f"link_{shape.link}" for shape in solids}
-        for shape in solids:
-            color = (*colors.get(shape.part, palette.SOLIDS[0]), 255)
-            body = drawn(shape.kind, shape.size, shape.position, shape.rotation, color, shape.vertices)
-            path = rr.new_entity_path(["robot", "solids", robot.links[shape.link], shape.name])
-            stream.log(path, rr.CoordinateFrame(self._frames[shape.link]), body, static=True)
+        looks = looks_of(robot)
+        self._frames = {look.link: f"link_{look.link}" for look in looks}
+        for link, frame in self._frames.items():
+            for name, body in drawn_looks([look for look in looks if look.link == link]):
+                path = rr.new_entity_path(["robot", "links", robot.links[link], name])
+                stream.log(path, rr.CoordinateFrame(frame), body, static=True)
 
     def move(self, transforms: Array) -> None:
         """The links as they are now; `transforms`: (L, 4, 4), from link_transforms."""
@@ -66,11 +59,7 @@ class Scene:
         self._looks = 0
         for path in ("fields/capsules", "fields/spheres", "objects", "trails"):
             stream.log(f"scene/{path}", rr.CoordinateFrame(ROOT), static=True)
-        self.tree = self._load_tree()
-        names = {joint.name: index for index, joint in enumerate(robot.joints)}
-        joints = self.tree.joints() if self.tree else []
-        self.meshes = [(joint, names[joint.name]) for joint in joints if joint.name in names]  # with the index in the robot
-        self._solids = None if self.tree else Solids(stream, robot)
+        self._links = Links(stream, robot)
 
     def show_fields(self, shown: bool) -> None:
         """Show or hide the fields."""
@@ -84,11 +73,7 @@ class Scene:
     def log_robot(self, q: Array, contacts: list[ContactItem]) -> None:
         """The robot at q (n,) rad; fields named in a contact are red."""
         transforms = link_transforms(self._robot, q)
-        angles = self._robot.coupling[0] @ q + self._robot.coupling[1]
-        for joint, index in self.meshes:
-            self._stream.log("robot/joints", joint.compute_transform(float(angles[index]), clamp=False))
-        if self._solids is not None:
-            self._solids.move(transforms)
+        self._links.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
         if self._looks % TRAIL_STEP == 0:
             self._log_trails(transforms)
@@ -153,40 +138,6 @@ class Scene:
                     colors.append((*HANDS[name], round(40 + 215 * (piece + 1) / TRAIL_PIECES)))
         if strips:
             self._stream.log("scene/trails", rr.LineStrips3D(strips, colors=colors, radii=0.003))
-
-    def _load_tree(self) -> UrdfTree | None:
-        """Log the iCub's meshes once; None for a robot that has not its joints, or where they are not installed."""
-        try:
-            with tempfile.TemporaryDirectory() as folder:
-                path = _plain(write_upper_body_urdf(Path(folder) / "icub.urdf"))
-                tree = UrdfTree.from_file_path(path, entity_path_prefix="robot")
-                moving = {joint.name for joint in tree.joints() if joint.joint_type == "revolute"}
-                if not moving <= {joint.name for joint in self._robot.joints}:
-                    return None
-                if isinstance(self._stream, rr.RecordingStream):
-                    tree.log_urdf_to_recording(self._stream)
-                else:
-                    self._stream.log_tree(tree)
-                return tree
-        except MobeeError:
-            return None
-
-
-def _plain(path: Path) -> Path:
-    """Return the URDF file in neutral colours and without collision geometry.
-
-    Red is the colour of contacts; collision geometry would double the data.
-    """
-    tree = defusedxml.ElementTree.parse(path)
-    for color in tree.getroot().iter("color"):
-        red, green, blue, _ = (float(channel) for channel in color.attrib["rgba"].split())
-        if red > 1.5 * max(green, blue):
-            color.set("rgba", palette.COVERS)
-    for link in tree.getroot().iter("link"):
-        for hull in link.findall("collision"):
-            link.remove(hull)
-    tree.write(path)
-    return path
 
 
 def _now(transforms: Array, shape: Shape) -> Array:

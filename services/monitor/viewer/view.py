@@ -80,18 +80,23 @@ MOST_NAMES = 4  # a longer legend hides the plot
 
 
 def view(
-    robot: Robot, world: World | None, save: Path | None, tell: Callable[[str], None], stretches: Sequence[Stretch] | None = None
+    robot: Robot,
+    world: World | None,
+    save: Path | None,
+    tell: Callable[[str], None],
+    stretches: Sequence[Stretch] | None = None,
+    solids: bool = False,
 ) -> None:
     """Show a motion on a page until the user interrupts, or save it to a file.
 
     `tell` is called with the page's address when all data is there.  `stretches`: of the motion, RATE poses a second; None: a sweep
-    through all that the robot can do.
+    through all that the robot can do.  `solids`: show the solids in place of what the file draws.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
         stream = rr.RecordingStream("mobee")
         stream.set_sinks(rr.FileSink(file), default_blueprint=layout(robot))
-        _log(stream, robot, world, sweep(robot) if stretches is None else stretches)
+        _log(stream, robot, world, sweep(robot) if stretches is None else stretches, solids)
         stream.disconnect()
         if save is None:
             site = Site(Board(), "", NoControls(), None, ViewerFiles(Path(private)).path, lambda: 0.0, {"view.rrd": file})
@@ -101,8 +106,8 @@ def view(
                 time.sleep(3600.0)
 
 
-def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretches: Sequence[Stretch]) -> None:
-    figure = Figure(stream, robot, world)
+def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretches: Sequence[Stretch], solids: bool) -> None:
+    figure = Figure(stream, robot, world, solids)
     begin = 0.0
     for stretch in stretches:
         figure.say(begin, stretch.title)

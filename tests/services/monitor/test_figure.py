@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 
 from mobee.model import World, sphere
 from mobee.robot.robot import Robot
+from mobee.robot.visual import Visual
 from tests.mobee.check.arm import arm
 
 rr = pytest.importorskip("rerun")
@@ -61,6 +63,22 @@ def test_a_solid_is_red_while_it_touches(robot: Robot) -> None:
     assert told == [(0.0, grey), (1.0, packed(*palette.COLLIDING)), (2.0, grey)]
     events = [what.text.as_arrow_array().to_pylist()[0] for _, what in notebook.logged["events"]]
     assert "solid: fore meets ball" in events
+
+
+def test_a_solid_under_what_the_file_draws_is_shown_while_it_touches(robot: Robot) -> None:
+    world = World()
+    world.add("ball", sphere(0.05), position=(0.0, -0.373, 0.1))
+    link = next(shape.link for shape in robot.shapes if shape.name == "fore")
+    drawn = replace(robot, visuals=(Visual(link, "sphere", (0.04,), np.zeros(3), np.eye(3), (0.0, 0.0, 1.0, 1.0)),))
+    notebook = Notebook()
+    Figure(notebook.stream, drawn, world).move(0.0, 1.0, np.array([robot.home, [np.pi / 2, robot.home[1]], robot.home]))
+    ((when, look),) = notebook.logged["robot/bend/looks/volume_0"]
+    assert (when, color(look)) == (0.0, packed(0, 0, 255, 255))
+    (begin, solid), (end, gone) = notebook.logged["robot/bend/solids/fore"]
+    assert (begin, color(solid), end, type(gone)) == (1.0, packed(*palette.TOUCHED), 2.0, rr.Clear)
+    solids = Notebook()
+    Figure(solids.stream, drawn, world, solids=True)
+    assert "robot/bend/solids/fore" in solids.logged and "robot/bend/looks/volume_0" not in solids.logged
 
 
 def test_arrows_stand_where_it_touches_and_go(robot: Robot) -> None:

@@ -18,16 +18,17 @@ import numpy as np
 import psutil
 import pytest
 
-from bus_schema import VERSION, keys
+from bus_schema import VERSION
 from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, State, Transition, Truth, WorldObject
 from bus_schema.rpc import ObjectState
-from mobee.model.kinematics import link_transforms, matrix_from_quaternion
+from mobee.model.kinematics import link_transforms
 from mobee.robot.load import load_robot
 from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
 from mobee.rendering import palette  # noqa: E402  # only where Rerun is
+from mobee.rendering.looks import BUDGET  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.files import program  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.plots import Plots  # noqa: E402  # only where Rerun is
@@ -100,10 +101,9 @@ def test_a_robot_without_meshes_is_drawn_by_its_solids_which_move_as_its_links_d
     scene = Scene(notebook.stream, robot)
     q = np.array([0.5, -0.3])
     scene.log_robot(q, [])
-    assert scene.tree is None
     transforms = link_transforms(robot, q)
     for shape in robot.shapes:
-        frame, body = notebook.logged[f"/robot/solids/{robot.links[shape.link]}/{shape.name}"]
+        frame, body = notebook.logged[f"/robot/links/{robot.links[shape.link]}/volume_0"]
         assert isinstance(frame, rr.CoordinateFrame) and isinstance(body, rr.Cylinders3D)
         (place,) = notebook.logged[f"robot/frames/link_{shape.link}"]
         np.testing.assert_allclose(place.translation.as_arrow_array().to_pylist(), [transforms[shape.link, :3, 3]], atol=1e-6)
@@ -142,33 +142,19 @@ def test_the_plot_of_forces_has_all_that_are_told() -> None:
     assert scalars == [[5.0, 0.0, 1.0], [5.0, 0.0, 1.0, 2.0]]
 
 
-def test_the_meshes_move_as_the_model_s_links_do(rng: np.random.Generator) -> None:
-    scene = Scene(rr.RecordingStream("test"), ROBOT)
-    assert len(scene.meshes) == 20
-    for _ in range(5):
-        q = rng.uniform(*ROBOT.limits.T)
-        angles = ROBOT.coupling[0] @ q + ROBOT.coupling[1]
-        transforms = link_transforms(ROBOT, q)
-        for link in ("head", "l_hand", "r_hand", "l_forearm"):
-            index = ROBOT.links.index(link)
-            moved = mesh_pose(scene, link, angles) @ np.linalg.inv(mesh_pose(scene, link, np.zeros(len(angles))))
-            np.testing.assert_allclose(moved, transforms[index], atol=1e-4)
-
-
-def mesh_pose(scene: Scene, link: str, angles: np.ndarray) -> np.ndarray:
-    """Pose of a link of the URDF that the viewer has, by the transforms that it is sent."""
-    joints = {joint.child_link: joint for joint in scene.tree.joints()}
-    index = {joint.name: place for joint, place in scene.meshes}
-    pose = np.eye(4)
-    while link in joints:
-        joint = joints[link]
-        sent = joint.compute_transform(float(angles[index[joint.name]]) if joint.name in index else 0.0, clamp=False)
-        step = np.eye(4)
-        x, y, z, w = sent.quaternion.as_arrow_array().to_pylist()[0]
-        step[:3, :3] = matrix_from_quaternion(np.array([w, x, y, z]))
-        step[:3, 3] = sent.translation.as_arrow_array().to_pylist()[0]
-        pose, link = step @ pose, joint.parent_link
-    return pose
+def test_the_icub_is_drawn_as_its_meshes_a_mesh_a_link_within_the_budget() -> None:
+    notebook = Notebook()
+    scene = Scene(notebook.stream, ROBOT)
+    meshes = {path.split("/")[3]: found[1] for path, found in notebook.logged.items() if path.endswith("/mesh")}
+    assert {"root_link", "chest", "head", "l_forearm", "r_forearm"} <= meshes.keys()
+    assert 40_000 < sum(len(body.triangle_indices.as_arrow_array()) for body in meshes.values()) <= 1.01 * BUDGET
+    corners = np.array(meshes["head"].vertex_positions.as_arrow_array().to_pylist())
+    eye = ROBOT.marker("left_eye").position
+    assert (corners.min(axis=0) < eye).all() and (eye < corners.max(axis=0)).all()
+    scene.log_robot(DOWN, [])
+    (place,) = notebook.logged[f"robot/frames/link_{ROBOT.links.index('head')}"]
+    at = link_transforms(ROBOT, DOWN)[ROBOT.links.index("head"), :3, 3]
+    np.testing.assert_allclose(place.translation.as_arrow_array().to_pylist(), [at], atol=1e-6)
 
 
 def test_trails_follow_the_hands_and_end_with_the_run() -> None:
@@ -189,7 +175,7 @@ def whole_chain(stage: Stage) -> Callable[[], None]:
     """A function that puts one message on every stream that the monitor shows."""
     motions = {part: stage.publisher(Motion, part) for part in palette.PARTS}
     forces, contacts = stage.publisher(Forces, "model"), stage.publisher(Contacts)
-    images = {eye: stage.publisher(Image, eye) for eye in keys.EYES}
+    images = {eye: stage.publisher(Image, eye) for eye in ("left", "right")}
     transitions = {part: stage.publisher(Transition, part) for part in palette.PARTS}
     ball, events = stage.publisher(WorldObject, "ball"), stage.publisher(Event, "stage")
 
@@ -230,7 +216,15 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
     command = [program(), "rrd", "stats", str(tmp_path / "recording.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=private)
     shown = {line.split(":")[0] for line in done.stdout.splitlines() if line.startswith("/")}
-    wanted = {"/robot/joints", "/scene/fields/capsules", "/scene/fields/spheres", "/scene/trails", "/scene/objects/ball", "/events"}
+    wanted = {
+        "/robot/links/head/mesh",
+        "/robot/frames/link_6",
+        "/scene/fields/capsules",
+        "/scene/fields/spheres",
+        "/scene/trails",
+        "/scene/objects/ball",
+        "/events",
+    }
     wanted |= {"/eyes/left", "/eyes/right", "/plots/forces", "/plots/reward/torso", "/plots/value/left_arm", "/plots/transitions/right_arm"}
     wanted |= {f"/plots/joints/{part}" for part in palette.PARTS}
     assert wanted - shown == set()
