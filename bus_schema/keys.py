@@ -11,7 +11,6 @@ from bus_schema.stream import chunk
 ESTOP_RESET = "estop/rpc/reset"
 MODEL_JACOBIAN = "model/rpc/jacobian"
 ALL_ALIVE = "alive/*/*"
-EYES = ("left", "right")
 
 
 def meta(part: str) -> str:

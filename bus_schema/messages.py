@@ -298,11 +298,11 @@ class WorldObject(Message, frozen=True, kw_only=True):
 
 
 class Image(Message, frozen=True, kw_only=True):
-    """Picture of one eye at tick k_capture: rows top to bottom, height x width x 3 bytes."""
+    """Picture of one camera at tick k_capture: rows top to bottom, height x width x 3 bytes."""
 
-    stream: ClassVar[Stream] = Stream("vision/image/{eye}", "BULK", writer="renderer", readers="vision, monitor")
+    stream: ClassVar[Stream] = Stream("vision/image/{camera}", "BULK", writer="renderer", readers="vision, monitor")
 
-    eye: Literal["left", "right"]
+    camera: Name
     k_capture: Count
     width: Annotated[int, Meta(gt=0, le=4096)]
     height: Annotated[int, Meta(gt=0, le=4096)]
@@ -311,15 +311,14 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class Camera(Message, frozen=True, kw_only=True):
-    """Calibration of an eye, and the posture of head and torso at the picture's tick."""
+    """Calibration of a camera, and the posture of the robot at the picture's tick."""
 
-    stream: ClassVar[Stream] = Stream("vision/camera/{eye}", "BULK", writer="renderer", readers="vision")
+    stream: ClassVar[Stream] = Stream("vision/camera/{camera}", "BULK", writer="renderer", readers="vision")
 
-    eye: Literal["left", "right"]
+    camera: Name
     k_capture: Count
     intrinsics: Matrix3  # pixels; pixel centres at integers, origin top left
-    q_head: list[float]  # rad, head motors
-    q_torso: list[float]  # rad, torso motors
+    q: list[float]  # rad, all motors
 
 
 class Transition(Message, frozen=True, kw_only=True):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from experiments.kit.command_line import positive_number, positive_whole
 from mobee_cli.connect import endpoint
+from mobee_cli.robot_options import add_cameras
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 
@@ -31,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown.add_argument("--headless", action="store_true", help="start without the page")
     shown.add_argument("--page", action="store_true", help="start with the page, also if the scenario has none, as kinematic and lockstep")
     parser.add_argument("--no-record", dest="record", action="store_false", help="start without the recorder of all messages")
+    add_cameras(parser)
     parser.add_argument("--duration", type=positive_number, metavar="S", help="end S seconds after all services are ready")
     parser.add_argument("--ticks", type=positive_whole, metavar="N", help="lockstep only (shared.mode=lock): end after N ticks")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
@@ -48,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
             headless=arguments.headless,
             page=arguments.page,
             record=arguments.record,
+            cameras=tuple(arguments.cameras),
             duration=arguments.duration,
             ticks=arguments.ticks,
             json=arguments.json,

@@ -18,7 +18,7 @@ from mobee_cli.launch import add_settings
 from mobee_cli.playing.files import Files, free_folder, write_files, write_readme
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
-from mobee_cli.robot_options import add_urdf_options, add_world
+from mobee_cli.robot_options import add_cameras, add_urdf_options, add_world
 from services.common.exit_codes import BAD_INPUT
 from services.launcher.run import Options, launch, refused_now
 
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("robot", nargs="?", default=ICUB, metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
     add_urdf_options(parser)
     add_world(parser)
+    add_cameras(parser)
     add_setup_options(parser)
     parser.add_argument("--seconds", type=positive_number, metavar="S", help=f"learn offline for S seconds (default: {SECONDS:g})")
     parser.add_argument("--transitions", type=positive_whole, metavar="N", help="learn offline until there are N transitions")
@@ -108,6 +109,7 @@ def _options(arguments: argparse.Namespace, files: Files) -> Options:
         scenario=str(files.scenario),
         settings=tuple(arguments.settings),
         headless=arguments.headless,
+        cameras=tuple(arguments.cameras) if arguments.learned else (),  # else the scenario has them
         duration=arguments.duration,
         json=arguments.json,
         endpoint=arguments.endpoint,

@@ -58,6 +58,12 @@ def add_world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--world", metavar="FILE", help=text)
 
 
+def add_cameras(parser: argparse.ArgumentParser) -> None:
+    """Add the option for cameras on links."""
+    text = "a camera on a link or marker, as hand or hand=0,0,0.1,0,0,1: a place [m] and a direction of view in its frame; may be repeated"
+    parser.add_argument("--camera", dest="cameras", action="append", default=[], metavar="LINK", help=text)
+
+
 def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
     """Load the robot of the options, or the default; raises MobeeError."""
     return load_robot(arguments.robot or default, **urdf_options(arguments))

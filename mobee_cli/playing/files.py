@@ -50,11 +50,14 @@ def _scenario(setup: Setup, files: Files) -> str:
         shared["world"] = str(Path(setup.world).resolve()) if is_path(setup.world) else setup.world
     if setup.contact_gain:
         shared["contact_gain"] = setup.contact_gain
+    if setup.cameras:
+        shared["cameras"] = list(setup.cameras)
     services: dict[str, Any] = {"robot_sim": {}, "model": {}, "controller": {}}
     for part, config in setup.agents.items():
         own = {"joints": list(config.joints), "neighbours": config.neighbours, "rest": list(config.rest)}
         settings = {name: value for name, value in own.items() if value}
         services[f"agent_{part}"] = settings | {"explorer": config.curious().explorer, "seed": config.seed, "continues": files.store.name}
+    services |= {who: {} for who in setup.eyes}
     services["monitor"] = {}
     tables = {"title": f"A curious {setup.name}", "shared": shared, "services": services}
     return f"# Written by mobee: the agents go on with what they have learned offline, in {files.store.name}.\n{to_toml(tables)}"

@@ -7,17 +7,19 @@ import argparse
 import os
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Sized
 from dataclasses import dataclass
 
 from mobee.control.gains import Gains
 from mobee.derivation import Arm, Derived, derive
 from mobee.errors import InvalidValue
+from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.robot_options import urdf_options
 from services.agents.config import Config as AgentConfig
-from services.common.worlds import effective_world
+from services.common.cameras import STEREO
+from services.common.worlds import effective_world, world_around
 
 WIDTH = 80  # columns
 ICUB = "icub"
@@ -36,6 +38,8 @@ class Setup:
     contact_gain: float
     agents: dict[str, AgentConfig]
     lines: tuple[str, ...]
+    cameras: tuple[str, ...] = ()  # beside those of the robot
+    eyes: tuple[str, ...] = ()  # services of the cameras
 
     @property
     def law(self) -> Gains:
@@ -57,9 +61,12 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     parts = _parts(arguments.parts)
     common = {"explorer": arguments.explorer, "seed": arguments.seed}
     world = effective_world(arguments.world, robot)
+    asked = tuple(getattr(arguments, "cameras", ()))  # `mobee learn` has no such option
     if robot == ICUB and not parts and not options:
         agents = {part: AgentConfig(part=part, **common) for part in PUBLISHED}
-        return Setup(ICUB, ICUB, load_robot(ICUB), world, "published_2014", 0.0, agents, _PUBLISHED_LINES)
+        icub = load_robot(ICUB)
+        eyes = _eyes(cameras_of(icub, asked), world, ICUB) if asked else ()
+        return Setup(ICUB, ICUB, icub, world, "published_2014", 0.0, agents, _PUBLISHED_LINES, asked, eyes)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_robot(robot, **options)
@@ -71,7 +78,15 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     gain = derived.gains.contact_gain if derived.gains != Gains.default() else 0.0
     remarks = [str(one.message).rpartition(":1: ")[2] for one in caught]
     name = re.sub(r"[^a-z0-9_]+", "_", loaded.name.lower()).strip("_") or "robot"
-    return Setup(name, "", derived.robot, world, "default", gain, agents, tuple(_described(derived, remarks)))
+    cameras = cameras_of(derived.robot, asked)
+    eyes, lines = _eyes(cameras, world, name), tuple(_described(derived, remarks, list(cameras)))
+    return Setup(name, "", derived.robot, world, "default", gain, agents, lines, asked, eyes)
+
+
+def _eyes(cameras: Sized, world: str, robot: str) -> tuple[str, ...]:
+    """Return the services of cameras: the renderer, and the locator if there are two and a ball to locate; raises MobeeError."""
+    balls = [one for one in world_around(world, robot).objects.values() if one.role == "target" and one.kind == "sphere"]
+    return ("renderer",) * bool(cameras) + ("vision",) * (len(cameras) >= STEREO and bool(balls))
 
 
 _PUBLISHED_LINES = (
@@ -97,7 +112,7 @@ def _parts(texts: list[str]) -> dict[str, tuple[str, ...]]:
     return parts
 
 
-def _described(derived: Derived, remarks: Sequence[str]) -> Iterator[str]:
+def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str]) -> Iterator[str]:
     """Yield at most ten lines of at most WIDTH columns that say what was derived."""
     robot = derived.robot
     yield _cut(f"{robot.name}: {len(robot.motors)} motors in {len(robot.parts)} parts, {len(robot.shapes)} shapes")
@@ -105,6 +120,8 @@ def _described(derived: Derived, remarks: Sequence[str]) -> Iterator[str]:
         yield _cut(f"  note   {remark}")
     for arm in derived.arms:
         yield _cut(f"  learns {arm.part}: {len(derived.space(arm))} states of {_listed(arm.joints)}")
+    if cameras:
+        yield _cut(f"  cameras {', '.join(cameras)}")
     if derived.limited:
         yield _cut(f"  limits half a turn to each side: {_listed(derived.limited)}")
     if derived.home_moved:

@@ -68,6 +68,7 @@ class Options:
     headless: bool = False  # without the monitor
     page: bool = False  # with the monitor, also if the scenario has none
     record: bool = True  # with the recorder, if the scenario has a robot
+    cameras: tuple[str, ...] = ()  # on links, see mobee.robot.cameras; with them the renderer starts, also if the scenario has none
     duration: float | None = None  # s after all services are ready; None: until a stop is requested
     ticks: int | None = None  # lockstep: number of ticks after which the run ends
     json: bool = False
@@ -91,17 +92,6 @@ def refused_now(options: Options) -> int:
     except (PortInUse, SystemRuns) as error:
         return _refuse(str(error), ENVIRONMENT)
     return OK
-
-
-def _read(options: Options) -> Scenario:
-    settings = (*options.settings, *([f"services.robot_sim.ticks={options.ticks}"] if options.ticks else []))
-    return read_scenario(
-        options.scenario,
-        settings,
-        leave_out=[*(["monitor"] if options.headless else []), *([] if options.record else [RECORDER])],
-        with_also=["monitor"] if options.page else [],
-        record=options.record,
-    )
 
 
 def _endpoint(options: Options, scenario: Scenario) -> str:
@@ -147,6 +137,23 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         )
     with service, router.liveliness().declare_token(keys.alive("router", service.instance)):
         return _Run(service, scenario, directory, options, local, record).execute(started)
+
+
+def _read(options: Options) -> Scenario:
+    """Return the scenario as the options change it; raises ConfigError."""
+    settings = list(options.settings)
+    if options.ticks:
+        settings.append(f"services.robot_sim.ticks={options.ticks}")
+    if options.cameras:
+        settings.append(f"shared.cameras={json.dumps(options.cameras)}")
+    also = ["monitor"] * options.page + ["renderer"] * bool(options.cameras)
+    left_out = ["monitor"] * options.headless + [RECORDER] * (not options.record)
+    scenario = read_scenario(options.scenario, settings, leave_out=left_out, with_also=also, record=options.record)
+    if options.cameras and scenario.is_locked:
+        raise ConfigError(
+            "--camera: pictures depend on real time, so that there are none in lockstep: leave it out, or launch without lockstep"
+        )
+    return scenario
 
 
 def _refuse(text: str, code: int) -> int:

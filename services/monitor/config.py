@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from services.common.config import ServiceConfig
+from services.common.cameras import CameraConfig
 
 Port = Annotated[int, Meta(gt=0, lt=65536)]
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
+class Config(CameraConfig, frozen=True, kw_only=True):
     """The monitor's settings."""
 
     serve: bool = True
@@ -26,4 +26,4 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     rate: Annotated[float, Meta(ge=1, le=20)] = 20.0
     """Updates of the robot a second."""
     image_rate: Annotated[float, Meta(gt=0, le=10)] = 2.0
-    """Eye pictures shown a second."""
+    """Pictures of each camera shown a second."""

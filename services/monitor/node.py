@@ -71,7 +71,7 @@ class MonitorNode:
         self._reaches = {part: bus.latest(Reach, part) for part in robot.parts}
         self._forces = [bus.latest(Forces, source) for source in ("model", "controller")]
         self._contacts = bus.latest(Contacts)
-        self._images = {eye: bus.latest(Image, eye) for eye in keys.EYES}
+        self._images = {name: bus.latest(Image, name) for name in config.cameras_on(robot)}
         self._touching: list[ContactItem] = []
         self._recorded: list[dict[str, Any]] = []  # contacts
         self._offset = self._last = 0.0  # s: runs are shown one after the other
@@ -222,12 +222,12 @@ class MonitorNode:
         return {"banner": said, "mode": seen.mode, "time": round(self._last, 1), "agents": agents, "services": services}
 
     def _show_images(self) -> None:
-        """Show the newest pictures of the eyes."""
-        for eye, stream in self._images.items():
+        """Show the newest pictures of the cameras."""
+        for name, stream in self._images.items():
             image = stream.take()
             if image is not None and len(image.data) == image.width * image.height * 3:
                 pixels = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
-                self._stream.log(f"eyes/{eye}", rr.Image(pixels).compress(jpeg_quality=JPEG_QUALITY))
+                self._stream.log(f"eyes/{name}", rr.Image(pixels).compress(jpeg_quality=JPEG_QUALITY))
 
     def _ask_world(self) -> None:
         if self._service.alive.get("model"):

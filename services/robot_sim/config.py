@@ -9,10 +9,11 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
+from services.common.cameras import require_cameras
 from services.common.config import WorldConfig
-from services.common.eyes import require_eyes
 from services.robot_sim.choice import EXTRA, PACKAGES, choose
 
 NotNegative = Annotated[float, Meta(ge=0)]
@@ -69,16 +70,16 @@ class Config(WorldConfig, frozen=True, kw_only=True):
 class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """The renderer's settings."""
 
+    cameras: tuple[str, ...] = ()
+    """Cameras beside the first two of the robot, as of vision."""
     frame_rate: Annotated[float, Meta(gt=0, le=30)] = 5.0
-    """Pictures of each eye a second of simulated time."""
+    """Pictures of each camera a second of simulated time."""
     width: Annotated[int, Meta(ge=16, le=1280)] = 320
     """Columns of a picture."""
     height: Annotated[int, Meta(ge=16, le=1024)] = 240
     """Rows of a picture."""
-    view_deg: Annotated[float, Meta(gt=5, lt=120)] = 50.0
-    """Vertical field of view, in degrees."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has eyes; raises MobeeError."""
+        """Check also that the robot has a camera; raises MobeeError."""
         super().check_robot(robot)
-        require_eyes(robot)
+        require_cameras(robot, cameras_of(robot, self.cameras), 1)

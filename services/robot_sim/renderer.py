@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders the eye images in a process of its own, `python -m services.robot_sim.renderer`.
+"""Renders the pictures of the cameras in a process of its own, `python -m services.robot_sim.renderer`.
 
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects).
-Writes: vision/image/{left,right}, vision/camera/{left,right}; only while there are subscribers.
+Writes: vision/image/{camera}, vision/camera/{camera}; only while there are subscribers.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import Camera, Clock, Image, Truth
+from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.rate import Percentiles
@@ -23,16 +24,16 @@ from services.robot_sim.renderer_scene import Scene
 
 
 class RendererNode:
-    """Mirrors the state streams and draws both eyes at one posture."""
+    """Mirrors the state streams and draws the pictures of all cameras at one posture."""
 
     def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
         self._service = service
         self._period = round(1e9 / config.frame_rate)  # ns
-        self._scene = Scene(robot, config.load_world(), config.width, config.height, config.view_deg)
+        self._scene = Scene(robot, config.load_world(), cameras_of(robot, config.cameras), config.width, config.height)
         self._body = Body(service.bus, robot)
         self._truth = service.bus.latest(Truth)
-        self._images = {eye: service.bus.publisher(Image, eye) for eye in keys.EYES}
-        self._cameras = {eye: service.bus.publisher(Camera, eye) for eye in keys.EYES}
+        self._images = {name: service.bus.publisher(Image, name) for name in self._scene.cameras}
+        self._cameras = {name: service.bus.publisher(Camera, name) for name in self._scene.cameras}
         self._due = 0  # ns, bus clock
         self._frame_time, self._pair_time = Percentiles(), Percentiles()
         self._frame_work = Percentiles()  # without the time that others had the processor
@@ -44,33 +45,32 @@ class RendererNode:
     def _tick(self, clock: Clock) -> None:
         if clock.t < self._due:
             return
-        if not any(self._images[eye].heard or self._cameras[eye].heard for eye in keys.EYES):
+        if not any(self._images[name].heard or self._cameras[name].heard for name in self._scene.cameras):
             self._due = clock.t + self._period
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
-        if self._body.update() and self._body.states["head"].k == self._body.states["torso"].k:
+        if self._body.update() and len({state.k for state in self._body.states.values()}) == 1:
             self._due = max(self._due + self._period, clock.t)
             self._draw()
 
     def _draw(self) -> None:
         begin = time.perf_counter()
-        head, torso = self._body.states["head"], self._body.states["torso"]
+        q = self._body.q()
+        state = next(iter(self._body.states.values()))
         truth = self._truth.take()
         if truth is not None:
             for thing in truth.objects:
                 self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
-        self._scene.pose(self._body.q())
-        intrinsics = self._scene.intrinsics.ravel().tolist()
-        for eye in keys.EYES:
+        self._scene.pose(q)
+        for name in self._scene.cameras:
             start, work = time.perf_counter(), time.thread_time()
-            picture = self._scene.draw(eye)
+            picture = self._scene.draw(name)
             self._frame_time.add(1e3 * (time.perf_counter() - start))
             self._frame_work.add(1e3 * (time.thread_time() - work))
-            self._cameras[eye].put(k=head.k, t=head.t, eye=eye, k_capture=head.k, intrinsics=intrinsics, q_head=head.q, q_torso=torso.q)
+            stamp: dict[str, Any] = {"k": state.k, "t": state.t, "camera": name, "k_capture": state.k}
+            self._cameras[name].put(**stamp, intrinsics=self._scene.intrinsics(name).ravel().tolist(), q=q.tolist())
             height, width, _ = picture.shape
-            self._images[eye].put(
-                k=head.k, t=head.t, eye=eye, k_capture=head.k, width=width, height=height, encoding="rgb8", data=picture.tobytes()
-            )
+            self._images[name].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
         self._pairs += 1
         self._pair_time.add(1e3 * (time.perf_counter() - begin))
 

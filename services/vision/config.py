@@ -8,12 +8,11 @@ from typing import Annotated
 from msgspec import Meta
 
 from mobee.robot.robot import Robot
-from services.common.config import ServiceConfig
-from services.common.eyes import require_eyes
+from services.common.cameras import STEREO, CameraConfig, require_cameras
 
 
-class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The target locator's settings."""
+class Config(CameraConfig, frozen=True, kw_only=True):
+    """The target locator's settings; it uses the first two cameras."""
 
     radius: Annotated[float, Meta(gt=0, le=0.5)] = 0.03
     """The ball's radius, in m."""
@@ -21,6 +20,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Time for which a position may be used after the picture was taken, in s of simulated time."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has eyes; raises MobeeError."""
+        """Check also that the robot has two cameras; raises MobeeError."""
         super().check_robot(robot)
-        require_eyes(robot)
+        require_cameras(robot, self.cameras_on(robot), STEREO)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the locator: reads pairs of images, publishes the ball's position."""
+"""Runs the locator: reads pairs of pictures, publishes the ball's position."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import time
 
 import numpy as np
 
-from bus_schema import keys
 from bus_schema.messages import Camera, Geometry, Image, WorldObject
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-from services.common.eyes import frame_at_capture
+from services.common.cameras import STEREO, frame_at_capture
 from services.common.rate import Percentiles
 from services.common.service import Service
 from services.vision.ball import Frame, Sighting, find_balls, locate
@@ -25,6 +24,7 @@ class VisionNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
+        self._mounts = dict(list(config.cameras_on(robot).items())[:STEREO])
         self._images: dict[str, Image] = {}
         self._cameras: dict[str, Camera] = {}
         self._place = service.bus.publisher(WorldObject, BALL)
@@ -33,27 +33,25 @@ class VisionNode:
         service.mark, service.describe = self._mark, self._describe
         service.on_run(self._forget)
         service.on_clock(lambda clock: None)  # for the id of the run
-        for eye in keys.EYES:
-            service.on_newest(Camera, self._take_camera, eye)
-            service.on_newest(Image, self._take_image, eye)
+        for name in self._mounts:
+            service.on_newest(Camera, self._take_camera, name)
+            service.on_newest(Image, self._take_image, name)
 
     def _take_camera(self, camera: Camera) -> None:
-        self._cameras[camera.eye] = camera
+        self._cameras[camera.camera] = camera
         self._try_locate()
 
     def _take_image(self, image: Image) -> None:
         if len(image.data) != image.width * image.height * 3:
-            self._service.bus.reject(
-                "length", f"picture of the {image.eye} eye: {len(image.data)} bytes for {image.width} x {image.height}"
-            )
+            self._service.bus.reject("length", f"picture of {image.camera}: {len(image.data)} bytes for {image.width} x {image.height}")
             return
-        self._images[image.eye] = image
+        self._images[image.camera] = image
         self._try_locate()
 
     def _try_locate(self) -> None:
         """Locate the ball, once all four messages of a tick are there."""
         parts: list[Image | Camera] = [*self._images.values(), *self._cameras.values()]
-        if len(parts) < 2 * len(keys.EYES) or len({part.k_capture for part in parts}) > 1:
+        if len(parts) < 2 * len(self._mounts) or len({part.k_capture for part in parts}) > 1:
             return
         begin = time.perf_counter()
         self._pairs += 1
@@ -65,14 +63,15 @@ class VisionNode:
         self._time.add(1e3 * (time.perf_counter() - begin))
 
     def _locate(self) -> None:
-        left, right = (self._sightings(eye) for eye in keys.EYES)
+        first, second = self._mounts
+        left, right = self._sightings(first), self._sightings(second)
         self._seen += bool(left) + bool(right)
-        fix = locate(left, right, (self._frame("left"), self._frame("right")), self._config.radius)
+        fix = locate(left, right, (self._frame(first), self._frame(second)), self._config.radius)
         if fix is None:
             self._mismatched += bool(left and right)
             return
         self._located += 1
-        camera = self._cameras["left"]
+        camera = self._cameras[first]
         self._place.put(
             name=BALL,
             geometry=Geometry("sphere", [self._config.radius]),
@@ -84,14 +83,13 @@ class VisionNode:
             valid_until=camera.t + round(1e9 * self._config.valid_for),
         )
 
-    def _sightings(self, eye: str) -> list[Sighting]:
-        image = self._images[eye]
+    def _sightings(self, name: str) -> list[Sighting]:
+        image = self._images[name]
         picture = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
-        return find_balls(picture, np.array(self._cameras[eye].intrinsics).reshape(3, 3))
+        return find_balls(picture, np.array(self._cameras[name].intrinsics).reshape(3, 3))
 
-    def _frame(self, eye: str) -> Frame:
-        camera = self._cameras[eye]
-        return frame_at_capture(self._robot, eye, np.array(camera.q_head), np.array(camera.q_torso))
+    def _frame(self, name: str) -> Frame:
+        return frame_at_capture(self._robot, self._mounts[name], np.array(self._cameras[name].q))
 
     def _forget(self) -> None:
         self._images.clear()

@@ -8,11 +8,15 @@ from pathlib import Path
 import pytest
 
 from experiments.kit.live.launch import free_endpoint
+from mobee.rendering.mesh import read_pieces
+from mobee.robot.load import load_robot
 from mobee_cli.__main__ import main
 from mobee_cli.playing.files import Files
 from mobee_cli.playing.setup import PUBLISHED
 from services.agents.config import Config as AgentConfig
+from services.launcher.checks import check_robots, check_services
 from services.launcher.scenario import read_scenario
+from tests.mobee.robot.urdf_files import tetrahedron, write_stl
 from tests.mobee_cli.test_learn import ARM
 
 
@@ -55,3 +59,23 @@ def test_a_file_that_mobee_learn_did_not_write_is_refused(tmp_path: Path, capsys
     Files(tmp_path / "x.sqlite").store.touch()
     assert main(["play", "--learned", str(tmp_path / "x.sqlite")]) == 2
     assert "x.toml: no such scenario beside" in capsys.readouterr().err
+
+
+def test_what_the_file_draws_and_its_cameras_go_on_live(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
+    drawn = '<visual><geometry><mesh filename="lower.stl"/></geometry></visual>'
+    arm.write_text(ARM.replace('<link name="lower">', f'<link name="lower">{drawn}'))
+    write_stl(tmp_path / "lower.stl", tetrahedron())
+    (tmp_path / "desk.xml").write_text(
+        '<World version="2.0" name="desk"><sphere name="ball" radius="0.03" px="0.5" role="target"/></World>'
+    )
+    options = ["--offline-only", "--transitions", "4", "--save", str(folder), "--world", str(tmp_path / "desk.xml")]
+    cameras = ["upper", "upper=0,0.1,0.2,1,0,0"]
+    assert main(["play", str(arm), *options, "--camera", cameras[0], "--camera", cameras[1]]) == 0
+    assert "  cameras upper, upper_2\n" in capsys.readouterr().out
+    (visual,) = load_robot(folder / "tiny_arm.xml").visuals
+    assert visual.mesh is not None and read_pieces(visual.mesh)
+    scenario = read_scenario(str(folder / "tiny_arm.toml"))
+    seeing = {part.who: list(part.config.cameras) for part in scenario.parts if part.who in ("renderer", "vision", "monitor")}
+    assert seeing == {"renderer": cameras, "vision": cameras, "monitor": cameras}
+    check_services(scenario, check_robots(scenario))

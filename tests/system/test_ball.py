@@ -14,12 +14,14 @@ from bus_schema import decode, keys
 from bus_schema.messages import Camera, Image, WorldObject
 from bus_schema.rpc import Done, Empty, Place, World
 from mobee import load_robot
+from mobee.robot.cameras import cameras_of
 from services.common import rpc
-from services.common.eyes import frame_at_capture
+from services.common.cameras import frame_at_capture
 from tests.services.vision.test_locator import share_seen
 from tests.system.live import running
 
 ROBOT = load_robot("icub")
+EYES = cameras_of(ROBOT)
 SCENARIO = Path(__file__).with_name("ball.toml")
 LOOK = 0.5  # s at each place: five pairs of pictures
 LATE = 0.3  # s for the last result to come
@@ -37,7 +39,7 @@ class Listener:
         self.cameras: dict[tuple[str, int], Camera] = {}
         self.places: dict[int, WorldObject] = {}
         self._kept = [session.declare_subscriber(WorldObject.stream.key("ball"), self._note_ball)]
-        for eye in keys.EYES:
+        for eye in EYES:
             self._kept.append(session.declare_subscriber(Image.stream.key(eye), self._note_image))
             self._kept.append(session.declare_subscriber(Camera.stream.key(eye), self._note_camera))
 
@@ -47,28 +49,28 @@ class Listener:
 
     def _note_image(self, sample: zenoh.Sample) -> None:
         image = decode(Image, sample.payload.to_bytes(), str(sample.encoding))
-        self.images[image.eye, image.t] = image
+        self.images[image.camera, image.t] = image
 
     def _note_camera(self, sample: zenoh.Sample) -> None:
         camera = decode(Camera, sample.payload.to_bytes(), str(sample.encoding))
-        self.cameras[camera.eye, camera.t] = camera
+        self.cameras[camera.camera, camera.t] = camera
 
     def errors(self, since: int, until: int, at: np.ndarray) -> list[float]:
         """How far off [m] the ball was placed in each pair of pictures that shows 90 % of it; infinity where it was not found."""
         found = []
         for t in sorted({t for _, t in self.cameras if since < t <= until}):
-            if all((eye, t) in shelf for eye in keys.EYES for shelf in (self.images, self.cameras)) and self._visible(t, at):
+            if all((eye, t) in shelf for eye in EYES for shelf in (self.images, self.cameras)) and self._visible(t, at):
                 ball = self.places.get(t)
                 found.append(np.inf if ball is None else float(np.linalg.norm(np.array(ball.position) - at)))
         return found
 
     def _visible(self, t: int, at: np.ndarray) -> bool:
-        return all(self._share(eye, t, at) >= 0.9 for eye in keys.EYES)
+        return all(self._share(eye, t, at) >= 0.9 for eye in EYES)
 
     def _share(self, eye: str, t: int, at: np.ndarray) -> float:
         image, camera = self.images[eye, t], self.cameras[eye, t]
         picture = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
-        frame = frame_at_capture(ROBOT, eye, np.array(camera.q_head), np.array(camera.q_torso))
+        frame = frame_at_capture(ROBOT, EYES[eye], np.array(camera.q))
         return share_seen(picture, frame, at, np.array(camera.intrinsics).reshape(3, 3))
 
 

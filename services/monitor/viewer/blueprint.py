@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
 from mobee.rendering.palette import colors_of
+from mobee.robot.cameras import EYES
 from mobee.robot.robot import Robot
 from services.common.worlds import AT_TABLE
 
@@ -42,32 +43,31 @@ ROOT = "root_link"  # frame of everything in the scene
 BACKGROUND = (24, 27, 33)
 WINDOW = 30.0  # s of plot
 SURPRISE = (0.0, 0.065)  # nats: the largest reward is .0589 (thesis table 6.3); equal rewards would be drawn around 0 otherwise
-EYES = {"left_eye", "right_eye"}
+MOST_EYES = 4  # cameras on the page
 
 
 @dataclass(frozen=True)
 class Shown:
     """The content of the monitor's page.
 
-    `name`: of the robot.  `parts`: those with plots.  `has_eyes`: whether it may have pictures to show.
+    `name`: of the robot.  `parts`: those with plots.  `cameras`: those that may have pictures to show.
 
     `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
     """
 
     name: str
     parts: tuple[str, ...]
-    has_eyes: bool
+    cameras: tuple[str, ...]
     eye: Array
     target: Array
 
 
-def shown_of(robot: Robot) -> Shown:
-    """Return the view of a robot; that of the iCub includes its table."""
+def shown_of(robot: Robot, cameras: Sequence[str] = ()) -> Shown:
+    """Return the view of a robot and its cameras; that of the iCub includes its table."""
     parts = tuple(colors_of(robot.parts))
-    has_eyes = robot.markers.keys() >= EYES
     if robot.name in AT_TABLE:
-        return Shown("iCub", parts, has_eyes, np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
-    return Shown(robot.name, parts, has_eyes, *eye_of(robot))
+        return Shown("iCub", parts, tuple(cameras), np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
+    return Shown(robot.name, parts, tuple(cameras), *eye_of(robot))
 
 
 def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
@@ -75,7 +75,7 @@ def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
 
     `in_motion`: False for the tab of the robot alone.
     """
-    eyes = [rrb.Horizontal(_eye("left"), _eye("right"), name="eyes")] if shown.has_eyes else []
+    eyes = [rrb.Grid(*map(_eye, shown.cameras[:MOST_EYES]), name="eyes")] if shown.cameras else []
     others: list[rrb.Container | rrb.View] = [*eyes, _motion(shown.parts), _learning(), _spaces(shown.parts), _log()] if in_motion else []
     return rrb.Blueprint(
         rrb.Tabs(_scene(shown), *others, active_tab=0),
@@ -135,8 +135,9 @@ def _scene(shown: Shown) -> rrb.Spatial3DView:
     )
 
 
-def _eye(eye: str) -> rrb.Spatial2DView:
-    return rrb.Spatial2DView(origin=f"/eyes/{eye}", name=f"{eye} eye", background=rrb.Background(color=BACKGROUND))
+def _eye(name: str) -> rrb.Spatial2DView:
+    title = f"{name} eye" if name in EYES else name
+    return rrb.Spatial2DView(origin=f"/eyes/{name}", name=title, background=rrb.Background(color=BACKGROUND))
 
 
 def _log() -> rrb.TextLogView:

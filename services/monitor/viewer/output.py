@@ -75,7 +75,7 @@ def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Itera
 
     `now`: the robot's time, s.
     """
-    folder, layout = _folder_of(config), blueprint(shown_of(robot))
+    folder, layout = _folder_of(config), blueprint(shown_of(robot, list(config.cameras_on(robot))))
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
         record = Record(folder / STORY, now) if folder else None
         board = Board(record.put if record else None)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mobee.robot import load
 from services.common.config import ConfigError
 from services.launcher.checks import MissingExtra, PortInUse, check_extras, check_gains, check_ports, check_robots, check_services
+from services.launcher.run import Options, _read
 from services.launcher.run_directory import make_run_directory, to_toml
 from services.launcher.scenario import read_scenario, shipped
 from tests.services.launcher.launched import mobee, toys
@@ -205,16 +206,15 @@ def unable(folder: Path, robot: str, services: str, suffix: str = "xml") -> str:
 
 
 NO_EYES = '<marker name="left_eye" nx="-1"/>'
-VERTICAL = '<marker name="left_eye" nz="1"/><marker name="right_eye" nz="1"/>'
 
 
 @pytest.mark.parametrize(
     ("robot", "services", "says", "instead"),
     [
-        (ARM, "[services.renderer]\n", "renderer: 'arm' cannot see: pictures are taken from", "Leave renderer and vision out"),
-        (seer(eyes=NO_EYES), "[services.vision]\n", "vision: 'seer' cannot see: pictures are taken from", "has no right_eye. Leave"),
-        (seer(head="neck"), "[services.vision]\n", "vision: 'seer' cannot see: each picture is sent", "has no part head. Leave"),
-        (seer(eyes=VERTICAL), "[services.renderer]\n", "renderer: 'seer' cannot see: the normal of", "Give the marker a normal"),
+        (ARM, "[services.renderer]\n", "renderer: 'arm' cannot see: 1 camera is needed, and it has none", "or --camera LINK"),
+        (seer(eyes=NO_EYES), "[services.vision]\n", "vision: 'seer' cannot see: 2 cameras are needed", "add right_eye to the robot's file"),
+        (ARM, '[services.vision]\ncameras = ["tip"]\n', "vision: 'arm' cannot see: 2 cameras are needed", "it has tip"),
+        (ARM, '[services.renderer]\ncameras = ["top"]\n', "renderer: unknown link or marker 'top'", "tip"),
         (
             ARM,
             '[services.robot_sim]\nbackend = "pybullet"\n',
@@ -378,3 +378,11 @@ def test_a_robot_of_an_older_version_may_start_and_one_with_a_slip_may_not(tmp_p
     robot.write_text(OLD_ROBOT.format("<shpere/>"))
     with pytest.raises(ConfigError, match=r"old.xml:3: <shpere>: unknown tag .* The launcher ignores nothing"):
         check_robots(read_scenario(str(path)))
+
+
+def test_a_camera_on_a_link_brings_the_renderer_and_is_known_to_all_that_use_pictures() -> None:
+    scenario = _read(Options("kinematic", page=True, cameras=("right_palm",)))
+    seeing = {part.who: part.config.cameras for part in scenario.parts if "cameras" in part.config.__struct_fields__}
+    assert seeing == {"renderer": ("right_palm",), "monitor": ("right_palm",)}
+    with pytest.raises(ConfigError, match="--camera: pictures depend on real time"):
+        _read(Options("lockstep", cameras=("right_palm",)))

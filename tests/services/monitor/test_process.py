@@ -188,7 +188,7 @@ def whole_chain(stage: Stage) -> Callable[[], None]:
         forces.put(re_k=stage.k, terms={"limits": zeros, "collision": zeros}, part_age={}, touched={})
         contacts.put(re_k=stage.k, contacts=[])
         for eye, stream in images.items():
-            stream.put(eye=eye, k_capture=stage.k, width=16, height=12, encoding="rgb8", data=bytes(16 * 12 * 3))
+            stream.put(camera=eye, k_capture=stage.k, width=16, height=12, encoding="rgb8", data=bytes(16 * 12 * 3))
         for part, stream in transitions.items():
             counts = {"n": 1, "s": 0, "a": 0, "goal": 1, "s_next": 1}
             stream.put(agent=part, **counts, reward=0.5, value=1.0, probability=0.5, settled=True, duration=4.0, touched=[])

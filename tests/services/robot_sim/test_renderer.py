@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus_schema import keys
 from bus_schema.messages import Camera, Image
 from mobee import World, box, cylinder, load_world, sphere
+from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.load import load_robot
-from services.common.eyes import eye_frame, frame_at_capture
+from services.common.cameras import frame_at_capture
 from services.robot_sim.renderer_scene import BACKGROUND, Scene
 from tests.services.harness import wait_for
 from tests.services.robots import seer
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 ROBOT = load_robot("icub")
+EYES = cameras_of(ROBOT)
 DOWN = posture(ROBOT, LOOKING_DOWN)
 NO_TURN = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -30,10 +31,9 @@ def red(picture: np.ndarray) -> np.ndarray:
 
 
 def project(scene: Scene, eye: str, q: np.ndarray, point: np.ndarray) -> np.ndarray:
-    head, torso = ROBOT.part("head"), ROBOT.part("torso")
-    origin, rotation = frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice])
+    origin, rotation = frame_at_capture(ROBOT, EYES[eye], q)
     x, y, depth = rotation.T @ (point - origin)
-    return (scene.intrinsics @ np.array([x / depth, y / depth, 1.0]))[:2]
+    return (scene.intrinsics(eye) @ np.array([x / depth, y / depth, 1.0]))[:2]
 
 
 @pytest.fixture
@@ -47,34 +47,29 @@ AHEAD = {"neck_pitch": 0.0, "eyes_tilt": 0.0, "eyes_vergence": 0.0}
 def test_at_zero_the_eyes_look_ahead_and_stand_upright() -> None:
     transforms = np.broadcast_to(np.eye(4), (len(ROBOT.links), 4, 4))
     for eye, side in (("left", -0.034), ("right", 0.034)):
-        origin, rotation = eye_frame(ROBOT, transforms, eye)
+        origin, rotation = camera_frame(EYES[eye], transforms)
         np.testing.assert_allclose(origin[1], side, atol=1e-6)
         np.testing.assert_allclose(rotation, [[0, 0, -1], [1, 0, 0], [0, -1, 0]], atol=1e-12)
 
 
 @pytest.mark.parametrize(("motor", "column", "row"), [("eyes_version", 1, 0), ("eyes_tilt", 0, -1), ("neck_pitch", 0, -1)])
 def test_motors_turn_both_eyes_the_same_way(motor: str, column: int, row: int) -> None:
-    for eye in keys.EYES:
-        head, torso = ROBOT.part("head"), ROBOT.part("torso")
-        views = [
-            frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice])[1]
-            for q in (posture(ROBOT, AHEAD), posture(ROBOT, AHEAD | {motor: 10.0}))
-        ]
+    for eye in EYES:
+        views = [frame_at_capture(ROBOT, EYES[eye], q)[1] for q in (posture(ROBOT, AHEAD), posture(ROBOT, AHEAD | {motor: 10.0}))]
         turned = views[0].T @ views[1][:, 2]  # the new direction of view, in the old picture's axes
         np.testing.assert_allclose(turned[:2], np.sin(np.deg2rad(10.0)) * np.array([column, row]), atol=1e-9)
 
 
 def test_vergence_turns_the_eyes_towards_each_other() -> None:
     q = posture(ROBOT, {"eyes_vergence": 20.0})
-    head, torso = ROBOT.part("head"), ROBOT.part("torso")
-    left, right = (frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice])[1][:, 2] for eye in keys.EYES)
+    left, right = (frame_at_capture(ROBOT, EYES[eye], q)[1][:, 2] for eye in EYES)
     np.testing.assert_allclose(left[1], np.sin(np.deg2rad(10.0)), atol=1e-9)
     np.testing.assert_allclose(right[1], -np.sin(np.deg2rad(10.0)), atol=1e-9)
 
 
 def test_the_ball_is_drawn_where_intrinsics_and_posture_say(scene: Scene) -> None:
     scene.pose(DOWN)
-    for eye in keys.EYES:
+    for eye in EYES:
         rows, columns = np.nonzero(red(scene.draw(eye)))
         seen = np.array([columns.mean(), rows.mean()])
         np.testing.assert_allclose(seen, project(scene, eye, DOWN, np.array([-0.35, 0.0, -0.07])), atol=0.6)  # perspective: .4 px
@@ -108,7 +103,7 @@ def test_the_robot_has_no_red_on_it(scene: Scene) -> None:
     scene.place("ball", np.array([0.0, 0.0, -5.0]), NO_TURN)
     q = posture(ROBOT, {**LOOKING_DOWN, "l_shoulder_pitch": -50.0, "r_shoulder_pitch": -50.0, "l_elbow": 60.0, "r_elbow": 60.0})
     scene.pose(q)
-    for eye in keys.EYES:
+    for eye in EYES:
         picture = scene.draw(eye).astype(int)
         assert (picture.max(axis=2) - picture.min(axis=2)).max() < 40
         assert (picture != BACKGROUND).any(axis=2).mean() > 0.5
@@ -140,8 +135,8 @@ def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_po
         with stage.running("services.robot_sim.renderer", "renderer"):
             stage.play(DOWN, lambda: stage.k > 60)
             assert stage.stat("renderer").numbers["pairs"] == 0
-            images = {eye: stage.latest(Image, eye) for eye in keys.EYES}
-            cameras = {eye: stage.latest(Camera, eye) for eye in keys.EYES}
+            images = {eye: stage.latest(Image, eye) for eye in EYES}
+            cameras = {eye: stage.latest(Camera, eye) for eye in EYES}
             ball = np.array([-0.33, 0.04, -0.07])
             stage.put_ball(ball)
             first = stage.k
@@ -160,7 +155,7 @@ def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_po
             assert len({message.t for message in got.values()}) == 1
             image, camera = got[0], got[2]
             pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
-            origin, rotation = frame_at_capture(stage.robot, "left", np.array(camera.q_head), np.array(camera.q_torso))
+            origin, rotation = frame_at_capture(stage.robot, EYES["left"], np.array(camera.q))
             seen = np.array(camera.intrinsics).reshape(3, 3) @ (rotation.T @ (ball - origin))
             rows, columns = np.nonzero(red(pixels))
             np.testing.assert_allclose([columns.mean(), rows.mean()], seen[:2] / seen[2], atol=0.8)

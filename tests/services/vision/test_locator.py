@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 
-from bus_schema import keys
 from bus_schema.messages import (
     Camera,
     Clock,
@@ -28,14 +27,16 @@ from bus_schema.messages import (
     Truth,
     WorldObject,
 )
-from mobee import load_world
+from mobee import World, load_world, sphere
+from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
-from services.common.eyes import frame_at_capture
+from services.common.cameras import frame_at_capture
 from services.robot_sim.renderer_scene import Scene
 from services.vision.ball import Fix, Sighting, find_balls, locate, triangulate
 from tests.services.stage import LOOKING_DOWN, TICK, Stage, matched, posture
 
 ROBOT = load_robot("icub")
+EYES = cameras_of(ROBOT)
 K = np.array([[257.34, 0.0, 160.0], [0.0, 257.34, 119.0], [0.0, 0.0, 1.0]])
 RED, GREY = (215, 20, 20), (150, 150, 150)
 RADIUS = 0.03
@@ -146,7 +147,6 @@ def scene() -> Scene:
 
 def test_the_drawn_ball_is_located_within_a_centimetre(scene: Scene, rng: np.random.Generator) -> None:
     """Median 1 cm, 95 % 2 cm over frames in which both eyes see 90 % of the ball, at ten places."""
-    head, torso = ROBOT.part("head"), ROBOT.part("torso")
     errors = []
     for _ in range(10):
         at = np.array([rng.uniform(-0.45, -0.28), rng.uniform(-0.12, 0.12), rng.uniform(-0.07, 0.05)])
@@ -155,15 +155,27 @@ def test_the_drawn_ball_is_located_within_a_centimetre(scene: Scene, rng: np.ran
             moved = {"torso_pitch": rng.uniform(2, 25), "torso_yaw": rng.uniform(-12, 12), "torso_roll": rng.uniform(-6, 6)}
             q = posture(ROBOT, {**LOOKING_DOWN, **moved})
             scene.pose(q)
-            frames = tuple(frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice]) for eye in keys.EYES)
-            pictures = [scene.draw(eye) for eye in keys.EYES]
-            if min(share_seen(picture, frame, at, scene.intrinsics) for picture, frame in zip(pictures, frames, strict=True)) < 0.9:
+            frames = tuple(frame_at_capture(ROBOT, EYES[eye], q) for eye in EYES)
+            pictures = [scene.draw(eye) for eye in EYES]
+            if min(share_seen(picture, frame, at, scene.intrinsics("left")) for picture, frame in zip(pictures, frames, strict=True)) < 0.9:
                 continue
-            fix = locate(*(find_balls(picture, scene.intrinsics) for picture in pictures), frames, RADIUS)
+            fix = locate(*(find_balls(picture, scene.intrinsics("left")) for picture in pictures), frames, RADIUS)
             errors.append(np.inf if fix is None else np.linalg.norm(fix.position - at))
     assert len(errors) >= 20
     assert np.median(errors) < 0.01
     assert np.quantile(errors, 0.95) < 0.02
+
+
+def test_two_cameras_put_on_any_robot_locate_the_ball() -> None:
+    robot, world, at = load_robot("katana"), World(), np.array([0.5, 0.05, 0.35])
+    base = robot.links[0]
+    cameras = cameras_of(robot, [f"{base}=1,-0.1,0.4,-1,0,0", f"{base}=1,0.1,0.4,-1,0,-0.1"])
+    world.add("ball", sphere(RADIUS), position=at, color=(1, 0, 0))
+    scene = Scene(robot, world, cameras)
+    frames = [frame_at_capture(robot, camera, robot.home) for camera in cameras.values()]
+    fix = locate(*(find_balls(scene.draw(name), scene.intrinsics(name)) for name in cameras), (frames[0], frames[1]), RADIUS)
+    assert fix is not None
+    np.testing.assert_allclose(fix.position, at, atol=0.005)
 
 
 def share_seen(picture: np.ndarray, frame: tuple[np.ndarray, np.ndarray], at: np.ndarray, intrinsics: np.ndarray) -> float:
@@ -178,7 +190,7 @@ def share_seen(picture: np.ndarray, frame: tuple[np.ndarray, np.ndarray], at: np
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
 ALLOWED: dict[str, type[Message]] = {Clock.stream.key(): Clock} | {
-    key: cls for eye in keys.EYES for key, cls in ((Image.stream.key(eye), Image), (Camera.stream.key(eye), Camera))
+    key: cls for eye in EYES for key, cls in ((Image.stream.key(eye), Image), (Camera.stream.key(eye), Camera))
 }
 FORBIDDEN: dict[str, type[Message]] = {
     **{State.stream.key(part): State for part in PARTS},
@@ -238,7 +250,7 @@ def test_pictures_of_different_ticks_are_not_paired_and_bad_ones_do_no_harm(stag
         put = pair_putter(stage, q, np.array([-0.36, 0.03, -0.07]))
 
         def harassed() -> bool:
-            wrong = ({"late": stage.k + 500}, {"size": 100}, {"q_head": [0.0] * 3})[stage.k % 3]
+            wrong = ({"late": stage.k + 500}, {"size": 100}, {"posture": [0.0] * 3})[stage.k % 3]
             put(stage.k, **wrong)
             return stage.k > 60
 
@@ -250,20 +262,18 @@ def test_pictures_of_different_ticks_are_not_paired_and_bad_ones_do_no_harm(stag
 
 def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray) -> Callable[..., None]:
     """A function that puts both eyes' pictures of a ball and their cameras, right or wrong in one way."""
-    images = {eye: stage.publisher(Image, eye) for eye in keys.EYES}
-    cameras = {eye: stage.publisher(Camera, eye) for eye in keys.EYES}
-    head, torso = ROBOT.part("head"), ROBOT.part("torso")
+    images = {eye: stage.publisher(Image, eye) for eye in EYES}
+    cameras = {eye: stage.publisher(Camera, eye) for eye in EYES}
     pictures = {}
-    for eye in keys.EYES:
-        origin, rotation = frame_at_capture(ROBOT, eye, q[head.slice], q[torso.slice])
+    for eye in EYES:
+        origin, rotation = frame_at_capture(ROBOT, EYES[eye], q)
         pictures[eye] = sphere_picture(rotation.T @ (at - origin), RADIUS).tobytes()
 
-    def put(k: int, late: int | None = None, size: int | None = None, q_head: list[float] | None = None) -> None:
-        for eye in keys.EYES:
+    def put(k: int, late: int | None = None, size: int | None = None, posture: list[float] | None = None) -> None:
+        for eye in EYES:
             k_capture = late if late is not None and eye == "right" else k
-            stamp = {"k": k, "t": k * TICK, "eye": eye, "k_capture": k_capture}
-            posture_head = q[head.slice].tolist() if q_head is None else q_head
-            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), q_head=posture_head, q_torso=q[torso.slice].tolist())
+            stamp = {"k": k, "t": k * TICK, "camera": eye, "k_capture": k_capture}
+            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), q=q.tolist() if posture is None else posture)
             images[eye].put(**stamp, width=320, height=240, encoding="rgb8", data=pictures[eye][:size])
 
     return put

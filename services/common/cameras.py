@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The cameras of a scenario: the same for the renderer, the locator and the monitor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import link_transforms
+from mobee.robot.cameras import EYES, camera_frame, cameras_of
+from mobee.robot.robot import Robot
+from mobee.robot.visual import Camera
+from services.common.config import ServiceConfig
+
+STEREO = 2  # cameras that locate a ball
+
+
+class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
+    """Settings of a service that makes, reads or shows pictures."""
+
+    cameras: tuple[str, ...] = ()
+    """Cameras beside the first two of the robot's file, or the eyes at its markers left_eye and right_eye: names of others in the file,
+    or NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place in m and a direction of view in its frame."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """Check also that the cameras can be made; raises MobeeError."""
+        super().check_robot(robot)
+        self.cameras_on(robot)
+
+    def cameras_on(self, robot: Robot) -> dict[str, Camera]:
+        """Return the cameras by name; raises MobeeError for one that cannot be made."""
+        return cameras_of(robot, self.cameras)
+
+
+def require_cameras(robot: Robot, cameras: dict[str, Camera], count: int) -> None:
+    """Raise InvalidValue if the robot has fewer cameras than that; the message names the remedies."""
+    if len(cameras) >= count:
+        return
+    has = f"it has {', '.join(cameras) or 'none'}"
+    missing = [marker for marker in EYES.values() if marker not in robot.markers]
+    raise InvalidValue(
+        f"{robot.name!r} cannot see: {count} camera{'s are' if count > 1 else ' is'} needed, and {has}. Put a camera on a link "
+        f'(cameras = ["LINK"], or --camera LINK), add {" and ".join(missing) or "cameras"} to the robot\'s file, or leave the service out.'
+    )
+
+
+def frame_at_capture(robot: Robot, camera: Camera, q: Array) -> tuple[Array, Array]:
+    """Return optical centre (3,) m and rotation (3, 3) of a camera from the posture q (n,) [rad] that was sent with a picture.
+
+    The columns of the rotation are the picture's right, its down, and the direction of view, in the root frame.  Raises InvalidValue.
+    """
+    if np.shape(q) != (len(robot.motors),):
+        raise InvalidValue(f"posture: {np.size(q)} numbers, expected {len(robot.motors)}")
+    return camera_frame(camera, link_transforms(robot, q))
