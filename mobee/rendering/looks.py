@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from mobee.arrays import Array
 from mobee.errors import MobeeError, Simplified
 from mobee.model.pose import Pose
 from mobee.rendering import palette
-from mobee.rendering.mesh import Mesh, ellipsoid_piece, fair_most, mesh_of, read_pieces, smaller
+from mobee.rendering.mesh import Mesh, ellipsoid_piece, fair_most, mesh_of, read_pieces, simplified, smaller
 from mobee.rendering.solid import Color, Solid
 from mobee.robot.robot import Robot, per_robot
 from mobee.robot.visual import Channels, MeshSource, Visual
@@ -62,6 +62,15 @@ def solid_looks(robot: Robot, without: Iterable[int] = ()) -> tuple[Look, ...]:
             solid = Solid(shape.kind, shape.size, shape.position, shape.rotation, color, group=shape.link, vertices=shape.vertices)
             found.append(Look(shape.link, shape.part, solid, True))
     return tuple(found)
+
+
+def coarser(looks: Sequence[Look], budget: int) -> list[Look]:
+    """Return looks whose meshes have at most about `budget` triangles in all; for viewers without a graphics card."""
+    meshes = {id(look.solid.mesh): look.solid.mesh for look in looks if look.solid.mesh is not None}
+    counts = [len(look.solid.mesh.triangles) for look in looks if look.solid.mesh is not None]
+    most = fair_most(counts, budget)
+    made = {key: simplified(mesh, most) for key, mesh in meshes.items()}
+    return [replace(look, solid=replace(look.solid, mesh=made.get(id(look.solid.mesh)))) for look in looks]
 
 
 def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:

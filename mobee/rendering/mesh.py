@@ -67,8 +67,13 @@ def read_pieces(source: MeshSource) -> tuple[Piece, ...]:
     for piece in pieces:
         if not np.isfinite(piece.points).all():
             raise RobotFileError(f"{path}: has points that are not finite")
-    scale = np.array(source.scale)
-    return tuple(replace(piece, points=piece.points * scale) for piece in map(_merged, pieces) if len(piece.triangles))
+    return tuple(_scaled(piece, np.array(source.scale)) for piece in map(_merged, pieces) if len(piece.triangles))
+
+
+def _scaled(piece: Piece, scale: Array) -> Piece:
+    """Return the piece with its points multiplied by `scale` (3,); a mirror image keeps its outside."""
+    triangles = piece.triangles if scale.prod() > 0.0 else piece.triangles[:, ::-1]
+    return replace(piece, points=piece.points * scale, triangles=triangles)
 
 
 def _read(path: Path) -> Sequence[Piece]:
@@ -130,6 +135,13 @@ def smaller(piece: Piece, most: int) -> Piece:
     size = float(np.ptp(piece.points, axis=0).max()) or 1.0  # the package has thresholds of its own, for sizes near 1
     points, triangles = simplify(((piece.points - centre) / size), piece.triangles.astype(np.int32), target_count=max(most, 4))
     return replace(piece, points=size * points.astype(np.float64) + centre, triangles=triangles.astype(np.intp))
+
+
+def simplified(mesh: Mesh, most: int) -> Mesh:
+    """Return a mesh with at most about `most` triangles; raises NotInstalled."""
+    if len(mesh.triangles) <= most:
+        return mesh
+    return mesh_of(smaller(_merged(Piece(mesh.corners.astype(np.float64), mesh.triangles.astype(np.intp), mesh.color)), most))
 
 
 def fair_most(counts: Sequence[int], budget: int) -> int:

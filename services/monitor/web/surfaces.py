@@ -12,11 +12,13 @@ from functools import cache
 import numpy as np
 
 from mobee.arrays import Array, Ints
+from mobee.rendering.looks import Look, coarser, looks_of
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot, Shape
 from mobee.robot.urdf.hull import facets
 
 COLOR: Color = (168, 174, 184)  # of a solid; the page adds that of the part's agent
+BUDGET = 9000  # triangles of meshes
 ROUND = 20  # corners of a circle
 BLOCK = 4  # bytes to which the header is padded: the arrays that follow are read in place
 
@@ -38,9 +40,28 @@ class Surface:
 
 
 def surfaces_of(robot: Robot) -> Callable[[], bytes]:
-    """Return a function that returns the solids of a robot, encoded; they are made when the first page asks for them."""
-    parts = list(robot.parts)
-    return cache(lambda: encoded([_surface(shape, parts) for shape in robot.shapes if shape.role == "solid"]))
+    """Return a function that returns what is drawn of a robot, encoded; it is made when the first page asks for it."""
+    return cache(lambda: encoded(_surfaces(robot)))
+
+
+def _surfaces(robot: Robot) -> list[Surface]:
+    """Return its solids, unless its file draws it: then that, with meshes as fine as JavaScript draws in some milliseconds."""
+    parts, drawn = list(robot.parts), looks_of(robot)
+    dressed = {look.link for look in drawn if not look.is_solid}
+    solids = [_surface(shape, parts) for shape in robot.shapes if shape.role == "solid" and shape.link not in dressed]
+    return solids + [_of_look(look, parts) for look in coarser([one for one in drawn if not one.is_solid], BUDGET)]
+
+
+def _of_look(look: Look, parts: Sequence[str]) -> Surface:
+    solid = look.solid
+    if solid.mesh is not None:
+        made: Made = solid.mesh.corners.astype(np.float64), solid.mesh.normals.astype(np.float64), solid.mesh.triangles.astype(np.intp)
+    else:
+        assert solid.kind != "mesh"
+        made = MAKERS[solid.kind](Shape("", look.link, solid.kind, solid.size, np.zeros(3), np.eye(3), "solid", look.part))
+    vertices, normals = made[0] @ solid.rotation.T + solid.position, made[1] @ solid.rotation.T
+    red, green, blue = (round(255.0 * channel) for channel in solid.color)
+    return Surface(look.link, parts.index(look.part) if look.part in parts else -1, (red, green, blue), vertices, normals, made[2])
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:

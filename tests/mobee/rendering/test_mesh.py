@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import RobotFileError, Simplified
 from mobee.rendering.camera import NEAREST, Raster, eye_camera, pixel_middles
-from mobee.rendering.looks import looks_of
+from mobee.rendering.looks import coarser, looks_of
 from mobee.rendering.mesh import Piece, ellipsoid_piece, fair_most, mesh_of, read_pieces, smaller
 from mobee.rendering.solid import Solid
 from mobee.robot.load import load_robot
@@ -117,6 +117,17 @@ def test_a_mesh_that_cannot_be_read_is_an_error_with_its_reason(tmp_path: Path, 
 SOLID = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 VISUAL = f'<link name="hand"><visual><geometry><mesh filename="{{}}"/></geometry></visual>{SOLID}</link>'
 WRIST = '<joint name="wrist" type="fixed"><parent link="lower"/><child link="hand"/></joint>'
+
+
+def test_a_mirror_image_keeps_its_outside_and_a_coarser_look_its_shape(tmp_path: Path) -> None:
+    fine = ellipsoid_piece((0.5, 0.4, 0.3))
+    write_stl(tmp_path / "ball.stl", fine.points[fine.triangles])
+    robot = load_robot(urdf_file(tmp_path, *ARM, VISUAL.format('ball.stl" scale="-1 1 1'), WRIST))
+    (look,) = coarser(looks_of(robot), 200)
+    mesh = look.solid.mesh
+    assert mesh is not None and 100 < len(mesh.triangles) <= 200
+    assert ((mesh.corners * mesh.normals).sum(axis=1) > 0.0).all()
+    np.testing.assert_allclose(np.ptp(mesh.corners, axis=0), [1.0, 0.8, 0.6], rtol=0.1)
 
 
 def test_a_missing_mesh_is_one_line_and_the_solid_instead(tmp_path: Path) -> None:

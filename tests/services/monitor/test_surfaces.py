@@ -12,7 +12,7 @@ import pytest
 from mobee.arrays import Array
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Shape, ShapeKind
-from services.monitor.web.surfaces import MAKERS, surfaces_of
+from services.monitor.web.surfaces import BUDGET, MAKERS, surfaces_of
 
 SIZES: dict[ShapeKind, tuple[float, ...]] = {"sphere": (0.1,), "capsule": (0.1, 0.4), "cylinder": (0.1, 0.4), "box": (0.1, 0.2, 0.3)}
 VOLUMES = {"sphere": np.pi * 4e-3 / 3, "capsule": np.pi * (4e-3 / 3 + 4e-3), "cylinder": np.pi * 4e-3, "box": 6e-3}
@@ -47,3 +47,14 @@ def test_the_page_reads_what_is_encoded() -> None:
         assert triangles.max() < len(vertices)
         np.testing.assert_allclose((vertices.min(axis=0) + vertices.max(axis=0)) / 2.0, shape.position, atol=1e-6)
     assert at == len(data)
+
+
+def test_the_meshes_that_a_file_draws_are_sent_coarser_and_its_solids_are_not() -> None:
+    pytest.importorskip("trimesh")
+    robot = load_robot("icub")
+    data = surfaces_of(robot)()
+    (length,) = struct.unpack_from("<I", data)
+    header = json.loads(data[4 : 4 + length])
+    assert {one["link"] for one in header} == {visual.link for visual in robot.visuals}
+    assert 5000 < sum(one["triangles"] for one in header) < 2 * BUDGET
+    assert len(data) == 4 + length + sum(24 * one["vertices"] + 12 * one["triangles"] for one in header)
