@@ -60,8 +60,8 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 - That two things are equal is confirmed by an equivalence test: the whole interval of their difference lies within a stated margin.
 - A claim is one row. Where the publications leave a setting open, the row has the verdict of each setting, and its text the numbers.
 - A verdict needs {MIN_SEEDS} repetitions or more.
-- Of all verdicts by intervals, {FALSE_DISCOVERIES:.0%} are expected to be wrong: the rate at which a row's intervals still decide is its p
-  value, and Benjamini and Hochberg's procedure over all rows makes those open that are not distinguished from chance.
+- Of all verdicts by intervals, at most {100 * FALSE_DISCOVERIES:.0f} % are expected to be wrong: the rate at which a row's intervals still
+  decide is its p value, and Benjamini and Hochberg's procedure over all rows makes those open that are not distinguished from chance.
 - The thresholds are in [frozen.json](frozen.json). After they were frozen, experiments were run once more with seeds from {CONFIRMING_SEED}
   on (`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`); the column "new seeds" has these verdicts.
 
@@ -249,6 +249,8 @@ def all_differences(record: Recorded) -> list[str]:
 
 def write_page(record: Recorded) -> None:
     """Write the record, the page, and the chapters in docs/results.md; the claims of an experiment without a raw record are open."""
+    if not chapters.PAGE.exists():
+        raise InvalidValue(f"there is no {chapters.PAGE}: the table is written in a clone of the repository.")
     kept = {name: _recorded_only(name, record[name]) for name in sorted(record) if name in EXPERIMENTS}
     RECORD.write_text(json.dumps(kept, indent=1) + "\n")
     PAGE.write_text(page(kept))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -69,7 +69,10 @@ def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = T
 
 
 def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured | None:
-    """Judge by a rule in each setting of `what`; the text is that of the first setting, and of those with another verdict."""
+    """Judge by a rule in each setting of `what`; the text is that of the first setting, and of those with another verdict.
+
+    If the rule itself returns an Envelope, that stays as it is where it is the same in all settings; else each pair is a setting.
+    """
     each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
     if not each:
         return None
@@ -80,17 +83,30 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
     if not any(isinstance(holds, Envelope) for _, holds in each.values()):
         return text, Envelope(what, {name: holds for name, (_, holds) in each.items() if not isinstance(holds, Envelope)})
     inner = {name: holds for name, (_, holds) in each.items() if isinstance(holds, Envelope)}
-    both = {f"{outer}, {name}": found for outer, envelope in inner.items() for name, found in envelope.holds.items()}
-    return text, Envelope(f"{what}, {next(iter(inner.values())).what}", both)
+    if all(envelope == first for envelope in inner.values()) and len(inner) == len(each):
+        return text, first
+    both = {f"{outer}{_PAIR}{name}": found for outer, envelope in inner.items() for name, found in envelope.holds.items()}
+    return text, Envelope(f"{what}{_PAIR}{next(iter(inner.values())).what}", both)
 
 
 _WORDS: Mapping[Holds, str] = {True: "holds", "stronger": "stronger than published", None: "open", False: "fails"}
 
 
+_PAIR = " / "  # between the names of two settings that vary together
+
+
 def _by_setting(envelope: Envelope) -> str:
     """Return in which settings the claim holds and fails, as text."""
     grouped = {word: [name for name, holds in envelope.holds.items() if holds == found] for found, word in _WORDS.items()}
-    return f"{envelope.what}: " + "; ".join(f"{word} with {', '.join(names)}" for word, names in grouped.items() if names)
+    each = (f"{word} with {', '.join(_merged(names, list(envelope.holds)))}" for word, names in grouped.items() if names)
+    return f"{envelope.what}: {'; '.join(each)}"
+
+
+def _merged(names: Sequence[str], every: Sequence[str]) -> list[str]:
+    """Return names of settings; where all pairs with the same first name are among them, that name stands for them."""
+    firsts = [name.partition(_PAIR)[0] for name in every]
+    whole = {first for first in firsts if all(name in names for name, its in zip(every, firsts, strict=True) if its == first)}
+    return list(dict.fromkeys(first if (first := name.partition(_PAIR)[0]) in whole else name for name in names))
 
 
 @dataclass(frozen=True)

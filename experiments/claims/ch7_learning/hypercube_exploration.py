@@ -149,7 +149,7 @@ def _proportional(groups: Groups) -> Measured:
     )
     bounds = high / low * (1.0 - ROUGHLY), high / low * (1.0 + ROUGHLY)
     readings = {"they grow with it": is_above(values[high], values[low])}
-    readings["in proportion to it, within one half"] = decides(ratio_interval(values[high], values[low]), *bounds)
+    readings["in proportion to it within one half"] = decides(ratio_interval(values[high], values[low]), *bounds)
     return text, Envelope("reading", readings)
 
 

@@ -93,10 +93,11 @@ def test_the_settings_of_a_claim_are_judged_one_by_one_and_their_text_says_where
     (found,) = judged([each], {"1 cm": [1, 2], "3 cm": [1], "10 cm": [1, 2, 3]})
     assert (found["verdict"], found["ours"]) == ("depends", "2 runs; with 3 cm: 1 runs")
     assert found["settings"] == "unit: holds with 1 cm, 10 cm; fails with 3 cm"
-    (nested,) = judged(
-        [Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs)), varies="unit")], {"1": {"a": True}, "3": {"a": False}}
-    )
-    assert nested["settings"] == "unit, gain: holds with 1, a; fails with 3, a"
+    inner = Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs)), varies="unit")
+    (nested,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": False, "b": False}})
+    assert nested["settings"] == "unit / gain: holds with 1 / a; fails with 1 / b, 3"
+    (same,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": True, "b": False}})
+    assert same["settings"] == "gain: holds with a; fails with b"
 
 
 def test_p_is_the_smallest_rate_at_which_the_intervals_decide_the_same():
