@@ -269,11 +269,12 @@ class Contacts:
 def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
     """Return by robot and part, with "offline" for all offline seeds together, how actions of a task ended in the run of a folder."""
     robot, found = load_robot(ROBOT), dict[str, dict[str, Contacts]]()
-    results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
+    results = [r.values for r in load_cells(folder).values() if r.cell.settings["task"] == task]
+    results = [values for values in results if f"touched_{TASKS[task].parts[0]}" in values]  # earlier versions kept no contacts
     for part in TASKS[task].parts:
         own, every = space(robot, TASKS[task], part), Contacts(0, 0, 0, 0)
-        for result in results:
-            every += Contacts.of(own, result.values[f"seen_{part}"], result.values[f"touched_{part}"])
+        for values in results:
+            every += Contacts.of(own, values[f"seen_{part}"], values[f"touched_{part}"])
         found.setdefault("offline", {})[part] = every
         for name in (name for name in ROBOTS if (folder / task / name / STORE).exists()):
             with TransitionStore(folder / task / name / STORE, part, read_only=True) as store:

@@ -11,8 +11,10 @@ from experiments.kit.learning.live import (
     RATE,
     ROBOTS,
     TASKS,
+    Contacts,
     agents,
     compared,
+    contacts,
     counts_of,
     distance,
     learn_live,
@@ -84,6 +86,23 @@ def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_o
     assert [one.variation for one in found.offline] == [0.5, 0.5, 0.5]
     assert (found.live["pybullet"].variation, found.live["pybullet"].agree, found.live["pybullet"].compared) == (1.0, 0.0, 2)
     assert found.counts["pybullet"]["left_arm"].sum() == 8  # as many as the offline seeds made
+
+
+def test_actions_that_miss_their_goals_and_touch_are_counted_on_each_robot(tmp_path):
+    goal = int(Lattice(load_robot("icub"), JOINTS["torso"], neighbours=4).goal(0, 0))
+    rows, touched = np.array([(0, 0, goal), (0, 0, goal), (0, 0, 26), (0, 0, 26), (0, 0, 26)]), np.array([True, False, True, True, False])
+    for seed, kept in enumerate((touched, touched, None)):  # the last is of an earlier version
+        values = {f"seen_{part}": rows for part in TASKS["table"].parts}
+        values |= {f"touched_{part}": kept for part in TASKS["table"].parts if kept is not None}
+        write_cell(tmp_path, Cell(f"table-s{seed}", seed, {"task": "table", "transitions": 5}), values, 1.0)
+    (tmp_path / "table" / "mujoco").mkdir(parents=True)
+    with TransitionStore(tmp_path / "table" / "mujoco" / STORE, "torso") as store:
+        store.append(Transition(1, 0, 0, 26, 0.0, True, 4.0, (0.0,), ("table",)))
+    for part in ("left_arm", "right_arm"):
+        made(tmp_path / "table" / "mujoco", part, 1)
+    found = contacts(tmp_path, "table")
+    assert found["offline"]["torso"] == Contacts(missed=6, touching=6, both=4, actions=10)
+    assert found["mujoco"]["torso"] == Contacts(missed=1, touching=1, both=1, actions=1) and "pybullet" not in found
 
 
 def test_a_part_that_has_enough_goes_on_with_the_others_so_that_none_waits_for_it(tmp_path, monkeypatch):
