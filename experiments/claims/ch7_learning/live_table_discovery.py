@@ -9,7 +9,7 @@ The robot `icub` on its motor model (no physics), the published gains and graphs
 between the outcomes observed live and those of all offline seeds but one, mean over the state-actions that both tried at least twice; then
 the rank of this number among the same numbers of the offline seeds, p.
 With the same encoder noise both plants make the same run to the last bit (`mobee bench agree`); here they have
-different seeds.
+different seeds.  With --also the agents learn on physics too, which adds rows to the results and does not change the claim.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ import numpy as np
 from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
-from experiments.kit.learning.live import TASKS, Compared, compared, draw_distances, learn_live, learn_offline
+from experiments.kit.learning.live import TASKS, Compared, compared, contact_rows, draw_distances, learn_live, learn_offline
+from experiments.kit.live.launch import PHYSICS
 from experiments.kit.plots import saved
 from experiments.kit.sweep import run_cells, sweep_arguments
 from mobee.store import STORE
@@ -38,9 +39,10 @@ LIVE_SEED = 900  # different from those of the offline runs
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, and --transitions."""
+    """Add the options of a sweep, --transitions and --also."""
     sweep_arguments(parser, seeds=SEEDS)
     parser.add_argument("--transitions", type=positive_whole, metavar="N", help=f"per part (default: {TRANSITIONS})")
+    parser.add_argument("--also", nargs="+", choices=PHYSICS, default=[], metavar="PHYSICS", help=f"learn on {' and '.join(PHYSICS)} too")
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
@@ -54,11 +56,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Learn live and offline, and compare."""
     number = _transitions(arguments)
     with Progress() as progress:
+        for robot in (ROBOT, *arguments.also):
 
-        def report(made: int) -> None:
-            progress.show(made / number, f"live: {made} of {number}")
+            def report(made: int, robot: str = robot) -> None:
+                progress.show(made / number, f"live, {robot}: {made} of {number}")
 
-        learn_live(TASK, ROBOT, LIVE_SEED, number, folder / TASK / ROBOT, report, PIECE)
+            learn_live(TASK, robot, LIVE_SEED, number, folder / TASK / robot, report, PIECE)
     run_cells(learn_offline, cells(arguments), folder, arguments)
     return results(folder)
 
@@ -68,7 +71,12 @@ def results(folder: Path) -> dict[str, Any]:
     number = next(int(result.cell.settings["transitions"]) for result in load_cells(folder).values())
     found = compared(folder, TASK, MIN_TRIES)
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
-    return {
+    physics = {
+        name: {"total variation": round(other.variation, 4), "state-actions compared": other.compared}
+        for name, other in found.live.items()
+        if name != ROBOT
+    }
+    return ({"on physics": physics} if physics else {}) | {
         "transitions": {part: number for part in TASKS[TASK].parts},
         "total variation": {"live": round(one.variation, 4), "offline_low": round(min(offline), 4), "offline_high": round(max(offline), 4)},
         "share with the same most frequent outcome": {
@@ -77,6 +85,7 @@ def results(folder: Path) -> dict[str, Any]:
         },
         "state-actions compared": one.compared,
         "p": round(p_value(found), 4),
+        "at the table": contact_rows(folder, TASK),
         "claims": judged((equal,), found),
     }
 

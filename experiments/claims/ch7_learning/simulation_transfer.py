@@ -29,7 +29,7 @@ from scipy.special import stdtrit
 from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
-from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, contacts, draw_distances, learn_live, learn_offline
+from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, contact_rows, draw_distances, learn_live, learn_offline
 from experiments.kit.plots import saved
 from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
@@ -99,20 +99,7 @@ def _compared(folder: Path) -> dict[str, Compared]:
 
 def _at_the_table(folder: Path) -> dict[str, Any]:
     """Return how the actions of each part at the table ended, on each robot; nothing without --table."""
-    if not (folder / "table").exists():
-        return {}
-    return {
-        "at the table": {
-            f"{robot}, {part}": {
-                "actions": one.actions,
-                "missed their goals": one.missed,
-                "ended in contact with table or ball": one.touching,
-                "both": one.both,
-            }
-            for robot, parts in contacts(folder, "table").items()
-            for part, one in parts.items()
-        }
-    }
+    return {"at the table": contact_rows(folder, "table")} if (folder / "table").exists() else {}
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:

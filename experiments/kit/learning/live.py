@@ -284,6 +284,20 @@ def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
     return found
 
 
+def contact_rows(folder: Path, task: str) -> dict[str, dict[str, int]]:
+    """Return `contacts` as rows of a table."""
+    return {
+        f"{robot}, {part}": {
+            "actions": one.actions,
+            "missed their goals": one.missed,
+            "ended in contact with table or ball": one.touching,
+            "both": one.both,
+        }
+        for robot, parts in contacts(folder, task).items()
+        for part, one in parts.items()
+    }
+
+
 COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
 
 

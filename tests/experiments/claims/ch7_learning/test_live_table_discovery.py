@@ -22,16 +22,17 @@ def seen(part, rng, odd):
 
 
 def prepared(folder, odd):
-    arguments = argparse.Namespace(seed=0, seeds=19, jobs=1, engine="processes", quick=False, transitions=108)
+    arguments = argparse.Namespace(seed=0, seeds=19, jobs=1, engine="processes", quick=False, transitions=108, also=["mujoco"])
     for cell in live_table_discovery.cells(arguments):
         rng = np.random.default_rng(cell.seed)
         write_cell(folder, cell, {f"seen_{part}": np.array(seen(part, rng, False)) for part in TASKS["published"].parts}, 1.0)
-    store, rng = folder / "published" / "kinematic", np.random.default_rng(77)
-    store.mkdir(parents=True)
-    for part in TASKS["published"].parts:
-        with TransitionStore(store / STORE, part) as file:
-            for n, (s, a, to) in enumerate(seen(part, rng, odd), 1):
-                file.append(Transition(n, s, a, to, 0.0, True, 4.0, (0.0,)))
+    for robot, is_odd in (("kinematic", odd), ("mujoco", not odd)):
+        store, rng = folder / "published" / robot, np.random.default_rng(77)
+        store.mkdir(parents=True)
+        for part in TASKS["published"].parts:
+            with TransitionStore(store / STORE, part) as file:
+                for n, (s, a, to) in enumerate(seen(part, rng, is_odd), 1):
+                    file.append(Transition(n, s, a, to, 0.0, True, 4.0, (0.0,), ("table",) if n % 2 else ()))
     return arguments
 
 
@@ -39,5 +40,7 @@ def prepared(folder, odd):
 def test_one_live_run_can_show_a_difference_but_not_that_there_is_none(tmp_path, odd, verdict):
     results = live_table_discovery.run(prepared(tmp_path, odd), tmp_path)
     assert results["claims"][0]["verdict"] == verdict
-    assert results["state-actions compared"] == 3 * 27
+    assert results["state-actions compared"] == results["on physics"]["mujoco"]["state-actions compared"] == 3 * 27
+    assert (results["on physics"]["mujoco"]["total variation"] > results["total variation"]["live"]) is not odd
+    assert results["at the table"]["mujoco, torso"]["ended in contact with table or ball"] == 54
     assert live_table_discovery.figure(tmp_path).exists()

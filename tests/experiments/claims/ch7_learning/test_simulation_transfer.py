@@ -15,10 +15,12 @@ pytestmark = pytest.mark.timeout(120)
 def test_parts_learn_at_the_same_time_and_each_makes_its_number_of_transitions():
     cell = Cell("arms-s0", 0, {"task": "arms", "transitions": 4})
     first, again = learn_offline(cell), learn_offline(cell)
-    assert set(first) == {"seen_left_arm", "seen_right_arm"}
-    for part, rows in first.items():
-        assert rows.shape == (4, 3) and np.array_equal(rows, again[part])
-        assert np.array_equal(rows[1:, 0], rows[:-1, 2])
+    assert set(first) == {"seen_left_arm", "seen_right_arm", "touched_left_arm", "touched_right_arm"}
+    assert all(np.array_equal(first[name], again[name]) for name in first)
+    for part in ("left_arm", "right_arm"):
+        rows = first[f"seen_{part}"]
+        assert rows.shape == (4, 3) and np.array_equal(rows[1:, 0], rows[:-1, 2])
+        assert first[f"touched_{part}"].tolist() == [False] * 4  # the world of the arms is empty
 
 
 def test_one_more_value_is_below_the_bound_with_95_percent():
