@@ -36,7 +36,8 @@ def test_what_it_saves_is_not_overwritten(tmp_path: Path, capsys: pytest.Capture
     arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
     arm.write_text(ARM)
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 0
-    assert sorted(path.name for path in folder.iterdir()) == ["README.md", "tiny_arm.sqlite", "tiny_arm.toml", "tiny_arm.xml"]
+    saved = ["README.md", "tiny_arm.sqlite", "tiny_arm.sqlite-lock", "tiny_arm.toml", "tiny_arm.xml"]
+    assert sorted(path.name for path in folder.iterdir()) == saved
     assert "mobee check tiny_arm.xml" in (folder / "README.md").read_text()
     capsys.readouterr()
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 2
