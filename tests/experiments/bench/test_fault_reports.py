@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reports and verdicts of the benchmarks of stops and faults on given results; nothing is launched here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from experiments.bench import faults, stop
+from experiments.kit.live.faults import Fault
+from experiments.kit.live.witness import Kept, Stop
+
+FINE = Kept(97, 0, 0, 0)
+
+
+def result(load: float, hold: float = 0.02, broken: tuple[str, ...] = (), kept: Kept = FINE) -> dict[str, Any]:
+    stops = [("kill", Stop(hold, 0.1, 0.01))] * 10
+    row = {"seed": 7, "schedule": ["1.00 s kill model"], "load": load, "back_s": 1.2, "broken": list(broken), "stops": stops}
+    row["actions"] = [("agent", True), ("model", False)]
+    return faults._result(faults.Settings(schedules=1, seed=7), [row], kept, 12.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "passed"),
+    [
+        ({"load": 0.5}, True),
+        ({"load": 0.5, "hold": 0.2}, False),
+        ({"load": 20.0, "hold": 0.2}, True),  # times say nothing of the system
+        ({"load": 20.0, "broken": ("torso: tick 2 after tick 3",)}, False),
+        ({"load": 20.0, "kept": Kept(97, 1, 0, 0)}, False),
+        ({"load": 20.0, "kept": Kept(97, 0, 0, 1)}, False),
+    ],
+)
+def test_a_broken_promise_counts_always_and_a_time_on_a_quiet_machine(given: dict[str, Any], passed: bool) -> None:
+    found = result(**given)
+    assert found["passed"] is passed
+    assert found["actions_survived"] == {"agent": {"survived": 1, "of": 1}, "model": {"survived": 0, "of": 1}}
+    report = faults.report(found)
+    assert max(map(len, report.splitlines())) <= 80
+    assert "times are not judged" in report if given["load"] > faults.QUIET else "times" not in report
+
+
+def test_the_effect_of_a_fault_is_told_only_if_no_other_is_near() -> None:
+    schedule = [Fault(0.0, "freeze", "model", 1.0), Fault(1.5, "kill", "model"), Fault(4.0, "kill", "model"), Fault(4.5, "kill", "model")]
+    assert [fault.at for fault, _, _ in faults._alone(schedule, [10.0, 11.5, 14.0, 14.5])] == [0.0]
+    schedule[3] = Fault(6.0, "kill", "model")
+    assert [fault.at for fault, _, _ in faults._alone(schedule, [10.0, 11.5, 14.0, 16.0])] == [0.0, 4.0, 6.0]
+
+
+def test_the_report_of_stops_fits_80_columns_and_names_what_has_ended() -> None:
+    row = {"flood": "calls of robot_sim's stat", "stop_ms_p50": 12.0, "stop_ms_p99": 168.2, "connect_ms_p50": 4.0, "connect_ms_p99": 60.0}
+    row |= {"armed_again": 12, "ended": ["model"], "load": 2.0}
+    given = {"stops": 12, "at_most_ms": 50.0, "floods": [row], "load": 2.0, "times_judged": True, "late": ["tokens"], "passed": False}
+    report = stop.report(given)
+    assert "ENDED: model" in report and "LATE: tokens" in report
+    assert max(len(line.partition("  ENDED")[0]) for line in report.splitlines()) <= 80
