@@ -156,8 +156,15 @@ class MonitorNode:
         begin = time.perf_counter()
         self._set_time()
         self._take_states()
-        self._stream.begin_look()
-        if self._body.update():
+        moved = self._body.update()
+        if self._stream.begin_look():
+            self._log_look(moved)
+        self._stream.end_look()
+        self._looks += 1
+        self._time.add(1e3 * (time.perf_counter() - begin))
+
+    def _log_look(self, moved: bool) -> None:
+        if moved:
             self._scene.log_robot(self._body.q(), self._touching)
         for part, motion in self._known.motions.items():
             self._plots.log_motion(part, motion)
@@ -165,9 +172,6 @@ class MonitorNode:
             forces = said.take()
             if forces is not None:
                 self._plots.log_forces(forces)
-        self._stream.end_look()
-        self._looks += 1
-        self._time.add(1e3 * (time.perf_counter() - begin))
 
     def _take_states(self) -> None:
         contacts = self._contacts.take()

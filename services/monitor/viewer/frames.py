@@ -13,6 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 LARGEST_HISTORY = 4_000_000  # bytes of changes that a new viewer gets
+RECORDED = 2  # of so many looks one is recorded: to log one takes 4 ms of a core
 WANTED_FOR = 15.0  # s after its last request for which a viewer counts as open, and changes are kept for it
 
 
@@ -52,7 +53,7 @@ class Frames:
     """A stream that logs to a file, if there is one, and for open viewers keeps what they need.
 
     What is static is kept for all; changes are kept up to a size; of the looks at the robot only the newest is kept, and it is made only
-    if a viewer waits for one.
+    if a viewer waits for one. The file gets every second look.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
@@ -66,12 +67,13 @@ class Frames:
         self._newest = (0, 0.0, b"")  # number, s of robot time, the look
         self._published = Condition()
         self._asked, self._waiting = -WANTED_FOR, 0
-        self._is_looking = self._is_wanted = False
+        self._is_looking = self._is_wanted = self._is_recorded = False
+        self._looks = 0
         self._time = 0.0
 
     def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
         """Log to the file, and for viewers."""
-        if self._file is not None:
+        if self._file is not None and (self._is_recorded or not self._is_looking):
             self._file.log(path, *what, static=static)
         if static:
             self._static.log(path, *what, static=True)
@@ -93,11 +95,14 @@ class Frames:
         for part in (self._static, self._changes, self._look):
             part.close()
 
-    def begin_look(self) -> None:
-        """What is logged until `end_look` is one look at the robot, all of it."""
+    def begin_look(self) -> bool:
+        """What is logged until `end_look` is one look at the robot, all of it; returns whether anybody needs it: a viewer, or the file."""
         self._is_looking = True
+        self._is_recorded = self._file is not None and self._looks % RECORDED == 0
+        self._looks += 1
         with self._published:
             self._is_wanted = self._waiting > 0
+        return self._is_wanted or self._is_recorded
 
     def end_look(self) -> None:
         """Give the look, and all changes since the one before, to the viewers that wait."""

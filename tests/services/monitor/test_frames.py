@@ -81,5 +81,21 @@ def test_without_a_viewer_nothing_is_kept(frames: Frames, monkeypatch: pytest.Mo
     assert len(asked(frames, 0, 30.0)[2]) == 2  # the layout, the look
 
 
+def test_the_file_gets_every_second_look_and_a_viewer_the_one_that_it_waits_for() -> None:
+    made = Frames(rr.RecordingStream("test"), rrb.Blueprint(), "test")
+    needed = []
+    for _ in range(4):
+        needed.append(made.begin_look())
+        made.end_look()
+    assert needed == [True, False, True, False]
+    viewer = threading.Thread(target=made.newest, args=(0, 20.0))
+    viewer.start()
+    give_up = time.monotonic() + 20.0
+    while viewer.is_alive() and time.monotonic() < give_up:
+        look(made, 1.0)
+    assert not viewer.is_alive()
+    made.close()
+
+
 def test_a_viewer_waits_for_a_look_but_not_for_ever(frames: Frames) -> None:
     assert pieces(frames.newest(0, 0.05)) == (0, 0.0, [])
