@@ -87,7 +87,9 @@ class Teller:
         """An action has ended."""
         agent = self._agent(seen.agent)
         if agent is not None:
-            agent.last, agent.decision = seen, None
+            agent.last = seen
+            if agent.decision is not None and agent.decision.n < seen.n:  # else it is the next one, which was heard before
+                agent.decision = None
             agent.recent.append((surprise_of(seen.probability), seen.s_next == seen.goal))
             self.changed.add("cards")
 

@@ -187,6 +187,15 @@ def test_the_story_of_an_agent_from_its_messages() -> None:
     json.dumps(told)
 
 
+def test_a_decision_that_is_heard_before_the_outcome_of_the_one_before_stays() -> None:
+    teller = Teller(ROBOT, colors_of_all(ROBOT.parts))
+    teller.note_learned(learned(TransitionModel(SPACE), n=0))
+    for heard, shown in ((transition(n=7), False), (decision(n=7), True), (transition(n=7), True), (transition(n=8), False)):
+        (teller.note_transition if isinstance(heard, Transition) else teller.note_decision)(heard)  # type: ignore[arg-type]
+        (card,) = teller.values()["cards"]
+        assert ("now" in card) == shown
+
+
 def test_an_agent_of_another_robot_has_a_story_too(tmp_path: Path) -> None:
     (tmp_path / "own.xml").write_text(OWN)
     robot = load_robot(tmp_path / "own.xml")
