@@ -221,9 +221,14 @@ class MonitorNode:
         seen.held_for = {part: now - since for part, since in self._held_since.items()}
         seen.stop = None if self._stop is None or now - self._stop[0] > STOP_REPEATED else self._stop[1]
         said = banner(seen)
-        agents = sorted(title_of(who.removeprefix("agent_")) for who in seen.services if who.startswith("agent_"))
-        services = sorted(seen.services)
-        return {"banner": said, "mode": seen.mode, "time": round(self._last, 1), "agents": agents, "services": services}
+        return {
+            "banner": said,
+            "mode": seen.mode,
+            "time": round(self._last, 1),
+            "agents": sorted(title_of(who.removeprefix("agent_")) for who in seen.services if who.startswith("agent_")),
+            "services": sorted(seen.services),
+            "moving": [title_of(part) for part, motion in self._known.motions.items() if motion.status == "moving"],
+        }
 
     def _show_images(self) -> None:
         """Show the newest pictures of the cameras."""

@@ -243,6 +243,7 @@ function noAgent() {
   if (!state.robot) return "Waiting for the robot.";
   if (state.past) return "Nobody explored in this run.";
   if (!state.status.services?.includes("controller")) return "Nor a controller: your own program drives it, and is seen here.";
+  if (state.status.moving?.length) return `A program moves its ${state.status.moving.join(" and ")}.`;
   return "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders.";
 }
 
@@ -251,9 +252,10 @@ let isArranged = false;
 function arrange() {
   const agents = state.status.agents?.length || Object.keys(state.curves).length;
   $("wonders-title").textContent = agents ? "What it wonders about" : "The robot";
-  if (isArranged || !state.robot || !state.status.services?.includes("controller")) return;
+  const runs = (who) => state.status.services?.includes(who);
+  if (isArranged || !state.robot || !(runs("controller") || runs("port_filter"))) return;
   isArranged = true;
-  if (!agents && !state.past) tab("move");
+  if (!agents && !state.past) tab(runs("controller") ? "move" : "events");
 }
 
 function waiting(name, text) {
