@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot: motors, safety gate, state streams and, in a second process, eye images.
+"""The simulated robot: motors, safety gate, state streams and, in a second process, the pictures of its cameras.
 
 Writes: `tick`, `clock`, `{part}/state`, `sim/truth`, `estop` (while it is latched), `event/robot_sim`; in lockstep `turn/{service}`.
 Reads: `commands`, `{part}/cmd`, `estop`, `alive/*/*`; in lockstep `done/{service}`.

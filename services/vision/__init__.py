@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The target locator: finds the red ball in both eye images and publishes its position in the root frame.
+"""The target locator: finds the red ball in the pictures of two cameras and publishes its position in the root frame.
 
-Reads: clock (for the id of the run), vision/image/{left,right}, vision/camera/{left,right}.
+Reads: clock (for the id of the run), vision/image/{camera}, vision/camera/{camera}.
 Writes: world/ball.
 """
