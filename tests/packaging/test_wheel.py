@@ -22,6 +22,7 @@ EXTRAS = {"live", "sim", "viz", "reference", "planning", "parquet", "cluster", "
     "film",
     "gym",
     "menagerie",
+    "meshes",
     "mjcf",
     "track",
 }
