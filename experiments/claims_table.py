@@ -208,7 +208,9 @@ def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool
         if entry == one.entry:
             if confirms:
                 require_frozen(name)
-            keep_record(name, one.run, one.versions, load_experiment(name).method.kept, confirms)
+            method = load_experiment(name).method
+            with method.recorded(one.run) as folder:
+                keep_record(name, one.run, one.versions, method.kept, confirms, folder)
 
 
 def recomputed(name: str, confirms: bool = False) -> Entry:

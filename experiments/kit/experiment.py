@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -207,6 +208,9 @@ class Method(Protocol):
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
         """Run the experiment; returns its results as JSON values."""
 
+    def recorded(self, folder: Path) -> AbstractContextManager[Path]:
+        """Return a folder with the `kept` files of a finished run, for its record."""
+
     def results(self, folder: Path) -> dict[str, Any]:
         """Compute the results of a finished run from its `kept` files; raises InvalidValue if the experiment keeps none."""
 
@@ -226,6 +230,10 @@ class Steps:
     figure: Callable[[Path], Path]
     recomputed: Callable[[Path], dict[str, Any]] | None = None
     kept: tuple[str, ...] = ()
+
+    def recorded(self, folder: Path) -> AbstractContextManager[Path]:
+        """Return the folder of the run."""
+        return nullcontext(folder)
 
     def results(self, folder: Path) -> dict[str, Any]:
         """Compute the results from the `kept` files in the folder."""

@@ -30,27 +30,29 @@ def all_records() -> list[Path]:
     return sorted(RECORDS.glob("*.zip"))
 
 
-def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False) -> Path:
+def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False, folder: Path | None = None) -> Path:
     """Write the archive of a finished run, whole or not at all.
 
     Args:
         name: of the experiment.
         run: folder of the run, with config.json.
         versions: the versions.json of the run.
-        kept: glob patterns of files in the folder.
+        kept: glob patterns of files in `folder`.
         confirms: whether the run confirms the first one with new seeds; its archive is written once.
+        folder: with the kept files; None: that of the run.
 
     Raises:
         InvalidValue: no file matches, the archive would be larger than MAX_BYTES, or another run has confirmed the experiment.
     """
-    files = sorted({path for pattern in kept for path in run.glob(pattern)})
+    place = run if folder is None else folder
+    files = sorted({path for pattern in kept for path in place.glob(pattern)})
     if not files:
         raise InvalidValue(f"{run} has none of the files {', '.join(kept) or '(the experiment names none)'}: there is nothing to record.")
     path = record_path(name, confirms)
     unfinished = path.with_suffix(".unfinished")
     path.parent.mkdir(exist_ok=True)
     with zipfile.ZipFile(unfinished, "w") as archive:
-        for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(run)), file) for file in files)]:
+        for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(place)), file) for file in files)]:
             method = zipfile.ZIP_STORED if source.suffix == ".npz" else zipfile.ZIP_DEFLATED
             archive.writestr(zipfile.ZipInfo(member, _NO_TIME), source.read_bytes(), method)
     if (size := unfinished.stat().st_size) > MAX_BYTES:

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -77,6 +79,8 @@ class Sweep:
         add_options: adds the options of the experiment.
         require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
         kept: glob patterns of the files that are the record of a run.
+        summary: reduces the values of a cell to those from which `findings` and `plot` compute, where all values of a run are too large for
+            its record; both get its result.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -87,6 +91,7 @@ class Sweep:
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
     require: Callable[[], object] = no_requirement
     kept: tuple[str, ...] = CELL_FILES
+    summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the options of all sweeps and those of the experiment."""
@@ -108,14 +113,41 @@ class Sweep:
 
     def results(self, folder: Path) -> dict[str, Any]:
         """Compute the findings from the finished cells."""
-        return self.findings(load_cells(folder))
+        return self.findings(self._loaded(folder))
+
+    def _loaded(self, folder: Path) -> dict[str, CellResult]:
+        found = load_cells(folder)
+        return found if self.summary is None else {name: _summarised(one, self.summary) for name, one in found.items()}
+
+    @contextmanager
+    def recorded(self, folder: Path) -> Iterator[Path]:
+        """Yield the folder with the `kept` files of a run; with a `summary` a temporary one with the reduced cells."""
+        if self.summary is None:
+            yield folder
+            return
+        with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
+            for one in self._loaded(folder).values():
+                write_cell(Path(reduced), one.cell, one.values, one.seconds)
+            yield Path(reduced)
 
     def figure(self, folder: Path) -> Path:
         """Draw the finished cells; raises InvalidValue if there are none."""
-        found = load_cells(folder)
+        found = self._loaded(folder)
         if not found:
             raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
         return saved(self.plot(found), folder)
+
+
+_SUMMARY = "is_summary"
+
+
+def _summarised(one: CellResult, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> CellResult:
+    """Return a cell with reduced values; the cell of a record has them already."""
+    if one.values.get(_SUMMARY):
+        return one
+    found = CellResult(one.cell, one.seconds, one.path)
+    vars(found)["values"] = summary(one.values) | {_SUMMARY: True}  # where the property keeps what it has read
+    return found
 
 
 def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:

@@ -105,7 +105,7 @@ def findings(found: Cells) -> dict[str, Any]:
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})
     whole = {(explorer, world) for explorer in EXPLORERS for world in WORLDS} <= set(tree)
-    whole = whole and len(next(iter(tree.values()))[0].seen["torso"]) >= TRANSITIONS
+    whole = whole and next(iter(tree.values()))[0].number("transitions") >= TRANSITIONS
     every = [(propagate, runs) for propagate, runs in forces.items() if set(runs) == set(tree)]
     return {
         "conditions": {_label(propagate, *key): row(group, ROW) for propagate, runs in forces.items() for key, group in runs.items()},
@@ -435,6 +435,6 @@ def _detector(axes: Any, runs: Runs) -> None:
 EXPERIMENT = Experiment(
     claim="three independent agents of torso and arms become interested in the table: they lean forward and touch it more and more often",
     source="paper 3.2 and 4.4, thesis 7.4",
-    method=Sweep(conditions, trial, findings, plot, seeds=6, add_options=add_options),
+    method=Sweep(conditions, trial, findings, plot, seeds=6, add_options=add_options, summary=measures.summary),
     claims=CLAIMS,
 )

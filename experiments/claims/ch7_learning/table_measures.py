@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from scipy.stats import spearmanr
 
 from experiments.kit.cells import CellResult
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
-from experiments.kit.learning.outcomes import goals_of, outcome_counts, tries_of, uncertain_in
+from experiments.kit.learning.outcomes import UNCERTAIN, goals_of, tries_of
 from experiments.kit.statistics import interval
 from experiments.kit.sweep import Cells, runs_by
 from mobee import Lattice, Model, World, box
@@ -98,9 +99,39 @@ def is_forward(q: Array) -> NDArray[np.bool_]:
     return bent
 
 
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Reduce the values of a trial to the numbers and counts from which the claims and the figure are computed.
+
+    Returns of each part: how often each action ended in each state, as indices in (S, A, S) and counts, its tries in the second half, and
+    the share of timeouts; of the arms the contact rate in windows, and in parts of the run; and hours of plant time.
+    """
+    seen = {part: values[f"seen_{part}"].astype(np.intp) for part in PARTS}
+    touch, forward = (np.array([values[f"{name}_{arm}"] for arm in ARMS], dtype=bool) for name in ("touch", "forward"))
+    count = touch.shape[1]
+    late, third, windows = slice(count // 2, None), count // 3, count // WINDOW
+    goals = np.array([goals_of(spaces()[arm], seen[arm]) for arm in ARMS])
+    found: dict[str, Any] = {
+        "transitions": count,
+        "touch_rate": touch[:, : windows * WINDOW].reshape(2, windows, WINDOW).mean(axis=(0, 2)),
+        "touch": float(touch[:, late].mean()),
+        "growth": float(touch[:, -third:].mean() - touch[:, :third].mean()),
+        "low_and_forward": float((low()[goals] & forward)[:, late].mean()),
+        "hours": float(max(values[f"ends_{part}"][-1] for part in PARTS)) / 3600.0,
+    }
+    for part, transitions in seen.items():
+        space = spaces()[part]
+        ends = np.zeros((*space.goals.shape, len(space)), dtype=np.uint16)
+        np.add.at(ends, tuple(transitions.T), 1)
+        at = np.flatnonzero(ends)
+        found |= {f"ends_at_{part}": at.astype(np.uint32), f"ends_{part}": ends.ravel()[at]}
+        found[f"late_tries_{part}"] = tries_of(space, transitions[late]).astype(np.uint16)
+        found[f"timeouts_{part}"] = float(1.0 - values[f"settled_{part}"].mean())
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of three agents; see the trial of table-discovery."""
+    """One run of three agents, from its `summary`."""
 
     result: CellResult
 
@@ -109,28 +140,32 @@ class Run:
         """The seed of agents and encoders."""
         return self.result.cell.seed
 
-    @cached_property
-    def seen(self) -> dict[str, Ints]:
-        """Each part's transitions, (T, 3)."""
-        return {part: self.result.values[f"seen_{part}"].astype(np.intp) for part in PARTS}
-
-    @cached_property
-    def tries(self) -> dict[str, Ints]:
-        """Tries of each part's actions, (S, A)."""
-        return {part: tries_of(spaces()[part], seen) for part, seen in self.seen.items()}
+    def number(self, name: str) -> float:
+        """Return a number of the summary."""
+        return float(self.result.values[name])
 
     @cached_property
     def ends(self) -> dict[str, Ints]:
         """How often each action of a part ended in each state, (S, A, S)."""
         found = {part: np.zeros((*spaces()[part].goals.shape, len(spaces()[part])), dtype=np.int32) for part in PARTS}
         for part, counts in found.items():
-            np.add.at(counts, tuple(self.seen[part].T), 1)
+            counts.ravel()[self.result.values[f"ends_at_{part}"]] = self.result.values[f"ends_{part}"]
         return found
+
+    @cached_property
+    def tries(self) -> dict[str, Ints]:
+        """Tries of each part's actions, (S, A)."""
+        return {part: ends.sum(axis=-1) for part, ends in self.ends.items()}
+
+    @cached_property
+    def late_tries(self) -> dict[str, Ints]:
+        """Tries of each part's actions in the second half, (S, A)."""
+        return {part: self.result.values[f"late_tries_{part}"].astype(np.intp) for part in PARTS}
 
     @cached_property
     def outcomes(self) -> dict[str, Ints]:
         """The number of states in which each action of a part ended, (S, A)."""
-        return {part: outcome_counts(spaces()[part], seen) for part, seen in self.seen.items()}
+        return {part: (ends > 0).sum(axis=-1) for part, ends in self.ends.items()}
 
     @cached_property
     def outcome_numbers(self) -> Ints:
@@ -138,71 +173,62 @@ class Run:
         every = np.concatenate([self.outcomes[part].ravel() for part in PARTS])
         return every[every > 0]
 
-    def of_arms(self, name: str) -> Array:
-        """Return a recorded array of both arms' actions, (2, T)."""
-        return np.array([self.result.values[f"{name}_{arm}"] for arm in ARMS])
-
-    @cached_property
-    def late(self) -> slice:
-        """The second half of the transitions."""
-        return slice(len(self.seen["torso"]) // 2, None)
-
     @property
     def touch(self) -> float:
         """The share of the arms' actions that ended in contact with the table, in the second half."""
-        return float(self.of_arms("touch")[:, self.late].mean())
+        return self.number("touch")
 
     @property
     def touch_rate(self) -> Array:
         """The share of actions that ended in contact, in windows of WINDOW transitions of each arm."""
-        touch = self.of_arms("touch")
-        count = touch.shape[1] // WINDOW
-        rate: Array = touch[:, : count * WINDOW].reshape(2, count, WINDOW).mean(axis=(0, 2))
+        rate: Array = self.result.values["touch_rate"]
         return rate
 
     @property
     def growth(self) -> float:
         """The contact rate of the last third minus that of the first."""
-        touch = self.of_arms("touch")
-        third = touch.shape[1] // 3
-        return float(touch[:, -third:].mean() - touch[:, :third].mean())
+        return self.number("growth")
 
     @property
     def torso_forward(self) -> float:
         """Mean tries of the torso's actions that lean forward over those of its other actions, in the second half."""
-        tries = tries_of(spaces()["torso"], self.seen["torso"][self.late])
-        goals = spaces()["torso"].goals
+        tries, goals = self.late_tries["torso"], spaces()["torso"].goals
         forward = (goals >= FORWARD_STATES.start) & (goals < FORWARD_STATES.stop)
         return float(tries[forward].mean() / tries[~forward].mean())
 
     @property
     def low_and_forward(self) -> float:
         """The share of the arms' actions with a low goal that ended while the torso was bent, in the second half."""
-        goals = np.array([goals_of(spaces()[arm], self.seen[arm]) for arm in ARMS])
-        both = low()[goals] & self.of_arms("forward").astype(bool)
-        return float(both[:, self.late].mean())
+        return self.number("low_and_forward")
 
     @property
     def arms_low(self) -> float:
         """Mean tries of the arms' actions with a low goal over those of the other actions, in the second half."""
-        tries = np.sum([tries_of(spaces()[arm], self.seen[arm][self.late]) for arm in ARMS], axis=0)
+        tries = np.sum([self.late_tries[arm] for arm in ARMS], axis=0)
         aims_low = low()[spaces()[ARMS[0]].goals]
         return float(tries[aims_low].mean() / tries[~aims_low].mean())
 
     @property
     def half_failing(self) -> int:
         """The number of actions of both arms that failed in 10 to 90 % of their tries."""
-        return sum(uncertain_in(spaces()[arm], self.seen[arm]) for arm in ARMS)
+        return sum(self._uncertain(arm) for arm in ARMS)
+
+    def _uncertain(self, arm: str) -> int:
+        goals = np.maximum(spaces()[arm].goals, 0)
+        reached = np.take_along_axis(self.ends[arm], goals[..., None], axis=-1)[..., 0]
+        with np.errstate(invalid="ignore"):
+            failed = 1.0 - reached / self.tries[arm]
+        return int(((failed > UNCERTAIN[0]) & (failed < UNCERTAIN[1])).sum())
 
     @property
     def timeouts(self) -> dict[str, float]:
         """The share of a part's actions that timed out."""
-        return {part: float(1.0 - self.result.values[f"settled_{part}"].mean()) for part in PARTS}
+        return {part: self.number(f"timeouts_{part}") for part in PARTS}
 
     @property
     def hours(self) -> float:
         """Hours of plant time until the slowest agent was finished."""
-        return float(max(self.result.values[f"ends_{part}"][-1] for part in PARTS)) / 3600.0
+        return self.number("hours")
 
 
 Runs = Mapping[tuple[str, str], list[Run]]  # by explorer and world

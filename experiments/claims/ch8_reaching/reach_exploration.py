@@ -109,6 +109,13 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     return learn(agent, problems, settings["checkpoints"], REPETITIONS, {"grid": problems})
 
 
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Reduce the values of a trial to those from which the claims and the figure are computed: times and actions to their means."""
+    kept = {name: values[name] for name in ("rewards_grid", "states_grid", "failures")}
+    smaller = {"reach_state": values["reach_state"].astype(np.int8), "problem": values["problem"].astype(np.uint8)}
+    return kept | smaller | {"hours": float(values["duration"].sum()) / 3600.0, "mean_actions": float(values["actions"].mean())}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
     """The N runs of one strategy, by seed: values of their cells, and the computing time of each, s."""
@@ -169,11 +176,11 @@ class Runs:
 
     def hours(self) -> Array:
         """Return the robot time of exploration, (N,) h."""
-        return np.array([float(one["duration"].sum()) / 3600.0 for one in self.values])
+        return np.array([float(one["hours"]) for one in self.values])
 
     def actions(self) -> Array:
         """Return the mean number of actions per problem-try, (N,)."""
-        return np.array([float(one["actions"].mean()) for one in self.values])
+        return np.array([float(one["mean_actions"]) for one in self.values])
 
 
 def _shares(states: Ints) -> Array:
@@ -495,6 +502,6 @@ EXPERIMENT = Experiment(
     claim="of the three published exploration strategies, intrinsic motivation yields the best scores, and the only runs that agree on "
     "where to reach from",
     source="thesis 8.4, figs. 8.2-8.8",
-    method=Sweep(conditions, trial, findings, plot, seeds=20, add_options=add_options),
+    method=Sweep(conditions, trial, findings, plot, seeds=20, add_options=add_options, summary=summary),
     claims=CLAIMS,
 )

@@ -10,6 +10,7 @@ from experiments.kit import raw_records
 from experiments.kit.cells import CELL_FILES, Cell, load_cells, write_cell
 from experiments.kit.raw_records import keep_record, opened_record, record_path
 from experiments.kit.run_folder import new_run
+from experiments.kit.sweep import Sweep
 from mobee.errors import InvalidValue
 
 
@@ -60,3 +61,19 @@ def test_all_raw_records_together_are_small_enough_for_the_repository():
 def test_a_record_without_an_entry_in_the_table_is_a_difference(run):
     keep_record("reward-decay", run, run / "versions.json", CELL_FILES)
     assert claims_table.all_differences({}) == ["reward-decay.zip: a raw record without an entry in the table"]
+
+
+def test_the_record_of_a_sweep_with_a_summary_holds_the_reduced_cells_and_gives_the_same_results(run):
+    def findings(found):
+        return {name: one.values["twice"] for name, one in found.items()}
+
+    def twice(values):
+        return {"twice": 2 * values["tries"]}
+
+    sweep = Sweep(lambda arguments: [], lambda settings, seed: {}, findings, lambda found: None, summary=twice)
+    expected = {"curious-s0": 0, "curious-s1": 2}
+    with sweep.recorded(run) as folder:
+        keep_record("reward-decay", run, run / "versions.json", sweep.kept, folder=folder)
+    with opened_record("reward-decay") as record:
+        assert sweep.results(record) == sweep.results(run) == expected
+        assert all("tries" not in cell.values for cell in load_cells(record).values())

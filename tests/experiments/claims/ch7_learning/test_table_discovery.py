@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from experiments.claims.ch7_learning.table_discovery import trial
 from experiments.claims.ch7_learning.table_measures import (
+    WINDOW,
     Judged,
+    Run,
     agreement,
     at_second_peak,
     autocorrelation,
@@ -15,8 +18,12 @@ from experiments.claims.ch7_learning.table_measures import (
     low_goals,
     near_table,
     second_peak,
+    spaces,
+    summary,
 )
+from experiments.kit.cells import Cell, load_cells, write_cell
 from experiments.kit.learning.arm import robot
+from experiments.kit.learning.outcomes import outcome_counts, tries_of, uncertain_in
 
 RUNS, WINDOWS, LONGEST = 6, 300, 100
 PERIOD = 30
@@ -119,3 +126,18 @@ def test_low_goals_are_the_same_for_both_arms():
     left, right = low_goals("left_arm"), low_goals("right_arm")
     assert (left == right).all()
     assert 20 < left.sum() < 40
+
+
+def test_the_summary_of_a_run_holds_what_its_transitions_do(tmp_path):
+    values = trial({"explorer": "curious", "world": "table", "propagate": "tree", "transitions": 260}, 0)
+    write_cell(tmp_path, Cell("a", 0), summary(values), 1.0)
+    run = Run(load_cells(tmp_path)["a"])
+    for part, space in spaces().items():
+        seen = values[f"seen_{part}"].astype(int)
+        assert np.array_equal(run.tries[part], tries_of(space, seen)) and run.tries[part].sum() == 260
+        assert np.array_equal(run.late_tries[part], tries_of(space, seen[130:]))
+        assert np.array_equal(run.outcomes[part], outcome_counts(space, seen))
+        assert run.timeouts[part] == pytest.approx(1.0 - values[f"settled_{part}"].mean())
+    assert run.half_failing == sum(uncertain_in(spaces()[arm], values[f"seen_{arm}"].astype(int)) for arm in ("left_arm", "right_arm"))
+    touch = np.array([values["touch_left_arm"], values["touch_right_arm"]])
+    assert run.touch == pytest.approx(touch[:, 130:].mean()) and run.touch_rate[0] == pytest.approx(touch[:, :WINDOW].mean())

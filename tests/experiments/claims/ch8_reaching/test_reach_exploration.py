@@ -44,8 +44,8 @@ def values(seed: int, scores, favourites: int, failures: int, hours: float):
         "states_grid": states,
         "problem": np.arange(tries) % TARGETS,
         "reach_state": rng.integers(min(STATES, 40 * favourites), size=tries),
-        "actions": np.ones(tries),
-        "duration": np.full(tries, hours * 3600.0 / tries),
+        "mean_actions": 1.0,
+        "hours": hours,
         "failures": fails,
     }
 
