@@ -23,12 +23,13 @@ from services.recorder.reader import Recording
 _NO_PAGE = 'a page needs rerun-sdk: pip install "mobee[viz]"'
 STORY = "story.jsonl"  # of a monitor, in the folder of a run
 
-_NOTES = """RUN is the folder of a run of `mobee launch`, or one of its files messages-*.mcap.
-Without options: the page shows what it showed during the run, with a time line
-where the run had a monitor, else by playing the recorded messages to a new one.
---into: the service runs again in lockstep on the recorded messages, and all
-that it says is compared. --diff: the runs are compared tick by tick. Exit code
-of these two: 0 equal to the last bit, 1 different, 2 they cannot be compared."""
+_NOTES = """RUN is the folder of a run of `mobee launch`, or one of its files
+messages-*.mcap. Without options: the page shows what it showed during the run,
+with a time line where the run had a monitor, else by playing the recorded
+messages to a new one. --into: the service runs again in lockstep on the
+recorded messages, and all that it says is compared. --diff: the runs are
+compared tick by tick. Exit code of these two: 0 equal to the last bit,
+1 different, 2 they cannot be compared."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
