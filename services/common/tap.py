@@ -5,17 +5,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import zenoh
+from msgspec import Struct
 from zenoh.handlers import Callback, RingChannel
 
 from services.common.listener import stay_known
 
 
-@dataclass(frozen=True, slots=True)
-class Raw:
+class Raw(Struct, frozen=True, gc=False):
     """A message as it is on the bus; times in ns since 1970."""
 
     key: str

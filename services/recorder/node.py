@@ -23,7 +23,7 @@ from services.recorder.config import Config
 from services.recorder.files import Channel, Files
 from services.recorder.views import Views
 
-PERIOD = 0.05  # s between two looks at what has arrived: a message is received when it is seen
+PERIOD = 0.1  # s between two looks at what has arrived: a message is received when it is seen
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
@@ -73,7 +73,7 @@ class RecorderNode:
     def be_nice(self) -> None:
         """Let the main thread yield the processor to all services; called when the start, on which they wait, is over.
 
-        Not in lockstep, where no message is dropped, so that the others would have to wait for a recorder that gets no processor.
+        Not in lockstep, where no tick can be late, but the recording of a run can be played again only if nothing is lost.
         """
         if self._service.locked:
             return
@@ -99,11 +99,11 @@ class RecorderNode:
             self._lost += len(arrived)
             return
         try:
-            self._require_space()
-            self._write(arrived)
-            if now >= self._flushed + FLUSH_PERIOD:
+            if self._trouble or now >= self._flushed + FLUSH_PERIOD:
                 self._flushed = now
+                self._require_space()
                 self._files.flush()
+            self._write(arrived)
         except OSError as error:
             self._lost += len(arrived)
             self._fail(f"nothing is recorded: {error.strerror or error}")

@@ -101,19 +101,19 @@ class Transforms:
     def __init__(self, links: Sequence[str]) -> None:
         layout = _Layout()
         layout.count(len(links))
-        self._places = []  # of each stamp, and of each pose
+        stamps, poses = [], []
         for name in links:
-            stamp = layout.stamp()
+            stamps.append(layout.stamp())
             layout.text(ROOT_FRAME)
             layout.text(name)
-            self._places.append((stamp, layout.reserve(8, 7)))
-        self._data = layout.data
+            poses.append(layout.reserve(8, 7))
+        self._stamps = np.array(stamps)[:, None] + np.arange(8)  # places of the bytes
+        self._poses = np.array(poses)[:, None] + np.arange(56)
+        self._data = np.frombuffer(layout.data, dtype=np.uint8)
 
     def encode(self, t: int, positions: Array, quaternions: Array) -> bytes:
         """Return the message at time t [ns of the robot]; positions (L, 3) m, quaternions (L, 4) wxyz."""
         rows = np.column_stack([positions, quaternions[:, [1, 2, 3, 0]]]).astype("<f8")
-        stamp = struct.pack("<iI", *divmod(t, 1_000_000_000))
-        for (begin, pose), row in zip(self._places, rows, strict=True):
-            self._data[begin : begin + 8] = stamp
-            self._data[pose : pose + 56] = row.tobytes()
-        return bytes(self._data)
+        self._data[self._stamps] = np.frombuffer(struct.pack("<iI", *divmod(t, 1_000_000_000)), dtype=np.uint8)
+        self._data[self._poses] = rows.view(np.uint8)
+        return self._data.tobytes()
