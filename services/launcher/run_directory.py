@@ -39,7 +39,7 @@ def _new_folder(runs: Path, name: str) -> Path:
     for number in range(1, 100):
         folder = runs / (name if number == 1 else f"{name}-{number}")
         try:
-            folder.mkdir()
+            folder.mkdir(mode=0o700)  # it holds the recording of all messages, and the key of the page
         except FileExistsError:
             continue
         return folder.resolve()

@@ -63,6 +63,7 @@ def test_the_run_folder_says_what_was_run(launch: Launch, endpoint: str) -> None
     assert config["run_dir"] == str(folder)
     assert tomllib.loads((folder / "scenario.toml").read_text())["services"]["one"] == {"module": "tests.services.toy_service", **config}
     assert "python" in tomllib.loads((folder / "versions.toml").read_text())
+    assert folder.stat().st_mode & 0o077 == 0
     assert "ready as" in (folder / "logs" / "one.log").read_text()
 
 
