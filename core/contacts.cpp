@@ -25,15 +25,65 @@ void push(Wrench& wrench, Vec3 force, Vec3 point) {
 
 bool is_zero(Vec3 v) { return v.x == 0.0 && v.y == 0.0 && v.z == 0.0; }
 
+// The sum over the motors of the squared changes of a contact's depth when each moves by the angle 1 of the law [m^2]; only the joints
+// count that move one of the two links.  `change` (motors,): all 0 before and after.
+double squared_lever(const Robot& robot, const Frame* frames, const Contact& contact, Array<double>& change) {
+    const std::int64_t sides[] = {contact.first_link, contact.second_link};
+    const std::int64_t common = contact.second_link < 0 ? 0 : robot.common[sides[0] * robot.links + sides[1]];
+    double sign = 1.0, squares = 0.0;
+    for (const std::int64_t side : sides) {
+        for (std::int64_t link = side; link > common; link = robot.joint[link - 1].parent) {
+            const Joint& joint = robot.joint[link - 1];
+            const Vec3 axis = turn(frames[link], joint.axis), arm = contact.touch.point - move(frames[link], joint.point);
+            const double along = sign * dot(joint.slides ? axis : cross(axis, arm), contact.touch.normal);
+            for (std::int64_t k = link - 1; k < robot.drives * robot.joints; k += robot.joints) {
+                double& of_motor = change[robot.motor[k]];
+                const double more = robot.travel[k] * along;
+                squares += more * (2.0 * of_motor + more);
+                of_motor += more;
+            }
+        }
+        sign = -1.0;
+    }
+    for (const std::int64_t side : sides) {
+        for (std::int64_t link = side; link > common; link = robot.joint[link - 1].parent) {
+            for (std::int64_t k = link - 1; k < robot.drives * robot.joints; k += robot.joints) change[robot.motor[k]] = 0.0;
+        }
+    }
+    return squares;
+}
+
+constexpr double lever = 0.5;  // m, of the contacts for which the default gain was tuned; `LEVER` of mobee/robot/robot.py
+
+// The share of a contact in the depth of all contacts of fields between the same two links; all free objects count as one link.
+double share_of(const Array<Contact>& contacts, const Contact& contact) {
+    double total = 0.0;
+    for (const Contact& other : contacts) {
+        const bool same = other.first_link == contact.first_link && other.second_link == contact.second_link;
+        const bool mirrored = other.first_link == contact.second_link && other.second_link == contact.first_link;
+        if (other.kind == field_contact && (same || mirrored)) total += other.depth;
+    }
+    return contact.depth / total;
+}
+
+// The force of a contact of fields: depth * normal.  With a least lever it makes a push by J^T the damped inverse of J, times lever^2, and
+// the contacts of two links together push as one.
+Vec3 push_of(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, const Contact& contact, Array<double>& change) {
+    const Vec3 force = contact.depth * contact.touch.normal;
+    if (robot.least_lever <= 0.0) return force;
+    const double squares = squared_lever(robot, frames, contact, change) + robot.least_lever * robot.least_lever;
+    return share_of(contacts, contact) * lever * lever / squares * force;
+}
+
 // Sum in the order of the contacts, so that the result does not depend on the order in which they were found.
-bool push_links(const Array<Contact>& contacts, Array<Wrench>& wrench) {
+bool push_links(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, Pushes& pushes) {
     bool any = false;
     for (const Contact& contact : contacts) {
         if (contact.kind != field_contact) continue;
         any = true;
-        const Vec3 force = contact.depth * contact.touch.normal;
-        push(wrench[contact.first_link], force, contact.touch.point);
-        if (contact.second_link >= 0) push(wrench[contact.second_link], -force, contact.touch.point);
+        const Vec3 force = push_of(robot, frames, contacts, contact, pushes.change);
+        push(pushes.wrench[contact.first_link], force, contact.touch.point);
+        if (contact.second_link >= 0) push(pushes.wrench[contact.second_link], -force, contact.touch.point);
     }
     return any;
 }
@@ -107,8 +157,9 @@ void sort_contacts(const Scene& scene, Contacts& contacts) {
     }
 }
 
-void project(const Robot& robot, const Frame* frames, const Array<Contact>& found, bool cut, Array<Wrench>& wrench, double* torque) {
-    if (!contacts::push_links(found, wrench)) return;
+void project(const Robot& robot, const Frame* frames, const Array<Contact>& found, bool cut, Pushes& pushes, double* torque) {
+    if (!contacts::push_links(robot, frames, found, pushes)) return;
+    Array<Wrench>& wrench = pushes.wrench;
     // Accumulate over the links from the tips to the base.
     for (std::int64_t link = robot.joints; link > 0; --link) {
         const Vec3 force = wrench[link].force, moment = wrench[link].moment;

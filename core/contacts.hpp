@@ -15,6 +15,17 @@ struct Wrench {
     Vec3 force, moment;
 };
 
+// Buffers of `project`: of the links, and of the motors; all 0 between two calls.
+struct Pushes {
+    Array<Wrench> wrench;
+    Array<double> change;
+
+    void fit(const Robot& robot) {
+        wrench.resize(robot.links);
+        change.resize(robot.motors);
+    }
+};
+
 // The depth by which a pair overlaps, see `overlap`.
 double overlap_of(const Scene& scene, Placed& placed, Pair pair, Touch& touch);
 
@@ -34,9 +45,10 @@ struct Contacts {
 // Sort contacts by kind, first and second.
 void sort_contacts(const Scene& scene, Contacts& contacts);
 
-// Add the sum of J^T (depth * normal) over the contacts of fields (thesis eq. 5.11) to `torque` (motors,).
+// Add the sum of J^T (depth * normal) over the contacts of fields (thesis eq. 5.11) to `torque` (motors,); of a robot with a least lever
+// that of lever^2 J^T / (|J|^2 + least_lever^2) (depth * normal).
 //
-// `cut`: a contact acts only on the motors of its own part, as in the original program.  `wrench` (links,): all 0 before and after.
-void project(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, bool cut, Array<Wrench>& wrench, double* torque);
+// `cut`: a contact acts only on the motors of its own part, as in the original program.
+void project(const Robot& robot, const Frame* frames, const Array<Contact>& contacts, bool cut, Pushes& pushes, double* torque);
 
 }  // namespace mobee

@@ -12,7 +12,7 @@ struct Worker {
     Placed placed;
     Pairs pairs;
     Contacts contacts;
-    Array<Wrench> wrench;
+    Pushes pushes;
     Rows rows;
 };
 
@@ -52,7 +52,7 @@ namespace evaluation {
 
 void fit(Worker& worker, const Robot& robot) {
     worker.placed.fit(robot);
-    worker.wrench.resize(robot.links);
+    worker.pushes.fit(robot);
 }
 
 // Find the contacts of one pose q (motors,), sorted, and their projection to the motors, `torque` (motors,).
@@ -69,7 +69,7 @@ const Array<Contact>& contacts_at(const Scene& scene, const double* q, const Han
     find_contacts(scene, hands, placed, worker.pairs.left, found);
     if (found.size() == 0) return found;
     sort_contacts(scene, worker.contacts);
-    project(robot, placed.links.frame.data(), found, cut, worker.wrench, torque);
+    project(robot, placed.links.frame.data(), found, cut, worker.pushes, torque);
     return found;
 }
 

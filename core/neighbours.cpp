@@ -42,7 +42,7 @@ struct Neighbours {
     Contacts contacts;
     Array<Pair> close;     // listed pairs to be tested
     Array<Contact> still;  // contacts of pairs of which neither volume has moved
-    Array<Wrench> wrench;
+    Pushes pushes;
     Rows rows;
 };
 
@@ -178,7 +178,7 @@ std::int64_t find(Neighbours& near, const double* q) {
 
 void project_contacts(Neighbours& near, double* torque) {
     sort_contacts(*near.scene, near.contacts);
-    project(*near.scene->robot, near.placed.links.frame.data(), near.contacts.found, near.cut, near.wrench, torque);
+    project(*near.scene->robot, near.placed.links.frame.data(), near.contacts.found, near.cut, near.pushes, torque);
 }
 
 const Contact& contact(const Neighbours& near, std::int64_t index) { return near.contacts.found[index]; }
@@ -202,7 +202,7 @@ MOBEE_CALL void mobee_neighbours_enter(Neighbours* near, const Scene* scene, con
     near->pause = was_of_use || first ? 0 : following::min_served;  // in a moving world lists are soon out of date
     near->placed.fit(*scene->robot);
     near->motion.fit(*scene->robot);
-    near->wrench.resize(scene->robot->links);
+    near->pushes.fit(*scene->robot);
 }
 
 // Find the contacts in each pose of q (poses, motors) and their torques (poses, motors).  Return the number of contacts.

@@ -22,6 +22,8 @@ struct RobotTables {
     const unsigned char* tested;                          // (shapes, shapes)
     const Vec3* corner;                                   // (corners,)
     const std::int32_t *edge_start, *edge;                // (corners + 1,), (edges,)
+    const double* travel;                                 // (drives, joints)
+    double least_lever;
 };
 
 namespace robots {
@@ -55,6 +57,8 @@ void set_joints(Robot& robot, const RobotTables& from) {
     robot.motor = Array<std::int64_t>(from.motor, from.drives * from.joints);
     robot.scale = Array<double>(from.scale, from.drives * from.joints);
     robot.offset = Array<double>(from.offset, from.joints);
+    robot.travel = Array<double>(from.travel, from.drives * from.joints);
+    robot.least_lever = from.least_lever;
 }
 
 // Compute the distance of every joint from the one before, and the largest distance of every shape's points from the joint of its link.

@@ -77,6 +77,8 @@ struct Robot {
     Array<double> scale;        // (drives, joints): motion of the joint per motion of the motor
     Array<double> offset;       // (joints,)
     Array<double> span;         // (joints,): distance of a joint from the one before [m]
+    Array<double> travel;       // (drives, joints): motion of the joint when the motor moves by the angle 1 of the law
+    double least_lever = 0.0;   // m; above 0: contacts push by the motion that undoes them, see `push_of`
 
     // Shapes stand in slots, cluster by cluster; each cluster begins at a multiple of `lanes`, and slots between them hold nothing.
     Array<Shape> shape;            // (slots,)

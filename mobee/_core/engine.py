@@ -67,7 +67,8 @@ class _RobotTables(ctypes.Structure):
         *((name, INTEGER) for name in ("motors", "joints", "drives", "shapes", "own_shapes", "clusters", "corners", "edges")),
         *((name, ADDRESS) for name in ("parent", "slides", "border", "axis", "point", "motor", "scale", "offset")),
         *((name, ADDRESS) for name in ("volume", "link", "name", "field", "meets_world", "cluster", "tested")),
-        *((name, ADDRESS) for name in ("corner", "edge_start", "edge")),
+        *((name, ADDRESS) for name in ("corner", "edge_start", "edge", "travel")),
+        ("least_lever", REAL),
     )
 
 
@@ -127,9 +128,9 @@ _span = function("span", REAL, REAL, REAL, INTEGER, ADDRESS)
 _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
-def robot(counts: Mapping[str, int], arrays: Mapping[str, NDArray[Any]]) -> Handle:
+def robot(numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]) -> Handle:
     """Return a robot of the core, made from tables that the core copies; see mobee/model/robot_tables.py."""
-    tables = _RobotTables(**counts, **{name: address(array) for name, array in arrays.items()})
+    tables = _RobotTables(**numbers, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 

@@ -16,6 +16,7 @@ from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.contact import ContactTable
 from mobee.model.kinematics import link_transforms, point_jacobian
+from mobee.model.levers import push_factors
 from mobee.model.snapshot import ATTACHED, NO_HANDS, OBSTACLE, TARGET, Hands, Snapshot
 from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
@@ -78,9 +79,12 @@ class FclEngine:
 
     def _projection(self, transforms: Array, table: ContactTable, cut: bool) -> Array:
         total = np.zeros(len(self.robot.motor_table))
-        for row in np.flatnonzero(table.kind == 1):
-            push = table.depth[row] * table.normal[row]
-            for link, force in ((int(table.first_link[row]), push), (int(table.second_link[row]), -push)):
+        rows = np.flatnonzero(table.kind == 1)
+        both = np.stack([table.first_link[rows], table.second_link[rows]], axis=1)
+        factors = push_factors(self.robot, transforms, both, table.depth[rows], table.point[rows], table.normal[rows])
+        for row, links, factor in zip(rows.tolist(), both.tolist(), factors.tolist(), strict=True):
+            push = factor * table.depth[row] * table.normal[row]
+            for link, force in zip(links, (push, -push), strict=True):
                 if link > 0:
                     columns = self._own_columns(link) if cut else slice(None)
                     jacobian = point_jacobian(self.robot, transforms, link, table.point[row])[:3, columns]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.volumes import VOLUME, Volumes, convex_row, volume_row
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import LinkPair, Robot, Shape
 
 MANY_CORNERS = 32  # of a hull: with more, the core searches the farthest corner along the edges
@@ -54,14 +55,16 @@ class RobotTables:
     corner: Array  # (V, 3) m, in the axes of their hull
     edge_start: NDArray[np.int32]  # (V + 1,) where the edges of each corner begin
     edge: NDArray[np.int32]  # the corner of the same hull that each edge leads to
+    travel: Array  # (K, J) motion of the joint when the motor moves by the angle 1 of the law
+    least_lever: float  # m
 
-    def for_core(self) -> tuple[dict[str, int], dict[str, NDArray[Any]]]:
-        """Return counts and arrays as `mobee._core.engine.robot` takes them."""
+    def for_core(self) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
+        """Return numbers and arrays as `mobee._core.engine.robot` takes them."""
         integers = ("parent", "slides", "border", "motor", "link", "name", "field", "meets_world", "cluster")
-        others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge")
+        others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge", "travel")
         arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.int64) for name in integers}
         arrays |= {name: np.ascontiguousarray(getattr(self, name)) for name in others}
-        counts = {
+        numbers = {
             "motors": self.motors,
             "joints": len(self.parent),
             "drives": len(self.motor),
@@ -70,8 +73,9 @@ class RobotTables:
             "clusters": len(self.cluster) - 1,
             "corners": len(self.corner),
             "edges": len(self.edge),
+            "least_lever": self.least_lever,
         }
-        return counts, arrays
+        return numbers, arrays
 
 
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
@@ -106,6 +110,8 @@ def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
         corner=corner,
         edge_start=edges[0],
         edge=edges[1],
+        travel=scale * motor_units(robot)[motor],
+        least_lever=robot.least_lever,
     )
 
 

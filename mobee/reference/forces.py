@@ -19,7 +19,7 @@ from mobee.control.gains import Gains
 from mobee.model.contact import Contact
 from mobee.reference.kinematics import joint_column, joints_to, link_frames, marker_jacobian
 from mobee.robot.motor_units import limit_zones, motor_units
-from mobee.robot.robot import Robot
+from mobee.robot.robot import LEVER, Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,18 +146,37 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
     """Return the sum in eq. 5.11: J(g)^T f_g over both sides g of every contact of fields, f_g = +-depth * normal; (n,) in m^2/rad.
 
     `propagate`: "tree": a contact acts on all motors down to the base; "part": on those of the part that touches, as in the original
-    program. `Model` and python-fcl compute the depths, each by its own method.
+    program. `Model` and python-fcl compute the depths, each by its own method. For a robot with a least lever f_g is multiplied by
+    `push_factor`.
     """
-    frames, per_joint = link_frames(robot, q), np.zeros(len(robot.joints))
+    frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
         if contact.kind == "field":
-            force = contact.depth * contact.normal
+            force = contact.depth * contact.normal * push_factor(robot, frames, contact, contacts)
             for link, push in ((contact.first_link, force), (contact.second_link, -force)):
                 for j in joints_to(robot, link) if propagate == "tree" else joints_of_part(robot, link):
                     per_joint[j] += joint_column(robot, frames, j, contact.point)[:3] @ push
     matrix, _ = robot.coupling
     per_motor: Array = per_joint @ matrix
     return per_motor
+
+
+def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
+    """Return 1; for a robot with a least lever, LEVER^2 / (|J|^2 + least_lever^2) times the contact's share in the depth between its links.
+
+    J is the change of the depth when each motor moves by 1 rad of the law. With this factor J^T pushes along the smallest motion
+    that undoes the contact, whatever its lever, and the contacts between two links push as one.
+    """
+    if robot.least_lever == 0.0:
+        return 1.0
+    links = {contact.first_link, contact.second_link}
+    together = sum(one.depth for one in contacts if one.kind == "field" and {one.first_link, one.second_link} == links)
+    change = np.zeros(len(robot.motors))
+    for link, sign in ((contact.first_link, 1.0), (contact.second_link, -1.0)):
+        for j in joints_to(robot, link):
+            change += sign * robot.coupling[0][j] * (joint_column(robot, frames, j, contact.point)[:3] @ contact.normal)
+    squares = float(np.sum((change * motor_units(robot)) ** 2))
+    return contact.depth / together * LEVER**2 / (squares + robot.least_lever**2)
 
 
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:

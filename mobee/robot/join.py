@@ -86,6 +86,7 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
         bodies=one_a_link(mass for body in bodies for mass in body.bodies),
         visuals=tuple(visual for body in bodies for visual in body.visuals),
         cameras={key: camera for body in bodies for key, camera in body.cameras.items()},
+        least_lever=max(body.least_lever for body in bodies),
     )
 
 

@@ -17,6 +17,7 @@ from mobee.robot.visual import Camera, Visual
 
 ShapeKind = Literal["sphere", "capsule", "cylinder", "box", "convex"]
 LinkPair = frozenset[int]
+LEVER = 0.5  # m, of the contacts for which the default gains were tuned: the length of the iCub's arm
 T = TypeVar("T")
 
 
@@ -144,6 +145,8 @@ class Robot:
         bodies: masses, at most one for each link, in the order of the links; () if the file has none.
         visuals: what is drawn of the links, if it is not their solids.
         cameras: those that the file names, by name; see `mobee.robot.cameras`.
+        least_lever: m; 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so one with a short lever hardly pushes. Above 0:
+            by LEVER^2 J^T / (|J|^2 + least_lever^2), where |J| is the lever of the contact, see `mobee.model.levers`.
     """
 
     name: str
@@ -162,6 +165,7 @@ class Robot:
     bodies: tuple[Body, ...] = ()
     visuals: tuple[Visual, ...] = ()
     cameras: Mapping[str, Camera] = field(default_factory=dict)
+    least_lever: float = 0.0
 
     @cached_property
     def motors(self) -> tuple[str, ...]:

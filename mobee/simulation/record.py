@@ -15,13 +15,14 @@ from mobee.robot.robot import Robot
 
 _WITHOUT_EFFECT = ("where", "untested", "visuals", "cameras")  # fields of a robot that change nothing that it does
 _APPEARANCE = ("name", "color")  # fields of a world object; the name is its key
-_ADDED_LATER = ("zone_ends_at_home",)  # fields of a motor that are left out if False, so that robots keep their earlier digests
+_ADDED_LATER = ("zone_ends_at_home", "least_lever")  # fields of a motor or robot that are left out if 0, so that robots keep their digests
 DIGITS = 9  # decimals of lengths and angles: the same file read on another machine gives the same digest
 
 
 def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
     """Return the robot's name and digest, the world's objects as they are now, and `more`: options, and dataclasses of numbers."""
-    content = {entry.name: _plain(getattr(robot, entry.name)) for entry in fields(robot) if entry.name not in _WITHOUT_EFFECT}
+    held = {entry.name: getattr(robot, entry.name) for entry in fields(robot) if entry.name not in _WITHOUT_EFFECT}
+    content = {name: _plain(value) for name, value in held.items() if name not in _ADDED_LATER or value}
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
     objects = {
         name: {entry.name: _plain(getattr(item, entry.name)) for entry in fields(item) if entry.name not in _APPEARANCE}

@@ -14,6 +14,7 @@ from mobee.control import Forces
 from mobee.control.forces import LARGEST_FORCE, published_terms
 from mobee.control.terms import Term, valid_terms
 from mobee.model.contact import KINDS, ContactTable
+from mobee.model.levers import push_factors
 from mobee.model.pose import Pose
 from mobee.model.snapshot import Hands, Snapshot
 from mobee.robot.robot import Robot
@@ -97,15 +98,19 @@ class PublishedContacts:
         self._pose, self._contacts = pose, contacts
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return the contact table, and the sum of J^T (depth * normal) over the contacts of fields, (1, n)."""
+        """Return the contact table, and the projection of the contacts of fields, (1, n), see `Pose.projection`."""
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):
             numbers.append((0, KINDS.index(contact.kind), 2 * at, 2 * at + 1, contact.first_link, contact.second_link))
             reals.append([contact.depth, *contact.normal, *contact.point])
-            if contact.kind == "field":
-                push, point = contact.depth * np.array(contact.normal), np.array(contact.point)
-                for link, sign in ((contact.first_link, 1.0), (contact.second_link, -1.0)):
-                    if link >= 0:
-                        projection[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
+        fields = [contact for contact in self._contacts if contact.kind == "field"]
+        links = np.array([(contact.first_link, contact.second_link) for contact in fields], dtype=np.intp).reshape(-1, 2)
+        depths = np.array([contact.depth for contact in fields])
+        points, normals = (np.array([getattr(contact, what) for contact in fields]).reshape(-1, 3) for what in ("point", "normal"))
+        pushes = (push_factors(self._pose.robot, self._pose.transforms, links, depths, points, normals) * depths)[:, None] * normals
+        for pair, push, point in zip(links.tolist(), pushes, points, strict=True):
+            for link, sign in zip(pair, (1.0, -1.0), strict=True):
+                if link >= 0:
+                    projection[0] += sign * push @ self._pose.point_jacobian(link, point)[:3]
         names = tuple(name for contact in self._contacts for name in (contact.first, contact.second))
         return ContactTable(names, (), (np.array(numbers, dtype=np.int64).reshape(-1, 6), np.array(reals).reshape(-1, 7))), projection

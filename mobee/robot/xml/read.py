@@ -78,6 +78,7 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
         bodies=one_a_link(draft.bodies),
         visuals=tuple(draft.visuals),
         cameras=finished_cameras(draft),
+        least_lever=root.positive("leastLever") if "leastLever" in root.attributes else 0.0,
     )
 
 
@@ -120,7 +121,7 @@ MOST = {
 ROOT = "zeropositionkinematictree"
 BODY_TAGS = VOLUME_TAGS | {"convex": CONVEX_ATTRIBUTES}
 KNOWN = {
-    ROOT: frozenset({"version", "robotName", "adjacency"}),
+    ROOT: frozenset({"version", "robotName", "adjacency", "leastLever"}),
     "bodypart": frozenset({"name"}),
     "link": frozenset({"name", *STEP, "length", "radius", "field", "noSelfCollision", "base"}),
     "joint": frozenset(

@@ -33,6 +33,8 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
     """
     drives = drives_of(robot)
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName=robot.name, adjacency="listed")
+    if robot.least_lever:
+        root.set("leastLever", number(robot.least_lever))
     for part in robot.parts.values():
         element = ET.SubElement(root, "bodypart", name=part.name)
         for motor in robot.motor_table[part.slice]:

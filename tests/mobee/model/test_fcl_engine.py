@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,13 @@ def test_the_benchmark_has_the_same_contacts_normals_points_and_forces(boxes: in
     assert ours.table.point == pytest.approx(reference.table.point, abs=1e-3)
     assert ours.projection == pytest.approx(reference.projection, abs=1e-4)
     assert abs(ours.projection).max() > 1e-3
+
+
+def test_contacts_with_a_least_lever_push_as_in_the_compiled_engine() -> None:
+    robot = replace(upper_body(), least_lever=0.05)
+    ours, reference = (model.evaluate(upper_body_poses(20)) for model in engines(robot, boxes_world(50)))
+    assert ours.projection == pytest.approx(reference.projection, abs=2e-3)
+    assert abs(ours.projection).max() > 0.02
 
 
 def test_forces_of_a_part_end_where_it_ends(rng: np.random.Generator) -> None:

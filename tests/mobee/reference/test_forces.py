@@ -32,7 +32,7 @@ from mobee.reference.forces import (
     work_force,
 )
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Clause, Robot
+from mobee.robot.robot import LEVER, Clause, Robot
 from tests.mobee.control.posed_forces import forces_at
 from tests.mobee.control.two_parts import STRETCHED, touching
 from tests.mobee.planar import planar_arm
@@ -173,6 +173,28 @@ def test_the_controllers_acceleration_is_spring_damping_and_client(seed: int) ->
         moved = gains.weight(robot.motors) > 0
         assert apart(controller.acceleration, np.where(moved, expected, 0.0)) < 1e-11  # a difference of velocities, over dt
         state = replace(state, velocity=controller.velocity)
+
+
+def test_contacts_with_a_least_lever_push_as_defined(rng: np.random.Generator) -> None:
+    robot = replace(load_robot("icub"), least_lever=0.03)
+    model, touched = Model(robot, load_world("table")), 0
+    for q in rng.uniform(*robot.limits.T, (15, len(robot.motors))):
+        pose = model.evaluate(q)
+        expected = projected(robot, q, pose.contacts)
+        assert apart(pose.projection, expected) < ROUNDING
+        touched += expected.any()
+    assert touched > 10
+
+
+def test_with_a_least_lever_the_push_undoes_a_contact_by_the_smallest_motion() -> None:
+    robot = replace(planar_arm(), least_lever=1e-6)
+    q = np.array([0.0, 0.3, 2.6])  # the tip's field meets that of the first link
+    (contact,) = (one for one in Model(robot).evaluate(q).contacts if one.kind == "field")
+    motion = Model(robot).evaluate(q).projection / LEVER**2
+    (after,) = (one for one in Model(robot).evaluate(q + 0.01 * motion).contacts if one.kind == "field")
+    assert contact.depth - after.depth == pytest.approx(0.01 * contact.depth, rel=0.02)
+    slope = np.array([Model(robot).evaluate(q + 1e-6 * axis).contacts[-1].depth - contact.depth for axis in np.eye(3)]) / 1e-6
+    assert motion == pytest.approx(-contact.depth * slope / (slope @ slope), rel=1e-3, abs=1e-6)
 
 
 def test_solids_make_no_force() -> None:

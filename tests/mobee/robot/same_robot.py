@@ -106,6 +106,7 @@ def assert_same_bodies(one: Robot, other: Robot) -> None:
 def assert_same_robot(one: Robot, other: Robot) -> None:
     assert one.name == other.name
     assert one.links[0] == other.links[0]
+    assert abs(one.least_lever - other.least_lever) < 1e-9
     assert_same_motors(one, other)
     assert_same_motion(one, other)
     assert_same_shapes(one, other)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -48,8 +49,10 @@ def test_terms_are_imported_by_name() -> None:
         load_terms([f"{HERE}:lift", f"{HERE}:lift"])
 
 
-def test_published_contacts_push_as_those_of_a_model_with_the_world(rng: np.random.Generator) -> None:
-    model, blind = Model(ROBOT, load_world("table")), Model(ROBOT)
+@pytest.mark.parametrize("least_lever", [0.0, 0.03])
+def test_published_contacts_push_as_those_of_a_model_with_the_world(least_lever: float, rng: np.random.Generator) -> None:
+    robot = replace(ROBOT, least_lever=least_lever)
+    model, blind = Model(robot, load_world("table")), Model(robot)
     for q in rng.uniform(*ROBOT.limits.T, (20, len(ROBOT.motors))):
         seen, told = model.evaluate(q), blind.evaluate(q)
         told.compute_contacts(PublishedContacts(told, [item(contact) for contact in seen.contacts]))
