@@ -23,7 +23,6 @@ ClientSquash = Literal["each", "direction"]
 _ANGLES = ("max_spring", "limit_width", "max_limit", "max_client")  # gains in units of rad
 _OF_MOTORS = ("damping", "stiffness", "max_spring", "limit_width", "max_limit", "client_slope", "max_client", "weight")
 _NO_NUMBERS = ("law", "settle", "client_squash", "weights", "motors", "groups")
-ICUB_REACH = 0.5  # m, the length of the arms for which the default gains were tuned
 Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor names; value)
 
 
@@ -173,22 +172,21 @@ class Gains:
         )
 
     @classmethod
-    def named(cls, name: str, contact_gain: float = 0.0) -> Gains:
-        """Return the gains named "default" or "published_2014", with this contact gain unless it is 0; raises UnknownName."""
-        sets = {"default": cls.default, "published_2014": cls.published_2014}
-        if name not in sets:
-            raise UnknownName("gain set", name, sets)
-        gains = sets[name]()
-        return replace(gains, contact_gain=contact_gain) if contact_gain else gains
+    def derived(cls) -> Gains:
+        """Return the default gains for robots whose fields were derived, see `mobee.derive`: contact forces have a larger bound.
+
+        Such robots have a least lever, so contacts of all levers have the stiffness contact_gain * LEVER^2 = 450 1/s^2. With the bound of
+        the default gains, tuned for the wide fields of the iCub, limbs with strong springs press their fields together.
+        """
+        return replace(cls.default(), max_contact=50.0)
 
     @classmethod
-    def for_reach(cls, reach: float) -> Gains:
-        """Return the default gains for a robot whose arms are `reach` m long: shorter arms than the iCub's get stiffer contacts.
-
-        The acceleration of a motor is contact_gain times lever times depth, and both lengths shrink with a robot.
-        """
-        gains = cls.default()
-        return replace(gains, contact_gain=float(np.round(gains.contact_gain * max(1.0, ICUB_REACH / reach) ** 2)))
+    def named(cls, name: str) -> Gains:
+        """Return the gains named "default", "derived" or "published_2014"; raises UnknownName."""
+        sets = {"default": cls.default, "derived": cls.derived, "published_2014": cls.published_2014}
+        if name not in sets:
+            raise UnknownName("gain set", name, sets)
+        return sets[name]()
 
     def with_motors(self, pattern: str, **gains: float) -> Gains:
         """Return gains with other values for the motors that match a pattern, for example `gains.with_motors("*_elbow", stiffness=50.0)`.

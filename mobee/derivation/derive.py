@@ -8,17 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.derivation.chains import Chain, chains
+from mobee.derivation.cuts import with_cuts
 from mobee.derivation.joints import bounded, joints_to_learn, movements
 from mobee.derivation.names import names_of
-from mobee.derivation.pairs import free_home, often_touching, reach_of, with_fields, without_links
+from mobee.derivation.pairs import free_home, home_apart, often_touching, reach_of, with_fields, without_links
 from mobee.errors import InvalidValue
 from mobee.learning.lattice import Lattice
 from mobee.robot.robot import Clause, Part, Robot
 
 MOST_ARMS = 4  # that learn at once
 LEAST_ARM = 0.25  # of the movement of the best arm's joint: what moves its end less is no arm
+LEAST_LEVER = 0.1  # of the robot's reach: contacts with shorter levers push less than others, since they hardly move what touches
 LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
 
 
@@ -37,14 +40,17 @@ class Derived:
     """A robot that curious agents can use at once, and what was derived.
 
     `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of
-    contact. `left_out`: pairs of links that are tested no more. `field`: width of the fields that were added [m], 0 for none.
-    `gains`: of the control law, the default ones with contacts for the size of the robot.
+    contact, or farther from it. `narrowed`: motors with a narrower range, since solids touch beyond it that fields cannot keep apart;
+    the clauses that were added do the same for several motors. `left_out`: pairs of links that are tested no more. `field`: width of the
+    fields that were added [m], 0 for none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its
+    own fields.
     """
 
     robot: Robot
     arms: tuple[Arm, ...]
     limited: tuple[str, ...]
     home_moved: tuple[str, ...]
+    narrowed: tuple[str, ...]
     left_out: tuple[tuple[str, str], ...]
     field: float
     gains: Gains
@@ -81,21 +87,30 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
     else:
         robot, arms = _arms(robot, seed)
     moved: tuple[str, ...] = ()
+    narrowed: tuple[str, ...] = ()
     left_out: set[frozenset[int]] = set()
     width, gains = 0.0, Gains.default()
     if not any(shape.role == "field" for shape in robot.shapes):
         left_out = often_touching(robot, seed)
         robot = without_links(robot, left_out, LEFT_OUT)
+        file_home = robot.home
         home, stuck = free_home(robot, seed)
-        moved = tuple(name for name, one, other in zip(robot.motors, robot.home, home, strict=True) if one != other)
-        table = tuple(replace(motor, home=float(place)) for motor, place in zip(robot.motor_table, home, strict=True))
-        robot = without_links(replace(robot, motor_table=table), stuck, LEFT_OUT)
+        robot = without_links(_at(robot, home), stuck, LEFT_OUT)
         left_out |= stuck
         reach = _reach(robot, arms)
-        robot, width = with_fields(robot, reach, seed)
-        gains = Gains.for_reach(reach) if reach > 0.0 else gains
+        robot = replace(_at(robot, home_apart(robot, reach, seed)), least_lever=LEAST_LEVER * reach)
+        moved = tuple(name for name, one, other in zip(robot.motors, file_home, robot.home, strict=True) if one != other)
+        robot, width, bare = with_fields(robot, reach, seed)
+        robot, narrowed = with_cuts(robot, bare, seed)
+        gains = Gains.derived() if width else gains
     names = tuple(sorted((robot.links[min(pair)], robot.links[max(pair)]) for pair in left_out))
-    return Derived(robot, arms, tuple(limited), moved, names, width, gains)
+    return Derived(robot, arms, tuple(limited), moved, narrowed, names, width, gains)
+
+
+def _at(robot: Robot, home: Array) -> Robot:
+    """Return the robot with another home (n,)."""
+    table = tuple(replace(motor, home=float(place)) for motor, place in zip(robot.motor_table, home, strict=True))
+    return replace(robot, motor_table=table)
 
 
 def _reach(robot: Robot, arms: Sequence[Arm]) -> float:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from mobee.arrays import Array
 from mobee.derivation.chains import Chain, end_point
 from mobee.model.kinematics import link_transforms
 from mobee.robot.motor_units import slides
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Motor, Robot
 
 MOST_JOINTS = 4  # of one arm: 3 levels of each make 81 states
 LEAST_SHARE = 0.1  # of the movement of the best joint: one that moves the end less is left out
@@ -34,10 +34,24 @@ def bounded(robot: Robot) -> tuple[Robot, list[str]]:
             limits = np.clip(centre + np.array([-np.pi, np.pi]) / scale, *motor.limits)
             motor = replace(motor, limits=limits, home=float(np.clip(motor.home, *limits)))
         table.append(motor)
+    narrowed = [name for name, one, other in zip(robot.motors, robot.motor_table, table, strict=True) if np.any(one.limits != other.limits)]
+    return _with_motors(robot, table), narrowed
+
+
+def with_limits(robot: Robot, limits: Mapping[int, Array]) -> Robot:
+    """Return the robot with other limits (2,) of some motors, by their numbers; home moves into them."""
+    table = [
+        replace(motor, limits=limits[k], home=float(np.clip(motor.home, *limits[k]))) if k in limits else motor
+        for k, motor in enumerate(robot.motor_table)
+    ]
+    return _with_motors(robot, table)
+
+
+def _with_motors(robot: Robot, table: Sequence[Motor]) -> Robot:
+    """Return the robot with other motors, and with the limits of its joints that follow from these."""
     moved = {j: np.sort(scale * motor.limits + shift) for motor in table for j, scale, shift in motor.joints}
     joints = tuple(replace(joint, limits=moved.get(index, joint.limits)) for index, joint in enumerate(robot.joints))
-    narrowed = [name for name, one, other in zip(robot.motors, robot.motor_table, table, strict=True) if np.any(one.limits != other.limits)]
-    return replace(robot, joints=joints, motor_table=tuple(table)), narrowed
+    return replace(robot, joints=joints, motor_table=tuple(table))
 
 
 def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> Array:

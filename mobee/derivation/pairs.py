@@ -11,7 +11,9 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.derivation.chains import corners_of
+from mobee.model.levers import lever
 from mobee.model.model import Model
+from mobee.model.pose import Pose
 from mobee.robot.motor_units import angle_unit, outside_zones, slides
 from mobee.robot.robot import LinkPair, Robot, Shape
 from mobee.robot.urdf.hull import convex_hull
@@ -22,6 +24,10 @@ OFTEN = 0.5  # of them: solids that touch in more overlap by design, or only as 
 FIELD_OFTEN = 0.6  # the same for fields, which would push there nearly always
 FIELD_SHARE = 0.06  # of the robot's reach: the width of its fields
 NARROWEST, WIDEST = 0.005, 0.06  # m
+SIZES = {"": 1.0, "_near": 0.5, "_nearer": 0.25, "_nearest": 0.125}  # of that width, by the ending of the field's name
+AT_HOME = 0.5  # of that width: fields that should not meet at home
+MOST_MOTORS = 3  # between two links that limits and clauses keep apart: with more, too many positions would have to be drawn
+LEVERS = 8  # contacts of a pair whose levers are computed
 ROUNDS, DRAWS = 8, 128  # of the search for a home
 
 
@@ -36,22 +42,55 @@ def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Rob
     return replace(robot, solid_pairs=kept(robot.solid_pairs), field_pairs=kept(robot.field_pairs), untested=untested)
 
 
-def often_touching(robot: Robot, seed: int) -> set[LinkPair]:
-    """Return the pairs of links whose solids touch in more than OFTEN of random poses."""
+def often_touching(robot: Robot, seed: int, share: float = OFTEN) -> set[LinkPair]:
+    """Return the pairs of links whose solids touch in more than `share` of random poses."""
     counts = _counted(replace(robot, field_pairs=robot.field_pairs[:0]), seed)
     links: Counter[LinkPair] = Counter()
     for (first, second), count in counts.items():
         pair = frozenset((robot.shapes[first].link, robot.shapes[second].link))
         links[pair] = max(links[pair], count)
-    return {pair for pair, count in links.items() if count > OFTEN * POSES}
+    return {pair for pair, count in links.items() if count > share * POSES}
 
 
 def _counted(robot: Robot, seed: int) -> Counter[tuple[int, int]]:
     """Return in how many of POSES random poses each pair of shapes touches."""
-    low, high = robot.limits.T
-    poses = np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
-    table = Model(robot).evaluate(poses).table.numbers
-    return Counter(tuple(sorted(pair)) for pair in table[:, [2, 3]].tolist())
+    return _counts(Model(robot).evaluate(_drawn(robot, seed)))
+
+
+def _drawn(robot: Robot, seed: int) -> Array:
+    return np.random.default_rng(seed).uniform(*robot.limits.T, (POSES, len(robot.limits)))
+
+
+def _counts(pose: Pose) -> Counter[tuple[int, int]]:
+    return Counter(tuple(sorted(pair)) for pair in pose.table.numbers[:, [2, 3]].tolist())
+
+
+def _short_levers(pose: Pose) -> set[tuple[int, int]]:
+    """Return the pairs of shapes that limits or clauses can keep apart and whose levers are mostly shorter than the least lever."""
+    robot, table = pose.robot, pose.table
+    rows: dict[tuple[int, int], list[int]] = {}
+    for row, (first, second) in enumerate(table.numbers[:, [2, 3]].tolist()):
+        rows.setdefault((min(first, second), max(first, second)), []).append(row)
+    short = set()
+    for pair, own in rows.items():
+        if not can_cut(robot, frozenset(robot.shapes[index].link for index in pair)):
+            continue
+        some = own[:: max(1, len(own) // LEVERS)]
+        if np.median([_lever_of(pose, row) for row in some]) < robot.least_lever:
+            short.add(pair)
+    return short
+
+
+def _lever_of(pose: Pose, row: int) -> float:
+    table = pose.table
+    links = int(table.first_link[row]), int(table.second_link[row])
+    return lever(pose.robot, pose.transforms[table.pose[row]], links, table.point[row], table.normal[row])
+
+
+def can_cut(robot: Robot, links: LinkPair) -> bool:
+    """Return whether few motors, all of one part, move two links against each other."""
+    motors = motors_between(robot, [links])
+    return 0 < len(motors) <= MOST_MOTORS and len({robot.motor_table[k].part for k in motors.tolist()}) == 1
 
 
 def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
@@ -66,7 +105,7 @@ def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
     for round_ in range(ROUNDS):
         if not touching:
             break
-        movable = _between(robot, touching)
+        movable = motors_between(robot, touching)
         reach = (round_ + 1) / ROUNDS * np.ptp(inner, axis=1)
         draws = np.repeat(best[None], DRAWS, axis=0)
         draws[:, movable] += rng.uniform(-1.0, 1.0, (DRAWS, len(movable))) * reach[movable]
@@ -93,7 +132,7 @@ def _touching(model: Model, q: Array) -> set[LinkPair]:
     return {frozenset((links[contact.first], links[contact.second])) for contact in model.evaluate(q).contacts}
 
 
-def _between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
+def motors_between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
     """Return the motors that move links of a pair against each other, the indices in ascending order."""
     moving: set[int] = set()
     for pair in pairs:
@@ -111,17 +150,34 @@ def _above(robot: Robot, link: int) -> set[int]:
     return joints
 
 
-def with_fields(robot: Robot, reach: float, seed: int) -> tuple[Robot, float]:
-    """Return the robot with a field around each solid, and the width of the fields [m].
+def field_width(reach: float) -> float:
+    """Return the width of the fields of a robot with arms of a length [m]."""
+    return float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
 
-    Fields are tested where their solids are, but for pairs that meet at home, or in more than FIELD_OFTEN of random poses; for
-    these a narrower field is tried, of half the width.
+
+def with_fields(robot: Robot, reach: float, seed: int) -> tuple[Robot, float, Ints]:
+    """Return the robot with a field around each solid, the width of the fields [m], and the pairs of solids (p, 2) without fields.
+
+    Fields are tested where their solids are, but for pairs that meet at home, or in more than FIELD_OFTEN of random poses, or whose
+    contacts have short levers; for these narrower fields are tried.
     """
-    width = float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
+    width = field_width(reach)
     left = robot.solid_pairs
-    for size in (width, width / 4.0):
-        robot, left = _with_fields(robot, left, size, "" if size == width else "_near", seed)
-    return robot, width
+    for suffix, size in SIZES.items():
+        robot, left = _with_fields(robot, left, size * width, suffix, seed)
+    return robot, width, left
+
+
+def home_apart(robot: Robot, reach: float, seed: int) -> Array:
+    """Return a home (n,) near that of the robot where narrow fields do not meet either, as far as one is found."""
+    width = AT_HOME * field_width(reach)
+    needed = sorted(set(robot.solid_pairs.ravel().tolist()))
+    wide = tuple(replace(_field(robot.shapes[index], width, "_wide"), role="solid") for index in needed)
+    number = {index: len(robot.shapes) + k for k, index in enumerate(needed)}
+    pairs = np.array([[number[a], number[b]] for a, b in robot.solid_pairs.tolist()], dtype=np.intp).reshape(-1, 2)
+    trial = replace(robot, shapes=(*robot.shapes, *wide), solid_pairs=pairs)
+    trial = without_links(trial, often_touching(trial, seed, FIELD_OFTEN), "near each other in most poses")
+    return free_home(replace(trial, solid_pairs=np.concatenate([robot.solid_pairs, trial.solid_pairs])), seed)[0]
 
 
 def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int) -> tuple[Robot, Ints]:
@@ -133,8 +189,8 @@ def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int
     wanted = np.array([[number[a], number[b]] for a, b in pairs.tolist()], dtype=np.intp).reshape(-1, 2)
     grown_robot = replace(robot, shapes=(*robot.shapes, *fields), base_shapes=robot.base_shapes | base)
     trial = replace(grown_robot, solid_pairs=robot.solid_pairs[:0], field_pairs=wanted)
-    met = _counted(trial, seed)
-    often = {pair for pair, count in met.items() if count > FIELD_OFTEN * POSES}
+    pose = Model(trial).evaluate(_drawn(trial, seed))
+    often = {pair for pair, count in _counts(pose).items() if count > FIELD_OFTEN * POSES} | _short_levers(pose)
     names = {shape.name: index for index, shape in enumerate(trial.shapes)}
     often |= {(min(pair), max(pair)) for c in Model(trial).evaluate(robot.home).contacts for pair in [(names[c.first], names[c.second])]}
     meets = np.array([(min(pair), max(pair)) in often for pair in wanted.tolist()], dtype=bool)

@@ -48,8 +48,6 @@ def _scenario(setup: Setup, files: Files) -> str:
     shared: dict[str, Any] = {"robot": setup.shipped or files.robot.name, "gains": setup.gains}
     if setup.world != NO_WORLD:
         shared["world"] = str(Path(setup.world).resolve()) if is_path(setup.world) else setup.world
-    if setup.contact_gain:
-        shared["contact_gain"] = setup.contact_gain
     if setup.cameras:
         shared["cameras"] = list(setup.cameras)
     services: dict[str, Any] = {"robot_sim": {}, "model": {}, "controller": {}}

@@ -35,7 +35,6 @@ class Setup:
     robot: Robot
     world: str
     gains: str
-    contact_gain: float
     agents: dict[str, AgentConfig]
     lines: tuple[str, ...]
     cameras: tuple[str, ...] = ()  # beside those of the robot
@@ -44,7 +43,7 @@ class Setup:
     @property
     def law(self) -> Gains:
         """The gains of the control law."""
-        return Gains.named(self.gains, self.contact_gain)
+        return Gains.named(self.gains)
 
 
 def add_setup_options(parser: argparse.ArgumentParser) -> None:
@@ -66,7 +65,7 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
         agents = {part: AgentConfig(part=part, **common) for part in PUBLISHED}
         icub = load_robot(ICUB)
         eyes = _eyes(cameras_of(icub, asked), world, ICUB) if asked else ()
-        return Setup(ICUB, ICUB, icub, world, "published_2014", 0.0, agents, _PUBLISHED_LINES, asked, eyes)
+        return Setup(ICUB, ICUB, icub, world, "published_2014", agents, _PUBLISHED_LINES, asked, eyes)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_robot(robot, **options)
@@ -75,12 +74,12 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
         arm.part: AgentConfig(part=arm.part, joints=arm.joints, rest=derived.rest(arm), neighbours=_neighbours(derived, arm), **common)
         for arm in derived.arms
     }
-    gain = derived.gains.contact_gain if derived.gains != Gains.default() else 0.0
+    gains = "default" if derived.gains == Gains.default() else "derived"
     remarks = [str(one.message).rpartition(":1: ")[2] for one in caught]
     name = re.sub(r"[^a-z0-9_]+", "_", loaded.name.lower()).strip("_") or "robot"
     cameras = cameras_of(derived.robot, asked)
     eyes, lines = _eyes(cameras, world, name), tuple(_described(derived, remarks, list(cameras)))
-    return Setup(name, "", derived.robot, world, "default", gain, agents, lines, asked, eyes)
+    return Setup(name, "", derived.robot, world, gains, agents, lines, asked, eyes)
 
 
 def _eyes(cameras: Sized, world: str, robot: str) -> tuple[str, ...]:
@@ -125,12 +124,15 @@ def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str])
     if derived.limited:
         yield _cut(f"  limits half a turn to each side: {_listed(derived.limited)}")
     if derived.home_moved:
-        yield _cut(f"  home   moved out of contact: {_listed(derived.home_moved)}")
+        yield _cut(f"  home   moved away from contact: {_listed(derived.home_moved)}")
+    if derived.narrowed:
+        yield _cut(f"  ranges narrower, as solids touch beyond: {_listed(derived.narrowed)}")
     if derived.left_out:
         pairs = ", ".join(f"{one}/{other}" for one, other in derived.left_out)
         yield _cut(f"  pairs  {len(derived.left_out)} not tested, as they touch in most poses: {pairs}")
     if derived.field:
-        yield _cut(f"  fields {1e3 * derived.field:.0f} mm wide, {len(robot.field_pairs)} pairs")
+        clauses = f", {len(robot.clauses)} clauses" if robot.clauses else ""
+        yield _cut(f"  fields {1e3 * derived.field:.0f} mm wide, {len(robot.field_pairs)} pairs{clauses}")
 
 
 def _listed(names: Sequence[str]) -> str:

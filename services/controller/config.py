@@ -16,10 +16,8 @@ from services.controller.forces import load_terms
 class Config(ServiceConfig, frozen=True, kw_only=True):
     """The controller's settings."""
 
-    gains: Literal["default", "published_2014"] = "published_2014"
+    gains: Literal["default", "derived", "published_2014"] = "published_2014"
     """Name of the set of gains; the model must use the same."""
-    contact_gain: Annotated[float, Meta(ge=0)] = 0.0
-    """Force of a contact for a lever and a depth of 1 m, as in Gains; 0: that of the set. Set it once, as shared.contact_gain."""
     modality: Literal["position", "velocity", "torque"] = "velocity"
     """Kind of command to the motors."""
     speed_scale: Annotated[float, Meta(gt=0, le=1)] = 1.0

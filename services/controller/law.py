@@ -36,7 +36,7 @@ class RobotLaw:
         """Start at rest at home, and run every code path of a reach once, so that the first real reach is not delayed."""
         self._bus, self._config, self._robot = bus, config, robot
         model = Model(robot)  # without a world: contacts come from the model service
-        gains = Gains.named(config.gains, config.contact_gain)
+        gains = Gains.named(config.gains)
         self._law = Controller(model, gains, config.modality, speed_scale=config.speed_scale, terms=load_terms(config.terms))
         self._needs_contacts = bool(self._law.terms) or needs_contacts()
         self.forces = ModelForces(robot, self._needs_contacts)

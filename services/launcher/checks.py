@@ -118,7 +118,7 @@ def _is_free(port: int) -> bool:
 
 def check_gains(scenario: Scenario) -> None:
     """Raise ConfigError if services would use different gains or terms of the law, since no later check would find this."""
-    for what in ("gains", "contact_gain", "terms"):
+    for what in ("gains", "terms"):
         named = {part.who: str(getattr(part.config, what)) for part in scenario.parts if hasattr(part.config, what)}
         if len(set(named.values())) > 1:
             listed = ", ".join(f"{who} {given}" for who, given in named.items())
@@ -141,7 +141,7 @@ def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
     if controller is None or rate is None or gains is None:
         return
     try:
-        require_stable(robots[controller.robot], Gains.named(gains, getattr(controller, "contact_gain", 0.0)), 1.0 / rate)
+        require_stable(robots[controller.robot], Gains.named(gains), 1.0 / rate)
     except MobeeError as error:
         raise ConfigError(f"{scenario.where('services.robot_sim.rate')}: rate {rate:g} Hz: {error}") from None
 

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
-
-from msgspec import Meta
+from typing import Literal
 
 from services.common.config import WorldConfig
 
@@ -13,10 +11,8 @@ from services.common.config import WorldConfig
 class Config(WorldConfig, frozen=True, kw_only=True):
     """The model's settings; world objects with the role target are not loaded, because vision perceives them."""
 
-    gains: Literal["default", "published_2014"] = "published_2014"
+    gains: Literal["default", "derived", "published_2014"] = "published_2014"
     """Name of the set of gains for the constraint forces; the controller must use the same."""
-    contact_gain: Annotated[float, Meta(ge=0)] = 0.0
-    """Force of a contact for a lever and a depth of 1 m, as in Gains; 0: that of the set. Set it once, as shared.contact_gain."""
     propagate: Literal["tree", "part"] = "tree"
     """Motors on which a contact acts: all between the body's root and the contact, or those of the touched part only."""
     contact_forces: bool = True

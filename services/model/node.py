@@ -39,7 +39,7 @@ class ModelNode:
             if item.role == "target":
                 self._model.world.remove(name)
         self._track = self._model.track()
-        self._gains = Gains.named(config.gains, config.contact_gain)
+        self._gains = Gains.named(config.gains)
         self._publishes_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
         self._world = WorldServer(service, self._model)

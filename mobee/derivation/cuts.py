@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keeps solids apart that fields cannot, since they are near each other in every pose: by narrower limits of motors, and by clauses.
+
+Whether two links a few joints apart touch depends only on the motors between them.  Over random positions of these, half-spaces
+are cut off until no touching position is left: one along a single motor becomes its limit, another a clause (thesis eqs. 5.14 to 5.17).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.control.gains import Gains
+from mobee.derivation.joints import with_limits
+from mobee.derivation.pairs import can_cut, motors_between
+from mobee.model.model import Model
+from mobee.robot.motor_units import motor_units
+from mobee.robot.robot import Clause, LinkPair, Robot
+
+POSES = 3000  # positions of these
+SHALLOW = 0.002  # m: an overlap of hulls that does not count
+MOST_CUTS = 6  # for two links
+DIRECTIONS = 48  # that are tried for each
+QUANTILES = (0.25, 0.5, 1.0)  # of the touching positions that a cut leaves out
+LIMIT_GAP = np.deg2rad(2.0)  # rad between home and a limit
+CLAUSE_GAP = 1.02 * Gains.default().constraint_width  # rad between home and a clause, which does not push at home
+LEAST_FREE = 0.05  # of the free positions that must stay
+ALONE = 0.7  # of its cost: a cut along one motor, which leaves the range of the motor its middle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Group:
+    """Links that the same motors move against each other, and positions of these motors from home in which they touch or are free."""
+
+    motors: tuple[int, ...]
+    touching: Array  # (t, k) rad of the law
+    free: Array  # (f, k) rad of the law
+
+
+def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...]]:
+    """Return the robot with limits and clauses that keep these pairs of solids apart, and the motors with a narrower range.
+
+    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between, or motors of several parts, are left alone,
+    and so is what touches too near home.
+    """
+    narrowed: dict[int, Array] = {}
+    clauses: list[Clause] = []
+    units = motor_units(robot)
+    for group in _groups(robot, pairs, seed):
+        for normal, offset in _cuts(group):
+            used = np.flatnonzero(normal)
+            if len(used) == 1:
+                motor = group.motors[int(used[0])]
+                limits = narrowed.setdefault(motor, robot.limits[motor].copy())
+                end = robot.home[motor] + offset * units[motor] * normal[used[0]]
+                if normal[used[0]] > 0.0:
+                    limits[0] = max(limits[0], end)
+                else:
+                    limits[1] = min(limits[1], end)
+            else:
+                row = np.zeros((1, len(robot.motors)))
+                row[0, list(group.motors)] = normal / units[list(group.motors)]
+                clauses.append(Clause(robot.motor_table[group.motors[0]].part, row, -row @ robot.home - offset))
+    robot = with_limits(robot, narrowed)
+    return replace(robot, clauses=(*robot.clauses, *clauses)), tuple(robot.motors[k] for k in sorted(narrowed))
+
+
+def _groups(robot: Robot, pairs: Ints, seed: int) -> Iterator[_Group]:
+    """Yield the groups of links with few motors of one part between them, the fewest motors first."""
+    of: dict[tuple[int, ...], list[list[int]]] = {}
+    for pair in pairs.tolist():
+        links: LinkPair = frozenset(robot.shapes[index].link for index in pair)
+        if can_cut(robot, links):
+            of.setdefault(tuple(motors_between(robot, [links]).tolist()), []).append(pair)
+    rng = np.random.default_rng(seed)
+    for motors, members in sorted(of.items(), key=lambda one: (len(one[0]), one[0])):
+        drawn = rng.uniform(*robot.limits[list(motors)].T, (POSES, len(motors)))
+        poses = np.repeat(robot.home[None], POSES, axis=0)
+        poses[:, motors] = drawn
+        tested = replace(robot, field_pairs=robot.field_pairs[:0], solid_pairs=np.array(members, dtype=np.intp))
+        table = Model(tested).evaluate(poses).table
+        touching = np.zeros(POSES, dtype=bool)
+        touching[table.pose[table.depth > SHALLOW]] = True
+        away = (drawn - robot.home[list(motors)]) / motor_units(robot)[list(motors)]
+        if touching.any():
+            yield _Group(motors, away[touching], away[~touching])
+
+
+def _cuts(group: _Group) -> Iterator[tuple[Array, float]]:
+    """Yield half-spaces normal . x > offset that hold at home, x = 0, until no touching position satisfies all of them."""
+    touching, free, rest = group.touching, group.free, len(group.free)
+    for _ in range(MOST_CUTS):
+        if not len(touching):
+            return
+        best = min(_candidates(touching, free), key=lambda one: one[0], default=None)
+        if best is None:
+            return
+        _, normal, offset = best
+        kept = free @ normal > offset
+        if kept.sum() < LEAST_FREE * rest:
+            return
+        touching, free = touching[touching @ normal > offset], free[kept]
+        yield normal, offset
+
+
+def _candidates(touching: Array, free: Array) -> Iterator[tuple[float, Array, float]]:
+    """Yield cuts with their cost: the free positions that are lost for each touching one that is left out."""
+    count = touching.shape[1]
+    axes = [sign * axis for axis in np.eye(count) for sign in (1.0, -1.0)]
+    chosen = touching[:: max(1, len(touching) // DIRECTIONS)]
+    towards = [-one / np.linalg.norm(one) for one in chosen if count > 1 and np.linalg.norm(one) > CLAUSE_GAP]
+    for normal, gap, weight in [*((axis, LIMIT_GAP, ALONE) for axis in axes), *((one, CLAUSE_GAP, 1.0) for one in towards)]:
+        behind = np.sort(touching @ normal)
+        behind = behind[behind < -gap]
+        if not len(behind):
+            continue
+        for share in QUANTILES:
+            number = max(1, int(share * len(behind)))
+            offset = float(behind[number - 1])
+            lost = int((free @ normal <= offset).sum())
+            yield weight * (lost + 1.0) / number, normal, offset
