@@ -27,6 +27,7 @@ DIRECTIONS = 48  # that are tried for each
 QUANTILES = (0.25, 0.5, 1.0)  # of the touching positions that a cut leaves out
 LIMIT_GAP = np.deg2rad(2.0)  # rad between home and a limit
 CLAUSE_GAP = 1.02 * Gains.default().constraint_width  # rad between home and a clause, which does not push at home
+MOST_LEFT = 0.2  # of the touching positions: with more, fields are needed too
 LEAST_FREE = 0.05  # of the free positions that must stay
 ALONE = 0.7  # of its cost: a cut along one motor, which leaves the range of the motor its middle
 
@@ -36,21 +37,29 @@ class _Group:
     """Links that the same motors move against each other, and positions of these motors from home in which they touch or are free."""
 
     motors: tuple[int, ...]
+    pairs: Ints  # (p, 2) of shapes
     touching: Array  # (t, k) rad of the law
     free: Array  # (f, k) rad of the law
 
 
-def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...]]:
-    """Return the robot with limits and clauses that keep these pairs of solids apart, and the motors with a narrower range.
+def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
+    """Return the robot with limits and clauses that keep these pairs of solids apart, the motors with a narrower range, and what is left.
 
-    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between, or motors of several parts, are left alone,
-    and so is what touches too near home.
+    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between, or motors of several parts, are left alone.
+    What is left, (r, 2), are pairs that touch near home or where no half-space cuts them off.
     """
     narrowed: dict[int, Array] = {}
     clauses: list[Clause] = []
+    failed = [pairs[:0]]
     units = motor_units(robot)
     for group in _groups(robot, pairs, seed):
-        for normal, offset in _cuts(group):
+        cuts = list(_cuts(group))
+        if (
+            np.all([np.ones(len(group.touching)), *(group.touching @ normal > offset for normal, offset in cuts)], axis=0).mean()
+            > MOST_LEFT
+        ):
+            failed.append(group.pairs)
+        for normal, offset in cuts:
             used = np.flatnonzero(normal)
             if len(used) == 1:
                 motor = group.motors[int(used[0])]
@@ -65,7 +74,7 @@ def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, .
                 row[0, list(group.motors)] = normal / units[list(group.motors)]
                 clauses.append(Clause(robot.motor_table[group.motors[0]].part, row, -row @ robot.home - offset))
     robot = with_limits(robot, narrowed)
-    return replace(robot, clauses=(*robot.clauses, *clauses)), tuple(robot.motors[k] for k in sorted(narrowed))
+    return replace(robot, clauses=(*robot.clauses, *clauses)), tuple(robot.motors[k] for k in sorted(narrowed)), np.concatenate(failed)
 
 
 def _groups(robot: Robot, pairs: Ints, seed: int) -> Iterator[_Group]:
@@ -86,7 +95,7 @@ def _groups(robot: Robot, pairs: Ints, seed: int) -> Iterator[_Group]:
         touching[table.pose[table.depth > SHALLOW]] = True
         away = (drawn - robot.home[list(motors)]) / motor_units(robot)[list(motors)]
         if touching.any():
-            yield _Group(motors, away[touching], away[~touching])
+            yield _Group(motors, np.array(members, dtype=np.intp), away[touching], away[~touching])
 
 
 def _cuts(group: _Group) -> Iterator[tuple[Array, float]]:

@@ -14,7 +14,7 @@ from mobee.derivation.chains import Chain, chains
 from mobee.derivation.cuts import with_cuts
 from mobee.derivation.joints import bounded, joints_to_learn, movements
 from mobee.derivation.names import names_of
-from mobee.derivation.pairs import free_home, home_apart, often_touching, reach_of, with_fields, without_links
+from mobee.derivation.pairs import field_width, free_home, home_apart, often_touching, reach_of, with_fields, without_links
 from mobee.errors import InvalidValue
 from mobee.learning.lattice import Lattice
 from mobee.robot.robot import Clause, Part, Robot
@@ -100,8 +100,10 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
         reach = _reach(robot, arms)
         robot = replace(_at(robot, home_apart(robot, reach, seed)), least_lever=LEAST_LEVER * reach)
         moved = tuple(name for name, one, other in zip(robot.motors, file_home, robot.home, strict=True) if one != other)
-        robot, width, bare = with_fields(robot, reach, seed)
-        robot, narrowed = with_cuts(robot, bare, seed)
+        width = field_width(reach)
+        robot, bare = with_fields(robot, robot.solid_pairs, width, seed)
+        robot, narrowed, bare = with_cuts(robot, bare, seed)
+        robot, _ = with_fields(robot, bare, width, seed, short=0.0)
         gains = Gains.derived() if width else gains
     names = tuple(sorted((robot.links[min(pair)], robot.links[max(pair)]) for pair in left_out))
     return Derived(robot, arms, tuple(limited), moved, narrowed, names, width, gains)

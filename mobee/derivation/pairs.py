@@ -28,6 +28,7 @@ SIZES = {"": 1.0, "_near": 0.5, "_nearer": 0.25, "_nearest": 0.125}  # of that w
 AT_HOME = 0.5  # of that width: fields that should not meet at home
 MOST_MOTORS = 3  # between two links that limits and clauses keep apart: with more, too many positions would have to be drawn
 LEVERS = 8  # contacts of a pair whose levers are computed
+SHORT = 2.0  # least levers: near the least lever the push of a contact may change its sign with the pose
 ROUNDS, DRAWS = 8, 128  # of the search for a home
 
 
@@ -65,20 +66,20 @@ def _counts(pose: Pose) -> Counter[tuple[int, int]]:
     return Counter(tuple(sorted(pair)) for pair in pose.table.numbers[:, [2, 3]].tolist())
 
 
-def _short_levers(pose: Pose) -> set[tuple[int, int]]:
-    """Return the pairs of shapes that limits or clauses can keep apart and whose levers are mostly shorter than the least lever."""
+def _short_levers(pose: Pose, short: float) -> set[tuple[int, int]]:
+    """Return the pairs of shapes that limits or clauses can keep apart and whose levers are mostly shorter than `short` least levers."""
     robot, table = pose.robot, pose.table
     rows: dict[tuple[int, int], list[int]] = {}
     for row, (first, second) in enumerate(table.numbers[:, [2, 3]].tolist()):
         rows.setdefault((min(first, second), max(first, second)), []).append(row)
-    short = set()
+    found = set()
     for pair, own in rows.items():
         if not can_cut(robot, frozenset(robot.shapes[index].link for index in pair)):
             continue
         some = own[:: max(1, len(own) // LEVERS)]
-        if np.median([_lever_of(pose, row) for row in some]) < robot.least_lever:
-            short.add(pair)
-    return short
+        if np.median([_lever_of(pose, row) for row in some]) < short * robot.least_lever:
+            found.add(pair)
+    return found
 
 
 def _lever_of(pose: Pose, row: int) -> float:
@@ -155,17 +156,15 @@ def field_width(reach: float) -> float:
     return float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
 
 
-def with_fields(robot: Robot, reach: float, seed: int) -> tuple[Robot, float, Ints]:
-    """Return the robot with a field around each solid, the width of the fields [m], and the pairs of solids (p, 2) without fields.
+def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float = SHORT) -> tuple[Robot, Ints]:
+    """Return the robot with fields around these pairs of solids (p, 2), and the pairs that remain without.
 
-    Fields are tested where their solids are, but for pairs that meet at home, or in more than FIELD_OFTEN of random poses, or whose
-    contacts have short levers; for these narrower fields are tried.
+    `width`: of the fields [m]; narrower ones are tried for pairs whose fields meet at home, or in more than FIELD_OFTEN of random poses, or
+    could be kept apart by limits and clauses and have levers shorter than `short` least levers.
     """
-    width = field_width(reach)
-    left = robot.solid_pairs
     for suffix, size in SIZES.items():
-        robot, left = _with_fields(robot, left, size * width, suffix, seed)
-    return robot, width, left
+        robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)
+    return robot, pairs
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
@@ -180,17 +179,20 @@ def home_apart(robot: Robot, reach: float, seed: int) -> Array:
     return free_home(replace(trial, solid_pairs=np.concatenate([robot.solid_pairs, trial.solid_pairs])), seed)[0]
 
 
-def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int) -> tuple[Robot, Ints]:
+def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int, short: float) -> tuple[Robot, Ints]:
     """Add fields of one width for these pairs of solids; return the robot and the pairs for which the fields meet too often."""
     needed = sorted(set(pairs.ravel().tolist()))
     fields = [_field(robot.shapes[index], width, suffix) for index in needed]
-    number = {index: len(robot.shapes) + k for k, index in enumerate(needed)}
+    known = {shape.name: index for index, shape in enumerate(robot.shapes)}
+    fields = [field for field in fields if field.name not in known]
+    known |= {field.name: len(robot.shapes) + k for k, field in enumerate(fields)}
+    number = {index: known[_name(robot.shapes[index], suffix)] for index in needed}
     base = {number[index] for index in needed if index in robot.base_shapes}
     wanted = np.array([[number[a], number[b]] for a, b in pairs.tolist()], dtype=np.intp).reshape(-1, 2)
     grown_robot = replace(robot, shapes=(*robot.shapes, *fields), base_shapes=robot.base_shapes | base)
     trial = replace(grown_robot, solid_pairs=robot.solid_pairs[:0], field_pairs=wanted)
     pose = Model(trial).evaluate(_drawn(trial, seed))
-    often = {pair for pair, count in _counts(pose).items() if count > FIELD_OFTEN * POSES} | _short_levers(pose)
+    often = {pair for pair, count in _counts(pose).items() if count > FIELD_OFTEN * POSES} | _short_levers(pose, short)
     names = {shape.name: index for index, shape in enumerate(trial.shapes)}
     often |= {(min(pair), max(pair)) for c in Model(trial).evaluate(robot.home).contacts for pair in [(names[c.first], names[c.second])]}
     meets = np.array([(min(pair), max(pair)) in often for pair in wanted.tolist()], dtype=bool)
@@ -203,9 +205,13 @@ ICOSAHEDRON = np.array([np.roll((0.0, a, b), k) for a in (-1.0, 1.0) for b in (-
 FIELD_CORNERS = 32
 
 
+def _name(solid: Shape, suffix: str) -> str:
+    return f"{solid.name}_field{suffix}"
+
+
 def _field(solid: Shape, width: float, suffix: str) -> Shape:
     """Return the field that reaches `width` [m] farther than a solid; around a hull it is a hull, closer than a capsule would be."""
-    name = f"{solid.name}_field{suffix}"
+    name = _name(solid, suffix)
     if solid.vertices is None:
         return grown(solid, width, name)
     cloud = (solid.vertices[:, None] + width * ICOSAHEDRON).reshape(-1, 3)

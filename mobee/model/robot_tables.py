@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -142,7 +143,7 @@ def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:
         if shape.vertices is None:
             rows[index] = volume_row(shape)
             continue
-        own, joined = _hull(shape.vertices)
+        own, joined = _hull(np.asarray(shape.vertices, dtype=np.float64).tobytes())
         rows[index] = convex_row(shape, own, first)
         corners.append(own)
         edges += joined
@@ -151,11 +152,13 @@ def _rows(shapes: Sequence[Shape]) -> tuple[Volumes, Array, _Edges]:
     return rows, np.concatenate(corners), (starts, np.array([other for joined in edges for other in joined], dtype=np.int32))
 
 
-def _hull(vertices: Array) -> tuple[Array, list[list[int]]]:
-    """Return the corners (v, 3) of the hull of points, and for each the corners that an edge joins it to.
+@lru_cache(maxsize=1024)
+def _hull(points: bytes) -> tuple[Array, list[list[int]]]:
+    """Return the corners (v, 3) of the hull of points, given as the bytes of (n, 3), and for each the corners that an edge joins it to.
 
-    Few points, and points in a plane, are returned as they are, without edges.
+    Few points, and points in a plane, are returned as they are, without edges. Results are kept, since variants of a robot share shapes.
     """
+    vertices = np.frombuffer(points).reshape(-1, 3)
     none: tuple[Array, list[list[int]]] = vertices, [[] for _ in vertices]
     if len(vertices) <= MANY_CORNERS:
         return none
