@@ -15,11 +15,11 @@ from mobee.errors import MobeeError
 from mobee.robot.load import load_robot
 from mobee_cli.errors import UserError
 from mobee_cli.launch import add_settings
-from mobee_cli.playing.files import Files, free_folder, write_files, write_readme
+from mobee_cli.playing.files import Files, free_folder, remove_files, write_files, write_readme
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
 from mobee_cli.robot_options import add_cameras, add_urdf_options, add_world
-from services.common.exit_codes import BAD_INPUT
+from services.common.exit_codes import BAD_INPUT, INTERRUPTED
 from services.launcher.run import Options, launch, refused_now
 
 SECONDS = 5.0  # s of real time in which it learns offline
@@ -66,6 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_files(setup, files)
         write_readme(setup, files)
         if not arguments.offline_only and (code := refused_now(_options(arguments, files))):  # before it learns for seconds
+            remove_files(files)
             return code
         numbers = _offline(arguments, setup, files, say)
     except MobeeError as error:
@@ -94,7 +95,12 @@ def _offline(arguments: argparse.Namespace, setup: Setup, files: Files, say: Any
     """Learn offline; returns the numbers of what was learned."""
     seconds = arguments.seconds or (None if arguments.transitions else SECONDS)
     with opened(setup, load_robot(setup.shipped or files.robot), files.store) as learning:
-        learn(learning, seconds, arguments.transitions, say)
+        try:
+            learn(learning, seconds, arguments.transitions, say)
+        except KeyboardInterrupt:
+            kept = learning.kept
+            text = f"interrupted; {kept} transitions are kept, and `mobee launch {files.scenario}` goes on live with them"
+            raise UserError(text if kept else "interrupted", INTERRUPTED) from None
         say(learning.report())
         say(learning.summary())
         return learning.numbers()

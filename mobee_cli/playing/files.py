@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from mobee_cli.playing.setup import Setup
 from services.common.exit_codes import FAILED
 from services.common.worlds import NO_WORLD, is_path
 from services.launcher.run_directory import to_toml
+
+README = "README.md"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +83,15 @@ What was derived:
 {derived}
 ```
 """
-    files.store.with_name("README.md").write_text(text, encoding="utf-8")
+    files.store.with_name(README).write_text(text, encoding="utf-8")
+
+
+def remove_files(files: Files) -> None:
+    """Remove what `write_files` and `write_readme` have written, and their folder if nothing else is in it."""
+    for path in (files.robot, files.scenario, files.store.with_name(README)):
+        path.unlink(missing_ok=True)
+    with suppress(OSError):  # it is not empty
+        files.store.parent.rmdir()
 
 
 def free_folder(runs: Path, name: str) -> Path:

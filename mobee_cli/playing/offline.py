@@ -45,6 +45,11 @@ class Learning:
         """Number of transitions made now."""
         return sum(agent.transitions for agent in self.agents) - self.begun
 
+    @property
+    def kept(self) -> int:
+        """Number of transitions in the file."""
+        return sum(len(_made(agent)) for agent in self.agents)
+
     def numbers(self) -> dict[str, Any]:
         """Return what was made and learned, as plain values."""
         return {

@@ -2,14 +2,19 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from experiments.kit.live.launch import free_endpoint
+from mobee.errors import MobeeError
 from mobee.rendering.mesh import read_pieces
 from mobee.robot.load import load_robot
+from mobee.store import TransitionStore
 from mobee_cli.__main__ import main
 from mobee_cli.playing.files import Files
 from mobee_cli.playing.setup import PUBLISHED
@@ -53,7 +58,36 @@ def test_a_port_in_use_is_said_before_it_learns(tmp_path: Path, capsys: pytest.C
         assert main(command) == 3
     printed = capsys.readouterr()
     assert f"port {port} of monitor is in use: choose another with --set services.monitor.web_port=" in printed.err
-    assert "actions tried" not in printed.out and not list(tmp_path.rglob("*.sqlite"))
+    assert "actions tried" not in printed.out and not list(tmp_path.iterdir())
+
+
+def test_a_ctrl_c_while_it_learns_keeps_what_was_learned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm, store = tmp_path / "arm.urdf", tmp_path / "mine" / "tiny_arm.sqlite"
+    arm.write_text(ARM)
+    main_thread = threading.main_thread().ident
+    assert main_thread is not None
+
+    def interrupt() -> None:
+        end = time.monotonic() + 60.0
+        while kept(store) < 20 and time.monotonic() < end:
+            time.sleep(0.02)
+        signal.pthread_kill(main_thread, signal.SIGINT)
+
+    watcher = threading.Thread(target=interrupt)
+    watcher.start()
+    assert main(["play", str(arm), "--offline-only", "--transitions", "20000", "--save", str(store.parent)]) == 130
+    watcher.join()
+    said = capsys.readouterr().err
+    assert f"{kept(store)} transitions are kept, and `mobee launch {store.with_suffix('.toml')}` goes on live with them" in said
+
+
+def kept(store: Path) -> int:
+    """The number of transitions in a file, 0 while it is being made."""
+    try:
+        with TransitionStore(store, "arm", read_only=True) as opened:
+            return len(opened.load())
+    except MobeeError:
+        return 0
 
 
 def test_a_file_that_mobee_learn_did_not_write_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
