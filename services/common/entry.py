@@ -18,15 +18,16 @@ from services.common.exit_codes import BAD_INPUT, FAILED
 from services.common.session import BusUnreachable
 from services.common.text import printable
 
-HELD = "MOBEE_HELD"  # environment variable; if set, standard input is a pipe that the launcher closes when the service may join the system
+HELD = "MOBEE_HELD"
+"""Environment variable: the instance of the launcher that has started this process, and closes its standard input when it may join."""
 
 
-def wait_until_released() -> bool:
-    """Wait until the services on which this one depends are ready, if the launcher has started it; return whether it has."""
-    if os.environ.pop(HELD, None) is None:
-        return False
-    os.read(sys.stdin.fileno(), 1)  # returns at the end of the file
-    return True
+def wait_until_released() -> str:
+    """Wait until the services on which this one depends are ready, if a launcher has started it; return the launcher's instance, or ""."""
+    launcher = os.environ.pop(HELD, "")
+    if launcher:
+        os.read(sys.stdin.fileno(), 1)  # returns at the end of the file, also when the launcher has died
+    return launcher
 
 
 def robot_of(config: ServiceConfig) -> Robot:

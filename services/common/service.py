@@ -80,7 +80,7 @@ class Service(Listener):
         if config.mode == "lock":
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
-        self._is_child = session is None and wait_until_released()
+        self._launcher = wait_until_released() if session is None else ""
         self._lease = lease
         session = session or self._open_session()
         with ExitStack() as failed:
@@ -116,7 +116,8 @@ class Service(Listener):
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._is_ready = False
         inbox.at(time.monotonic() + WINDOW, self._check_health)
-        self._router, self._router_seen = "", time.monotonic()
+        self._router, self._router_seen = self._launcher, time.monotonic()  # a launcher is the router of those it has started
+        self._strays: set[str] = set()  # tokens of routers that no process has
         self._watch_liveliness()
         self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
         self._kept.append(session.declare_queryable(keys.service_rpc(self.who, "pulse"), self._answer_pulse))
@@ -178,7 +179,7 @@ class Service(Listener):
 
         A process of ONLY_ONE that the launcher has not started ends if another one of its name answers.
         """
-        if self.who in ONLY_ONE and not self._is_child:
+        if self.who in ONLY_ONE and not self._launcher:
             self._require_no_other()
         gc.collect()
         gc.freeze()  # objects that live as long as the process: a full collection of them would delay a tick
@@ -212,7 +213,7 @@ class Service(Listener):
 
     def check_router(self) -> None:
         """End the process after ten seconds without a router."""
-        if self.alive.get("router"):
+        if self._router in self.alive.get("router", ()):
             self._router_seen = time.monotonic()
         elif time.monotonic() - self._router_seen > ORPHANED:
             self.log.error(
@@ -243,14 +244,24 @@ class Service(Listener):
             self._router = router
         elif router != self._router:
             self.bus.event("warning", "two_routers", f"a second token of a router, {router}, is on the bus beside {self._router}")
-            for who in ("launcher", "router"):
-                self.ask(keys.service_rpc(who, "stat"), Stat, partial(self._check_system, who))
+            self._ask_router(router)
 
-    def _check_system(self, who: str, answer: Stat | rpc.CallFailed) -> None:
+    def _ask_router(self, router: str) -> None:
+        """Ask which router answers, once a second until one does: a new system may be starting."""
+        if router not in self.alive["router"] or router in self._strays:
+            return
+        for who in ("launcher", "router"):
+            self.ask(keys.service_rpc(who, "stat"), Stat, partial(self._check_system, who, router))
+        self.inbox.at(time.monotonic() + 1.0, lambda: self._ask_router(router))
+
+    def _check_system(self, who: str, router: str, answer: Stat | rpc.CallFailed) -> None:
         """End if a launcher or router answers that is not the one of this service's system."""
-        if isinstance(answer, Stat) and answer.instance != self._router and self.who != who:
+        if not isinstance(answer, Stat) or self.who == who:
+            return
+        if answer.instance != self._router:
             self.log.error("another %s answers at %s, of a new system: this service ends", who, self.config.endpoint)
             raise SystemExit(ENVIRONMENT)
+        self._strays.add(router)
 
     def _check_health(self) -> None:
         refused, waiting = self.bus.rejected.total() + self.inbox.dropped, self.inbox.waiting()

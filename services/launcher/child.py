@@ -76,8 +76,8 @@ class Child:
         """Change the phase."""
         self.phase, self.since = phase, time.monotonic()
 
-    def spawn(self) -> None:
-        """Start the process, in its own group, so that Ctrl-C in a terminal reaches the launcher only.
+    def spawn(self, launcher: str) -> None:
+        """Start the process for the launcher of that instance, in its own group, so that Ctrl-C in a terminal reaches the launcher only.
 
         It stays in the same session, because with autogroup scheduling niceness counts only within one.  The service imports its
         packages, reads its robot, and then waits for `release` before it joins the system.
@@ -88,7 +88,7 @@ class Child:
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **self.program.environment, **_ONE_THREAD, "PYTHONUNBUFFERED": "1", HELD: "1"},
+                env={**os.environ, **self.program.environment, **_ONE_THREAD, "PYTHONUNBUFFERED": "1", HELD: launcher},
                 process_group=0,
             )
         if self.program.nice:

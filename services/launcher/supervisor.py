@@ -50,7 +50,7 @@ class Supervisor:
     def _spawn(self, child: Child) -> bool:
         """Start a process; if the operating system refuses to start it, it counts as failed, and the launcher continues."""
         try:
-            child.spawn()
+            child.spawn(self._service.instance)
         except OSError as error:
             self._fail(child, f"cannot be started: {error}")
             return False

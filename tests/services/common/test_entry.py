@@ -22,7 +22,7 @@ LIMIT = 30.0  # s
 def test_a_service_that_was_started_early_waits_until_it_is_released(tmp_path: Path) -> None:
     log = tmp_path / "one.log"
     child = Child(Program("one", (sys.executable, "-c", PROGRAM), log))
-    child.spawn()
+    child.spawn("i1_launcher")
     try:
         end = time.monotonic() + LIMIT
         while log.read_text() != "imported\n" and time.monotonic() < end:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -24,6 +25,8 @@ from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
 from services.common.rpc import CallFailed
 from services.common.service import Service
+from services.launcher.child import Child
+from services.launcher.child import Program as ChildProgram
 from tests.services.harness import QUICK_END, Program, Rig, free_endpoint, rig, wait_for
 
 PROBE = ("-m", "tests.services.common.probe")
@@ -392,6 +395,22 @@ def test_another_router_does_not_inherit_a_service(tmp_path: Path, bus: Rig) -> 
         parent.token("router", "usurper")
         assert program.wait() == 3
         assert "another launcher answers" in program.says
+
+
+def test_a_service_whose_launcher_died_during_its_start_does_not_join_the_next_system(tmp_path: Path, bus: Rig) -> None:
+    """The new launcher may answer late: the service asks again until it does."""
+    with rig(tmp_path, bus.robot) as parent:
+        argv = (sys.executable, "-m", "tests.services.common.probe", "--endpoint", parent.endpoint)
+        child = Child(ChildProgram("probe", argv, tmp_path / "probe.log"))
+        child.spawn("i1_dead")
+        try:
+            child.release()  # as the end of the launcher does, which closes the pipe
+            wait_for(lambda: parent.instances("probe"), "the service", 30.0)
+            parent.serve(keys.service_rpc("launcher", "stat"), Empty, lambda request, key: stat_of("launcher", "rig"))
+            assert child.process is not None and child.process.wait(10.0) == 3
+            assert "another launcher answers" in (tmp_path / "probe.log").read_text()
+        finally:
+            child.kill()
 
 
 def test_a_second_token_of_a_router_alone_ends_nothing(tmp_path: Path, bus: Rig) -> None:
