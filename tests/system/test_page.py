@@ -147,6 +147,18 @@ def test_the_ball_is_dragged_and_a_hand_reaches_for_it(page: Page, live: tuple[L
     targets = "JSON.parse(document.querySelector('#body').dataset.targets || '{}')"
     page.until(f"{targets}.ball", "the ball in the picture")
     time.sleep(0.5)  # the picture turns
+    reaches = "document.querySelector('#cards').textContent.includes('eaches for the ball')"
+    until(lambda: reaches_after_a_drag(page, targets, reaches), "the reach")  # on a busy machine the page moves, or a part holds
+    page.until("document.querySelector('#cards').textContent.match(/mm from it/)", "the end of the reach")
+    moved = {one.name: one for one in world(session)}["ball"].position
+    assert np.linalg.norm(np.array(moved) - ball["position"]) > 0.01
+    missing = float(re.search(r"(\d+) mm from it", page.page.inner_text("#cards"))[1])  # type: ignore[index]  # waited for above
+    print(f"page: the hand rests {missing:g} mm from the ball")
+    page.until("document.querySelector('.card').textContent.includes('Tries')", "the agent's next action, after the part was given back")
+
+
+def reaches_after_a_drag(page: Page, targets: str, reaches: str) -> bool:
+    """Whether a hand reaches within some seconds after the ball was dragged."""
     x, y = page.evaluate(f"{targets}.ball")
     mouse = page.page.mouse
     mouse.move(x, y)
@@ -154,13 +166,10 @@ def test_the_ball_is_dragged_and_a_hand_reaches_for_it(page: Page, live: tuple[L
     mouse.move(x + 10.0, y)
     mouse.move(x - 25.0, y, steps=5)
     mouse.up()
-    page.until("document.querySelector('#cards').textContent.includes('eaches for the ball')", "the reach")
-    page.until("document.querySelector('#cards').textContent.match(/mm from it/)", "the end of the reach")
-    moved = {one.name: one for one in world(session)}["ball"].position
-    assert np.linalg.norm(np.array(moved) - ball["position"]) > 0.01
-    missing = float(re.search(r"(\d+) mm from it", page.page.inner_text("#cards"))[1])  # type: ignore[index]  # waited for above
-    print(f"page: the hand rests {missing:g} mm from the ball")
-    page.until("document.querySelector('.card').textContent.includes('Tries')", "the agent's next action, after the part was given back")
+    give_up = time.monotonic() + 8.0
+    while not page.evaluate(reaches) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    return bool(page.evaluate(reaches))
 
 
 def world(session: Any) -> list[ObjectState]:

@@ -36,7 +36,12 @@ export class BodyPicture {
   look(name) {
     this.view = [...VIEWS[name]];
     if (!this.isIcub() && name !== "top") this.view[0] += 180;
-    this.frame = null;
+    this.refit();
+  }
+
+  // Fit the picture again when it is drawn next; until then it can be pointed at as it is.
+  refit() {
+    if (this.frame) this.frame.key = "";
     this.touch();
   }
 

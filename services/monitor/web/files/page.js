@@ -452,8 +452,7 @@ document.addEventListener("click", (event) => {
 });
 $("seek").addEventListener("input", () => seek($("seek").value));
 const watch = new ResizeObserver(() => {
-  picture.frame = null;
-  picture.touch();
+  picture.refit();
   showCurves();
 });
 watch.observe($("body"));
