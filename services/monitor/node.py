@@ -47,12 +47,12 @@ from services.monitor.viewer.output import Output
 from services.monitor.viewer.plots import Plots
 from services.monitor.viewer.scene import Poses, Scene
 from services.monitor.web.body import contacts_of, look, shapes_of, thing
+from services.monitor.web.record import SHOWN_EVENTS
 
 WORLD_PERIOD = 1.0  # s between two requests for the model's world
 BODY_PERIOD = 0.1  # s between two poses of the page's own picture of the body
 STORY_PERIOD = 0.25  # s between two looks at the story and the state
 RECORD_PERIOD = 0.2  # s between two poses in the record of the page
-SHOWN_EVENTS = 60
 STOP_REPEATED = 2.0  # s after the last message of an emergency stop, which robot_sim repeats, for which it counts as set
 JPEG_QUALITY = 85
 LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
@@ -284,7 +284,9 @@ class MonitorNode:
         self._tell("info" if up else "warning", who, "is up" if up else "is gone")
 
     def _tell(self, level: str, who: str, text: str) -> None:
-        self._events.append({"t": round(self._last, 1), "level": level, "who": who, "text": text[:300]})
+        event = {"t": round(self._last, 1), "level": level, "who": who, "text": text[:300]}
+        self._events.append(event)
+        self._board.record("event", event)
         self._board.put("events", list(self._events))
 
     def _note_stop(self, stop: EStop) -> None:

@@ -20,7 +20,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import ConfigError, read_toml
 from services.monitor.config import Config
-from services.monitor.web.record import STORY, Entry, entries
+from services.monitor.web.record import SHOWN_EVENTS, STORY, Entry, entries
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,11 @@ class Track:
         """Return the newest value at a moment; None before the first."""
         index = bisect_right(self.times, moment)
         return self.values[index - 1] if index else None
+
+    def newest(self, moment: float, count: int) -> list[Any]:
+        """Return at most `count` newest values at a moment, in order."""
+        index = bisect_right(self.times, moment)
+        return list(self.values[max(index - count, 0) : index])
 
 
 class Story:
@@ -62,7 +67,10 @@ class Story:
     def at(self, seconds: float) -> dict[str, Any]:
         """Return all values at a moment, s since the begin."""
         moment = self.begin + min(max(seconds, 0.0), self.length)
-        return {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
+        values = {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
+        if "event" in self.tracks:
+            values["events"] = self.tracks["event"].newest(moment, SHOWN_EVENTS)
+        return values
 
     def pose(self, seconds: float) -> Array:
         """Return the motor positions (n,) at a moment, s since the begin, between two recorded ones on the straight line between them."""

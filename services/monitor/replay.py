@@ -25,7 +25,7 @@ from services.monitor.web.server import Site
 from services.monitor.web.surfaces import surfaces_of
 
 PERIOD = 0.1  # s between two pictures
-NOT_SHOWN = ("q", "contacts")  # on the page they are the body
+NOT_SHOWN = ("q", "contacts", "event")  # on the page they are the body, and the events
 
 
 class Player:

@@ -28,6 +28,7 @@ def recorded(folder: Path) -> Path:
     lines: list[tuple[float, str, Any]] = [(0.0, "robot", {"name": "arm", "parts": [], "shapes": []}), (0.0, "cards", [])]
     lines += [(0.2 * k, "q", [0.01 * k, 0.5]) for k in range(51)]
     lines += [(5.0, "cards", [{"part": "arm", "now": "pan +10°"}])]
+    lines += [(when, "event", {"t": when, "level": "info", "who": "sim", "text": f"at {when}"}) for when in (1.0, 6.0)]
     (folder / "story.jsonl").write_text("".join(json.dumps(one) + "\n" for one in sorted(lines, key=lambda one: one[0])))
     return folder
 
@@ -56,11 +57,13 @@ def test_a_run_is_seen_again_at_any_time(tmp_path: Path) -> None:
         get("seek?at=2")
         seen = news_at(2.0)
         assert seen["player"] == {"at": 2.0, "length": 10.0, "plays": False}
+        assert [event["text"] for event in seen["events"]] == ["at 1.0"]
         assert seen["cards"] == [] and seen["body"]["q"] == pytest.approx([0.1, 0.5])
         assert len(seen["body"]["links"]) == len(load_robot(tmp_path / "arm.xml").links)
         get("seek?at=7.3")
         seen = news_at(7.3)
         assert seen["cards"][0]["now"] == "pan +10°"
+        assert [event["text"] for event in seen["events"]] == ["at 1.0", "at 6.0"] and "event" not in seen
         assert np.ptp([seen["body"]["q"][0], 0.36]) < 1e-9
         shown.send_signal(signal.SIGINT)
         try:

@@ -13,7 +13,8 @@ from typing import Any
 from mobee.errors import MobeeError
 
 STORY = "story.jsonl"  # in the folder of a run
-LEFT_OUT = ("body", "control")  # the body is recorded as motor positions; who held the controls is of no interest later
+LEFT_OUT = ("body", "control", "events")  # the body is recorded as motor positions, events one by one; who held the controls is of no use
+SHOWN_EVENTS = 60  # the newest
 SELDOM = {"curves": 10.0, "baselines": 10.0}  # s of the robot between two values that are recorded: a curve is long, and grows slowly
 FULL = 500_000_000  # bytes at which a record ends
 
