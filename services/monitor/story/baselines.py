@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from bus_schema.messages import Learned
 from mobee.arrays import Array, Ints
+from mobee.learning.beliefs import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 from mobee.learning.space import Space
-from services.monitor.story.knowledge import PREDICTABLE_SHARE, PREDICTABLE_TRIES, Knowledge
+from services.monitor.story.knowledge import Knowledge
 
 BASELINES = ("least_tried", "random")
 RUNS = 4  # of each; their mean is shown
