@@ -43,7 +43,7 @@ class Links:
 
 
 TRAIL = 60  # points a hand
-TRAIL_STEP = 4  # looks a point
+TRAIL_STEP = 2  # looks a point
 TRAIL_PIECES = 8  # of fading brightness
 HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["right_arm"]}
 

@@ -281,6 +281,7 @@ function card(one) {
     const now = node("p", "", node("b", "", "Tries "), node("strong", "now", one.now), ` ${one.expects}`);
     made.append(now);
   } else if (!one.last) made.append(node("p", "", "Waiting for its first action to begin."));
+  else if (one.explorer && !state.past) made.append(labelled("", "Tries", "nothing yet: it chooses its next action."));
   if (one.last) {
     const kind = one.last.reached ? "reached" : "missed";
     const line = labelled("", "Last", node("span", kind, one.last.outcome));
