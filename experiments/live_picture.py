@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Take the picture of the running system: start a scenario, open its page in headless Chromium, take a screenshot.
 
-`python -m experiments.live_picture --scenario lockstep` writes docs/figures/live.png in about two minutes.
+`mobee learn --robot icub --transitions 2000 --store icub.sqlite` and `python -m experiments.live_picture --scenario icub.toml
+--warm-up 25` write docs/figures/live.png, of agents that have learned for 80 minutes offline.
 """
 
 from __future__ import annotations
