@@ -134,6 +134,8 @@ def smaller(piece: Piece, most: int) -> Piece:
     centre = piece.points.mean(axis=0)
     size = float(np.ptp(piece.points, axis=0).max()) or 1.0  # the package has thresholds of its own, for sizes near 1
     points, triangles = simplify(((piece.points - centre) / size), piece.triangles.astype(np.int32), target_count=max(most, 4))
+    if not len(triangles) or not np.isfinite(points).all():
+        return piece
     return replace(piece, points=size * points.astype(np.float64) + centre, triangles=triangles.astype(np.intp))
 
 
