@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from experiments import chapters
 from experiments.frozen_rules import CONFIRMING_SEED, require_frozen
 from experiments.kit.experiment import MIN_SEEDS, VERDICTS, Claim
-from experiments.kit.raw_records import all_records, keep_record, opened_record, record_path
+from experiments.kit.raw_records import TooLarge, all_records, keep_record, opened_record, record_path
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.kit.statistics import RATES
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
@@ -198,11 +198,13 @@ def _confirms(run: Path) -> bool:
     return int(read(run / CONFIG)["options"].get("seed", 0)) >= CONFIRMING_SEED
 
 
-def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> None:
+def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> list[str]:
     """Write the raw records of the runs whose numbers are in the record; `confirms`: of those with new seeds.
 
-    Raises InvalidValue for a run that is too large, and for new seeds if the rules are not the frozen ones.
+    Returns a message for each run that is too large; the records of the others are written.  Raises InvalidValue for new seeds if the rules
+    are not the frozen ones, or if other seeds have confirmed them.
     """
+    failed = []
     for name, one in found.items():
         entry = record[name][CONFIRMED] if confirms else {key: value for key, value in record[name].items() if key != CONFIRMED}
         if entry == one.entry:
@@ -210,7 +212,11 @@ def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool
                 require_frozen(name)
             method = load_experiment(name).method
             with method.recorded(one.run) as folder:
-                keep_record(name, one.run, one.versions, method.kept, confirms, folder)
+                try:
+                    keep_record(name, one.run, one.versions, method.kept, confirms, folder)
+                except TooLarge as error:
+                    failed.append(str(error))
+    return failed
 
 
 def recomputed(name: str, confirms: bool = False) -> Entry:

@@ -205,14 +205,16 @@ def _claims(arguments: argparse.Namespace) -> int:
     entries = {name: one.entry for name, one in found.items()}
     merge = with_confirmed if arguments.confirm else better if arguments.write and not arguments.folders else replaced
     record = merge(recorded(), entries)
+    failed = keep_records(found, record, arguments.confirm) if arguments.write else []
     if arguments.write:
-        keep_records(found, record, arguments.confirm)
         write_page(record)
     table = rows(record)
     if arguments.json:
         print(json.dumps([{"experiment": name, **claim.record()} for name, claim in table], indent=2))
     else:
         print(claims_text(table, shutil.get_terminal_size().columns))
+    if failed:
+        raise UserError("\n".join([*failed, "The claims of these experiments are open; all others are written."]), FAILED)
     return 0
 
 

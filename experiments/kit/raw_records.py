@@ -20,6 +20,10 @@ MAX_BYTES, MAX_ALL = 2_000_000, 10_000_000  # of one archive, and of all togethe
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
+class TooLarge(InvalidValue):
+    """Raised for a record that is too large for the repository."""
+
+
 def record_path(name: str, confirms: bool = False) -> Path:
     """Return the archive of an experiment, or with `confirms` of its run with new seeds."""
     return RECORDS / f"{name}{'-confirm' if confirms else ''}.zip"
@@ -42,7 +46,8 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
         folder: with the kept files; None: that of the run.
 
     Raises:
-        InvalidValue: no file matches, the archive would be larger than MAX_BYTES, or another run has confirmed the experiment.
+        InvalidValue: no file matches, or another run has confirmed the experiment.
+        TooLarge: the archive would be larger than MAX_BYTES.
     """
     place = run if folder is None else folder
     files = sorted({path for pattern in kept for path in place.glob(pattern)})
@@ -57,7 +62,7 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
             archive.writestr(zipfile.ZipInfo(member, _NO_TIME), source.read_bytes(), method)
     if (size := unfinished.stat().st_size) > MAX_BYTES:
         unfinished.unlink()
-        raise InvalidValue(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: keep fewer values a cell.")
+        raise TooLarge(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: give its sweep a summary.")
     if confirms and path.exists() and path.read_bytes() != unfinished.read_bytes():
         unfinished.unlink()
         raise InvalidValue(f"{path} exists: an experiment is confirmed once, with the first run of new seeds. {run} is another run.")

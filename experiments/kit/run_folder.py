@@ -19,6 +19,7 @@ from experiments.registry import all_names, current_name
 from mobee.errors import InvalidValue
 
 PACKAGES = ("mobee", "numpy", "python-fcl", "mujoco", "matplotlib")
+SOURCES = ("core", "mobee", "experiments")
 CONFIG, VERSIONS, RESULTS = "config.json", "versions.json", "results.json"
 
 
@@ -135,7 +136,7 @@ def _versions() -> dict[str, Any]:
         except metadata.PackageNotFoundError:
             continue
     machine = {"python": platform.python_version(), "platform": platform.platform(), "processor": _processor()}
-    return {**machine, "commit": _commit(), "packages": packages, "begun": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
+    return {**machine, "commit": _commit(), "sources": _sources(), "packages": packages, "begun": time.strftime("%Y-%m-%dT%H:%M:%S%z")}
 
 
 def _processor() -> str:
@@ -148,9 +149,18 @@ def _processor() -> str:
 
 def _commit() -> str | None:
     """Return the commit of the sources, with a + if they have been edited since; None outside a git checkout."""
+    return _git("describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*") or None
+
+
+def _sources() -> dict[str, str]:
+    """Return git's hash of each folder of sources at the commit: other commits with the same hashes give the same results."""
+    return {folder: found[:12] for folder in SOURCES if (found := _git("rev-parse", "--verify", "--quiet", f"HEAD:{folder}"))}
+
+
+def _git(*command: str) -> str:
+    """Return what git says about the repository of this file; "" outside a checkout."""
     try:
-        command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10.0)
+        done = subprocess.run(["git", "-C", str(Path(__file__).parent), *command], capture_output=True, text=True, timeout=10.0)
     except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout.strip() or None
+        return ""
+    return done.stdout.strip()

@@ -212,6 +212,14 @@ def test_new_seeds_confirm_frozen_rules_once_and_stand_beside_the_first(toy, tmp
     assert any("new seeds" in line for line in claims_table.all_differences({"hypercube-exploration": entry}))
 
 
+def test_a_record_that_is_too_large_leaves_its_claims_open_and_is_named(toy, tmp_path, monkeypatch):
+    toy(0)
+    monkeypatch.setattr(raw_records, "MAX_BYTES", 100)
+    with pytest.raises(UserError, match="give its sweep a summary"):
+        command("--write", "--runs", tmp_path / "runs")
+    assert {claim["verdict"] for claim in recorded()["hypercube-exploration"]["claims"]} == {"open"}
+
+
 def test_a_verdict_without_a_raw_record_is_a_difference(toy, claim):
     entry = {"seeds": 10, "commit": None, "claims": [claim.measured("0.4", True).record()]}
     assert claims_table.differences("exploration-coverage", entry) == [

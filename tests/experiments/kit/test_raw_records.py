@@ -8,7 +8,7 @@ import pytest
 from experiments import claims_table
 from experiments.kit import raw_records
 from experiments.kit.cells import CELL_FILES, Cell, load_cells, write_cell
-from experiments.kit.raw_records import keep_record, opened_record, record_path
+from experiments.kit.raw_records import TooLarge, keep_record, opened_record, record_path
 from experiments.kit.run_folder import new_run
 from experiments.kit.sweep import Sweep
 from mobee.errors import InvalidValue
@@ -42,7 +42,7 @@ def test_a_record_that_is_empty_too_large_absent_or_damaged_is_refused(run, monk
     with pytest.raises(InvalidValue, match="there is no record of 'reward-decay'"), opened_record("reward-decay"):
         pass
     monkeypatch.setattr(raw_records, "MAX_BYTES", 100)
-    with pytest.raises(InvalidValue, match="keep fewer values"):
+    with pytest.raises(TooLarge, match="give its sweep a summary"):
         keep_record("reward-decay", run, run / "versions.json", CELL_FILES)
     assert list(raw_records.RECORDS.iterdir()) == []
     record_path("reward-decay").write_bytes(b"PK no archive")

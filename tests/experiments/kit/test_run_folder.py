@@ -14,7 +14,7 @@ def test_a_run_says_what_was_asked_for_and_with_what(tmp_path):
     assert options_of(folder, "model-throughput") == {"objects": 3, "seed": 7}
     versions = json.loads((folder / "versions.json").read_text())
     assert {"mobee", "numpy"} <= set(versions["packages"])
-    assert {"python", "platform", "commit", "begun"} <= set(versions)
+    assert {"python", "platform", "commit", "sources", "begun"} <= set(versions)
 
 
 def test_two_runs_in_one_second_get_two_folders_and_the_newest_is_found(tmp_path):
