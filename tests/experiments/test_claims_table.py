@@ -128,6 +128,7 @@ def test_the_text_fits_the_terminal(claim):
 
 
 def test_the_page_keeps_what_was_recorded_of_experiments_that_did_not_run(tmp_path, monkeypatch, claim):
+    monkeypatch.setattr(raw_records, "RECORDS", tmp_path / "records")
     monkeypatch.setattr(claims_table, "RECORD", tmp_path / "claims.json")
     monkeypatch.setattr(claims_table, "PAGE", tmp_path / "README.md")
     monkeypatch.setattr(chapters, "PAGE", tmp_path / "results.md")

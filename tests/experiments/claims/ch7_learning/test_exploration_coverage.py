@@ -28,7 +28,7 @@ from mobee.errors import InvalidValue
 def values(end: float, floor: int = 100, repeats_at: int = 50):
     new = np.concatenate([np.arange(1, repeats_at), [end]]).astype(int)
     return {
-        "new_actions": new,
+        "gaps": np.diff(new, prepend=0),
         "new_states": np.arange(81) * 2,
         "state_actions": len(new),
         "floor": floor,
