@@ -23,7 +23,7 @@ from services.recorder.config import Config
 from services.recorder.files import Channel, Files
 from services.recorder.views import Views
 
-PERIOD = 0.1  # s between two looks at what has arrived: a message is received when it is seen
+PERIOD = 0.25  # s between two looks at what has arrived: a message is received when it is seen
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
@@ -66,7 +66,8 @@ class RecorderNode:
         self._trouble = ""
         self._last: dict[tuple[str, str], int] = {}  # number of the last message of each key and sender
         self._tap = Tap(service.bus.session, recorded_keys(config.everything), CAPACITY)
-        service.describe = self._describe
+        service.describe, service.mark = self._describe, self._mark
+        self._mark()
         service.on_alive(self._note_token)
         self._repeat()
 
@@ -161,8 +162,14 @@ class RecorderNode:
         now = time.time_ns()
         self._tokens.append(Raw(ALIVE, JSON, content, now, now))
 
+    def _mark(self) -> None:
+        """Measure from now on the share of a processor that this process takes."""
+        self._marked = time.monotonic(), time.process_time()
+
     def _describe(self) -> tuple[str, Mapping[str, float]]:
+        passed, worked = (now - then for now, then in zip((time.monotonic(), time.process_time()), self._marked, strict=True))
         numbers = {"messages": self._messages, "lost": self._lost, "megabytes": self._files.size / _MEGABYTE, "files": self._files.begun}
+        numbers["cpu_percent"] = 100.0 * worked / max(passed, 1e-3)
         lost = f", {self._lost} messages lost" if self._lost else ""
         return self._trouble or f"{self._messages} messages, {numbers['megabytes']:.1f} MB{lost}", numbers
 
