@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: asks the monitor for news, shows them, and sends what a person asks for.
 import { BodyPicture, title } from "./body.js";
+import { card, node, waiting } from "./cards.js";
 import { drawCurves, drawSurprise } from "./curves.js";
 import { MovePanel } from "./move.js";
 import { View } from "./view.js";
@@ -206,17 +207,6 @@ function showState() {
 
 // ---- the story
 
-function node(tag, kind, ...content) {
-  const made = document.createElement(tag);
-  made.className = kind;
-  made.append(...content);
-  return made;
-}
-
-function labelled(kind, label, text) {
-  return node("p", kind, node("b", "", `${label} `), text);
-}
-
 function showCards() {
   const known = new Set(state.cards.map((card) => title(card.part)));
   const silent = (state.status.agents || []).filter((name) => !known.has(name));
@@ -235,7 +225,12 @@ function showCards() {
 const kept = new Map(); // cards by part, with what they were made from: one that has not changed is not made again
 function keptCard(one) {
   const text = JSON.stringify([one, picture.chosen === one.part, state.control.taken]);
-  if (kept.get(one.part)?.text !== text) kept.set(one.part, { made: card(one), text });
+  if (kept.get(one.part)?.text !== text) {
+    const isChosen = picture.chosen === one.part;
+    const isTaken = Boolean(state.control.taken?.includes(one.part));
+    const click = () => choose(picture.chosen === one.part ? null : one.part);
+    kept.set(one.part, { made: card(one, { color: colorOf(one.part), isChosen, isTaken, isPast: state.past, click }), text });
+  }
   return kept.get(one.part).made;
 }
 
@@ -256,50 +251,6 @@ function arrange() {
   if (isArranged || !state.robot || !(runs("controller") || runs("port_filter"))) return;
   isArranged = true;
   if (!agents && !state.past) tab(runs("controller") ? "move" : "events");
-}
-
-function waiting(name, text) {
-  const made = node("article", "card", node("h3", "", name), node("p", "", text));
-  made.style.setProperty("--hue", "#98a5b3");
-  return made;
-}
-
-function card(one) {
-  const facts = one.n === undefined ? "" : `${one.n} transition${one.n === 1 ? "" : "s"}, ${share(one.tried)} of ${one.actions} actions tried, ${share(one.predictable)} predictable`;
-  const plot = node("canvas", "");
-  plot.title = "Surprise of the last 60 transitions, −ln p in nats; amber: it did not get where it wanted";
-  const small = node("small", "", facts);
-  small.title = "Predictable: tried at least twice, and at least 80 % of the tries ended alike";
-  const made = node("article", `card${picture.chosen === one.part ? " chosen" : ""}`, node("h3", "", node("span", "", one.title), small, plot));
-  made.dataset.part = one.part;
-  made.style.setProperty("--hue", `rgb(${colorOf(one.part)})`);
-  made.title = "Click: show the places of this part only";
-  const taken = state.control.taken?.includes(one.part);
-  if (one.reach && (taken || !one.now)) made.append(node("p", "now", one.reach));
-  else if (taken) made.append(node("p", "now", "Taken over on this page. Its agent rests. G gives it back."));
-  else if (one.now) {
-    const now = node("p", "", node("b", "", "Tries "), node("strong", "now", one.now), ` ${one.expects}`);
-    made.append(now);
-  } else if (!one.last) made.append(node("p", "", "Waiting for its first action to begin."));
-  else if (one.explorer && !state.past) made.append(labelled("", "Tries", "nothing yet: it chooses its next action."));
-  if (one.last) {
-    const kind = one.last.reached ? "reached" : "missed";
-    const line = labelled("", "Last", node("span", kind, one.last.outcome));
-    const surprise = node("span", "", ` ${one.last.surprise}`);
-    surprise.title = "Surprise: −ln of the probability that it gave to what happened. Learned: how much its model changed (Kullback-Leibler divergence).";
-    line.append(surprise);
-    made.append(line);
-  } else if (one.now && !taken) {
-    made.append(node("p", "", one.n ? `It goes on after ${one.n} transitions of an earlier run.` : "Its first action has not ended yet: nothing is learned so far."));
-  }
-  if (one.wants && !taken) made.append(labelled("", one.wants.startsWith("nothing") ? "Wants" : `Wants, ${one.chooses},`, one.wants));
-  made.addEventListener("click", () => choose(picture.chosen === one.part ? null : one.part));
-  return made;
-}
-
-function share(part) {
-  const percent = 100 * part;
-  return `${percent > 0 && percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`;
 }
 
 function choose(part) {
