@@ -5,7 +5,7 @@ Claim: the curious agent (AC in the paper) has tried all state-actions in about 
 tried (LT); the random agent (RAND) needs far longer.  At first, AC and LT try only new actions.
 Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
 Published number: AC/LT about 1/2, on the lattice of 81 states and their 16 nearest neighbours.
-Run time: 8 minutes on 2 cores.
+Run time: 4 minutes on 2 cores.
 
 The left arm, with its cable constraints and self-contacts ("constrained") and without both ("free"), on the published graph of the 16
 nearest neighbours and, with the first 10 seeds, on that of the equidistant neighbours.  Ties among the 16 nearest are drawn anew for every
