@@ -86,7 +86,8 @@ def _groups(robot: Robot, pairs: Ints, seed: int) -> Iterator[_Group]:
             of.setdefault(tuple(motors_between(robot, [links]).tolist()), []).append(pair)
     rng = np.random.default_rng(seed)
     for motors, members in sorted(of.items(), key=lambda one: (len(one[0]), one[0])):
-        drawn = rng.uniform(*robot.limits[list(motors)].T, (POSES, len(motors)))
+        low, high = robot.limits[list(motors)].T
+        drawn = rng.uniform(low, high, (POSES, len(motors)))
         poses = np.repeat(robot.home[None], POSES, axis=0)
         poses[:, motors] = drawn
         tested = replace(robot, field_pairs=robot.field_pairs[:0], solid_pairs=np.array(members, dtype=np.intp))

@@ -59,7 +59,8 @@ def _counted(robot: Robot, seed: int) -> Counter[tuple[int, int]]:
 
 
 def _drawn(robot: Robot, seed: int) -> Array:
-    return np.random.default_rng(seed).uniform(*robot.limits.T, (POSES, len(robot.limits)))
+    low, high = robot.limits.T
+    return np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
 
 
 def _counts(pose: Pose) -> Counter[tuple[int, int]]:
