@@ -8,26 +8,32 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from experiments.kit.experiment import MIN_SEEDS, Claim, open_with_few_seeds
-from experiments.kit.raw_records import keep_record, opened_record
+from experiments.frozen_rules import CONFIRMING_SEED, require_frozen
+from experiments.kit.experiment import MIN_SEEDS, VERDICTS, Claim
+from experiments.kit.raw_records import keep_record, opened_record, record_path
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
+from experiments.kit.statistics import RATES
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue
 
 HERE = Path(__file__).parent
 RECORD, PAGE = HERE / "claims.json", HERE / "README.md"
 Rows = list[tuple[str, Claim]]  # the name of the experiment, and one of its claims
-Recorded = dict[str, dict[str, Any]]  # by experiment: its claims as dicts, "commit", "seeds"
+Entry = dict[str, Any]  # claims as dicts, "commit", "seeds"
+Recorded = dict[str, Entry]  # by experiment; "confirmed": the entry of the run with new seeds, if there is one
 
-_INDENT = 11  # of the lines below a verdict
+FALSE_DISCOVERIES = RATES[0]  # expected share of wrong verdicts among all verdicts by intervals
+CONFIRMED = "confirmed"
+_INDENT = 16  # of the lines below a verdict
 
 _HEAD = f"""\
 # Experiments
 
 Published claims, the numbers that this project measured, and verdicts. `mobee experiment claims --write` writes this page from
-the runs with the most seeds, and of those from the newest; do not edit it.
+the runs with the most seeds, and of those from the newest; do not edit it. [Results](../docs/results.md#the-thesis-chapter-by-chapter) is
+the summary, chapter by chapter.
 
 An experiment is one module in `claims/`, by chapter of the thesis: its docstring states claim, source, published number and run time.
 `mobee experiment list` lists them, `mobee experiment run NAME` runs one, `mobee experiment figure NAME` draws it, and
@@ -35,16 +41,32 @@ An experiment is one module in `claims/`, by chapter of the thesis: its docstrin
 intervals, unless stated otherwise; the last column has the number of seeds.
 
 `records/` has the raw record of each run: the values of every seed, its settings and the commit. `mobee experiment claims --check` computes
-all numbers and verdicts of this page from them again, and `mobee experiment figure NAME --record` draws the figure.
+all numbers and verdicts of this page from them again, and `mobee experiment figure NAME --record` draws the figure. A row without a record
+is open.
 
 A sweep (`--seeds N`) uses all cores; each finished cell is written to disk, and `--resume` continues after Ctrl-C or a kill.
 `--engine ray` (`pip install "mobee[cluster]"`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
 is none; MoBeE must be installed on all of them in the same version. `--quick` runs a short version, to check that it works.
 
-**confirmed**: our number agrees with the publication. **refuted**: it does not. **open**: it was not measured, does not decide, or has
-fewer than {MIN_SEEDS} seeds.
+## Verdicts
 
-Terms in the rows. **state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
+| verdict | meaning |
+| --- | --- |
+{chr(10).join(f"| {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items())}
+
+- Intervals decide, never estimates: a claim holds if the whole interval lies within its bounds, and fails if the whole interval lies
+  outside.
+- That two things are equal is confirmed by an equivalence test: the whole interval of their difference lies within a stated margin.
+- A claim is one row. Where the publications leave a setting open, the row has the verdict of each setting, and its text the numbers.
+- A verdict needs {MIN_SEEDS} repetitions or more.
+- Of all verdicts by intervals, {FALSE_DISCOVERIES:.0%} are expected to be wrong: the rate at which a row's intervals still decide is its p
+  value, and Benjamini and Hochberg's procedure over all rows makes those open that are not distinguished from chance.
+- The thresholds are in [frozen.json](frozen.json). After they were frozen, experiments were run once more with seeds from {CONFIRMING_SEED}
+  on (`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`); the column "new seeds" has these verdicts.
+
+## Terms
+
+**state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
 once and to succeed once; **60-40**: to succeed twice. **constrained**, **free**: the left arm with its cable constraints and
 self-contacts, and without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first
 is better than a run of the other, with ties counted half.
@@ -66,27 +88,62 @@ def recorded() -> Recorded:
     return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
-def rows(record: Mapping[str, Mapping[str, Any]]) -> Rows:
-    """Return every claim, with its measured number if there is one."""
-    measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in record.items() for c in entry["claims"]}
-    return [(name, measured.get((name, claim.source, claim.text), claim)) for name, claim in stated()]
+def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Rows:
+    """Return every claim, with its measured numbers if there are any, and open if it is not distinguished from chance among all rows.
+
+    `confirms`: those of the runs with new seeds.
+    """
+    entries = {name: entry.get(CONFIRMED, {}) if confirms else entry for name, entry in record.items()}
+    measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in entries.items() for c in entry.get("claims", ())}
+    table = [(name, measured.get((name, claim.source, claim.text), claim)) for name, claim in stated()]
+    most = largest_rate([claim.p for _, claim in table if claim.p is not None])
+    why = f"not distinguished from chance among all rows: p {{:g}}, at most {most:.3f}"
+    return [(name, claim.undecided(why.format(claim.p)) if claim.p is not None and claim.p > most else claim) for name, claim in table]
 
 
-def found_in(folders: Sequence[Path]) -> Recorded:
-    """Return the measured claims of finished runs, including the parts of a chapter's run; see `better` for several runs.
+def largest_rate(p: Sequence[float]) -> float:
+    """Return the largest p value of a decision if at most FALSE_DISCOVERIES of the decisions shall be wrong (Benjamini, Hochberg 1995)."""
+    ordered = sorted(p)
+    allowed = [FALSE_DISCOVERIES * rank / len(ordered) for rank in range(1, len(ordered) + 1)]
+    return max((most for value, most in zip(ordered, allowed, strict=True) if value <= most), default=0.0)
+
+
+class Finished(NamedTuple):
+    """A finished run: its entry in the table, its folder, and the file with its versions."""
+
+    entry: Entry
+    run: Path
+    versions: Path
+
+
+def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
+    """Return the finished run of each experiment, the parts of a chapter's run included; of several as `better` chooses.
 
     Raises InvalidValue for a folder without results.
     """
-    found: Recorded = {}
-    for name, entry, versions in _finished_in(folders):
-        found = better(found, {name: _entry(entry, versions)})
+    found: dict[str, Finished] = {}
+    for name, run, versions in _finished_in(folders):
+        one = Finished(_entry(name, run, versions), run, versions)
+        if name not in found or _counts_more(one.entry, found[name].entry):
+            found[name] = one
     return found
 
 
-def _entry(run: Path, versions: Path) -> dict[str, Any]:
-    options = read(run / CONFIG)["options"]
-    claims = open_with_few_seeds(read(run / RESULTS), options)["claims"]
-    return {"seeds": options.get("seeds"), "commit": read(versions).get("commit"), "claims": claims}
+def found_in(folders: Sequence[Path]) -> Recorded:
+    """Return the entries of `runs_in`."""
+    return {name: one.entry for name, one in runs_in(folders).items()}
+
+
+def _entry(name: str, run: Path, versions: Path) -> Entry:
+    """Return the entry of a run; its claims are computed from its files by the present rules where they can be."""
+    experiment, options = load_experiment(name), read(run / CONFIG)["options"]
+    is_kept = any(any(run.glob(pattern)) for pattern in experiment.method.kept)
+    try:
+        results = experiment.method.results(run) if is_kept else read(run / RESULTS)
+    except KeyError as error:
+        raise InvalidValue(f"{run} was made by another version of {name!r}: it has no {error}. Run the experiment again.") from None
+    claims = experiment.decided(results, options)["claims"]
+    return {"seeds": options.get(experiment.repeats), "commit": read(versions).get("commit"), "claims": claims}
 
 
 def _finished_in(folders: Sequence[Path]) -> Iterator[tuple[str, Path, Path]]:
@@ -104,16 +161,31 @@ def _finished_in(folders: Sequence[Path]) -> Iterator[tuple[str, Path, Path]]:
                 yield current_name(read(entry / CONFIG)["experiment"]), entry, run / VERSIONS
 
 
+def _counts_more(one: Entry, before: Entry) -> bool:
+    return bool((one["seeds"] or 0) >= (before["seeds"] or 0))
+
+
 def better(before: Recorded, after: Recorded) -> Recorded:
     """Merge two records: of each experiment the one with more seeds, and `after` if both have equally many."""
-    more = {name: one for name, one in after.items() if name not in before or (one["seeds"] or 0) >= (before[name]["seeds"] or 0)}
-    return {**before, **more}
+    return replaced(before, {name: one for name, one in after.items() if name not in before or _counts_more(one, before[name])})
 
 
-def finished_runs(runs: Path) -> list[Path]:
-    """Return the folders of runs with results, without --quick runs, the oldest first."""
+def replaced(before: Recorded, after: Recorded) -> Recorded:
+    """Return a record with the entries of `after` in place of those before; what new seeds confirmed stays beside them."""
+    kept = {name: {CONFIRMED: entry[CONFIRMED]} for name, entry in before.items() if CONFIRMED in entry}
+    return before | {name: kept.get(name, {}) | entry for name, entry in after.items()}
+
+
+def with_confirmed(record: Recorded, found: Recorded) -> Recorded:
+    """Return the record with the entries of runs with new seeds beside those of the first runs."""
+    return record | {name: {**record.get(name, {"seeds": None, "commit": None, "claims": []}), CONFIRMED: found[name]} for name in found}
+
+
+def finished_runs(runs: Path, confirms: bool = False) -> list[Path]:
+    """Return the folders of runs with results, without --quick runs, the oldest first; `confirms`: those with new seeds."""
     folders = sorted({path.parent for path in runs.glob(f"*/{CONFIG}")}, key=lambda folder: folder.name)
-    return [folder for folder in folders if current_name(read(folder / CONFIG).get("experiment", "")) in EXPERIMENTS and _counts(folder)]
+    known = [folder for folder in folders if current_name(read(folder / CONFIG).get("experiment", "")) in EXPERIMENTS and _counts(folder)]
+    return [folder for folder in known if _confirms(folder) == confirms]
 
 
 def _counts(run: Path) -> bool:
@@ -121,70 +193,106 @@ def _counts(run: Path) -> bool:
     return is_finished and not read(run / CONFIG)["options"].get("quick")
 
 
-def keep_records(folders: Sequence[Path], record: Recorded) -> None:
-    """Write the raw records of the runs whose numbers are in the record; raises InvalidValue for a run that is too large."""
-    for name, run, versions in _finished_in(folders):
-        if record.get(name) == _entry(run, versions):
-            keep_record(name, run, versions, load_experiment(name).method.kept)
+def _confirms(run: Path) -> bool:
+    return int(read(run / CONFIG)["options"].get("seed", 0)) >= CONFIRMING_SEED
 
 
-def recomputed(name: str) -> list[dict[str, str]]:
-    """Return the claims of an experiment, computed from its raw record; raises InvalidValue if there is none."""
-    with opened_record(name) as run:
-        claims: list[dict[str, str]] = open_with_few_seeds(load_experiment(name).method.results(run), read(run / CONFIG)["options"])[
-            "claims"
-        ]
-        return claims
+def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> None:
+    """Write the raw records of the runs whose numbers are in the record; `confirms`: of those with new seeds.
+
+    Raises InvalidValue for a run that is too large, and for new seeds if the rules are not the frozen ones.
+    """
+    for name, one in found.items():
+        entry = record[name][CONFIRMED] if confirms else {key: value for key, value in record[name].items() if key != CONFIRMED}
+        if entry == one.entry:
+            if confirms:
+                require_frozen(name)
+            keep_record(name, one.run, one.versions, load_experiment(name).method.kept, confirms)
 
 
-def differences(name: str, entry: Mapping[str, Any]) -> list[str]:
-    """Compare the raw record of an experiment with its entry in the table; returns a line for each difference."""
+def recomputed(name: str, confirms: bool = False) -> Entry:
+    """Return the entry of an experiment, computed from its raw record; raises InvalidValue if there is none."""
+    with opened_record(name, confirms) as run:
+        return _entry(name, run, run / VERSIONS)
+
+
+def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> list[str]:
+    """Compare the raw record of an experiment with its entry in the table; returns a line for each difference.
+
+    An entry without a record must leave its claims open.
+    """
+    label = f"{name}, new seeds" if confirms else name
+    if not record_path(name, confirms).exists():
+        return [f"{label}, {c['text']!r}: {c['verdict']} without a raw record" for c in entry["claims"] if c["verdict"] != "open"]
     try:
-        found = {claim["text"]: claim for claim in recomputed(name)}
-        with opened_record(name) as run:
-            commit, seeds = read(run / VERSIONS).get("commit"), read(run / CONFIG)["options"].get("seeds")
+        own = recomputed(name, confirms)
     except InvalidValue as error:
         return [str(error)]
-    lines = [
-        f"{name}: the table has {key} {entry[key]}, the record {value}"
-        for key, value in (("commit", commit), ("seeds", seeds))
-        if value != entry[key]
-    ]
+    lines = [f"{label}: the table has {key} {entry[key]}, the record {own[key]}" for key in ("commit", "seeds") if own[key] != entry[key]]
+    found = {claim["text"]: claim for claim in own["claims"]}
     for claim in entry["claims"]:
-        own = found.get(claim["text"])
-        for key in ("ours", "verdict"):
-            if own is None or own[key] != claim[key]:
-                value = "no such claim" if own is None else own[key]
-                lines.append(f"{name}, {claim['text']!r}: the table has {key} {claim[key]!r}, the record gives {value!r}")
+        for key in ("ours", "verdict", "settings", "p"):
+            value = found[claim["text"]][key] if claim["text"] in found else "no such claim"
+            if value != claim[key]:
+                lines.append(f"{label}, {claim['text']!r}: the table has {key} {claim[key]!r}, the record gives {value!r}")
     return lines
 
 
+def all_differences(record: Recorded) -> list[str]:
+    """Compare all raw records with the table; returns a line for each difference."""
+    lines = [line for name, entry in record.items() for line in differences(name, entry)]
+    return lines + [line for name, entry in record.items() if CONFIRMED in entry for line in differences(name, entry[CONFIRMED], True)]
+
+
 def write_page(record: Recorded) -> None:
-    """Write the record and the page."""
-    kept = {name: record[name] for name in sorted(record) if name in EXPERIMENTS}
+    """Write the record and the page; the claims of an experiment without a raw record are open."""
+    kept = {name: _recorded_only(name, record[name]) for name in sorted(record) if name in EXPERIMENTS}
     RECORD.write_text(json.dumps(kept, indent=1) + "\n")
     PAGE.write_text(page(kept))
 
 
+def _recorded_only(name: str, entry: Entry) -> Entry:
+    if record_path(name).exists():
+        return entry
+    return entry | {"claims": [Claim(**claim).undecided("no raw record").record() for claim in entry["claims"]]}
+
+
 def page(record: Recorded) -> str:
-    """Return the page as Markdown."""
-    table = rows(record)
+    """Return the page as Markdown: the published claims, then our own aims."""
+    table, confirming = rows(record), dict(_keyed(rows(record, confirms=True)))
+    lines = [_HEAD]
+    for title, is_aim in (("Claims of the thesis and the paper", False), ("Aims of our own", True)):
+        chosen = [(name, claim) for name, claim in table if claim.is_aim == is_aim]
+        lines += [f"## {title}", "", f"{len(chosen)}: {counts_text(chosen)}.", ""]
+        lines += ["| source | claim | published | ours | verdict | new seeds | experiment |", "| --- | --- | --- | --- | --- | --- | --- |"]
+        for name, claim in chosen:
+            seeds = record.get(name, {}).get("seeds")
+            runs = f"{name}, {seeds} {load_experiment(name).repeats}" if seeds and claim.ours else name
+            again = confirming.get((name, claim.text))
+            new = f"{again.verdict}: {again.ours}" if again is not None and again.ours else ""
+            verdict = f"**{claim.verdict}**" + (f" ({claim.settings})" if claim.settings else "")
+            cells = (claim.source, claim.text, claim.published, claim.ours or "not measured", verdict, new, runs)
+            lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def counts_text(table: Rows) -> str:
+    """Return how many claims have each verdict, as text."""
     counts = Counter(claim.verdict for _, claim in table)
-    lines = [_HEAD, f"{len(table)} claims: {counts['confirmed']} confirmed, {counts['refuted']} refuted, {counts['open']} open.", ""]
-    lines += ["| source | claim | published | ours | verdict | experiment |", "| --- | --- | --- | --- | --- | --- |"]
-    for name, claim in table:
-        seeds = record.get(name, {}).get("seeds")
-        runs = f"{name}, {seeds} seeds" if seeds and claim.ours else name
-        cells = (claim.source, claim.text, claim.published, claim.ours or "not measured", f"**{claim.verdict}**", runs)
-        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join(lines) + "\n"
+    return ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+
+
+def _keyed(table: Rows) -> Iterator[tuple[tuple[str, str], Claim]]:
+    return (((name, claim.text), claim) for name, claim in table)
 
 
 def claims_text(table: Sequence[tuple[str, Claim]], width: int) -> str:
     """Return the claims as text for a terminal: each with its verdict, and the numbers below."""
     lines = []
     for _, claim in table:
-        parts = (f"{claim.text} ({claim.source})", f"published: {claim.published}", f"ours: {claim.ours or 'not measured'}")
+        parts = [f"{claim.text} ({claim.source})", f"published: {claim.published}", f"ours: {claim.ours or 'not measured'}"]
+        parts += [claim.settings] if claim.settings else []
         filled = [textwrap.fill(text, width - _INDENT, break_long_words=False, break_on_hyphens=False) for text in parts]
         lines.append(f"{claim.verdict:<{_INDENT}}" + "\n".join(filled).replace("\n", "\n" + " " * _INDENT))
     return "\n".join(lines)

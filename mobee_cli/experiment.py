@@ -12,8 +12,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.claims_table import better, claims_text, differences, finished_runs, found_in, keep_records, recorded, rows, write_page
-from experiments.kit.experiment import Claim, Experiment, open_with_few_seeds
+from experiments.claims_table import (
+    all_differences,
+    better,
+    claims_text,
+    finished_runs,
+    keep_records,
+    recorded,
+    replaced,
+    rows,
+    runs_in,
+    with_confirmed,
+    write_page,
+)
+from experiments.frozen_rules import freeze
+from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.raw_records import opened_record
 from experiments.kit.run_folder import (
@@ -61,6 +74,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     claiming = actions.add_parser("claims", help="print the table of claims", description=text)
     claiming.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, to use their numbers")
     claiming.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the runs with the most seeds")
+    text = "with --write: from runs with new seeds, which confirm those of the table; once for each experiment"
+    claiming.add_argument("--confirm", action="store_true", help=text)
+    text = "write the rules of experiments, by name, or of all, into experiments/frozen.json, before they are run with new seeds"
+    claiming.add_argument("--freeze", nargs="*", metavar="NAME", help=text)
     text = "compute all verdicts and intervals from the raw records of the repository, and compare them with the table"
     claiming.add_argument("--check", action="store_true", help=text)
     claiming.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of these runs' folders (default: runs)")
@@ -158,7 +175,7 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
 
 def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     try:
-        return open_with_few_seeds(experiment.method.run(options, folder), vars(options))
+        return experiment.decided(experiment.method.run(options, folder), vars(options))
     except MobeeError:
         if options.resume is None:
             discard_unused(folder)
@@ -168,14 +185,18 @@ def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) 
 def _claims(arguments: argparse.Namespace) -> int:
     if arguments.check:
         return _check(arguments)
-    if arguments.folders or not arguments.write:
-        folders = arguments.folders
-        record = {**recorded(), **found_in(folders)}
-    else:
-        folders = finished_runs(arguments.runs)
-        record = better(recorded(), found_in(folders))
+    if arguments.freeze is not None:
+        freeze([load_experiment(name).name for name in arguments.freeze or EXPERIMENTS])
+        return 0
+    if arguments.confirm and not arguments.write:
+        raise InvalidValue("--confirm needs --write: it writes the numbers of new seeds into the table.")
+    chosen = arguments.folders or (finished_runs(arguments.runs, arguments.confirm) if arguments.write else [])
+    found = runs_in(chosen)
+    entries = {name: one.entry for name, one in found.items()}
+    merge = with_confirmed if arguments.confirm else better if arguments.write and not arguments.folders else replaced
+    record = merge(recorded(), entries)
     if arguments.write:
-        keep_records(folders, record)
+        keep_records(found, record, arguments.confirm)
         write_page(record)
     table = rows(record)
     if arguments.json:
@@ -189,12 +210,12 @@ def _check(arguments: argparse.Namespace) -> int:
     """Compute the table from the raw records; the command fails if a number or a verdict differs."""
     if arguments.folders or arguments.write:
         raise InvalidValue("--check takes no RUN and no --write: it compares the raw records of the repository with the table.")
-    start, found = time.monotonic(), {name: differences(name, entry) for name, entry in recorded().items()}
-    lines = [line for differing in found.values() for line in differing]
+    start, record = time.monotonic(), recorded()
+    lines = all_differences(record)
     if arguments.json:
-        print(json.dumps({"experiments": len(found), "differences": lines, "seconds": round(time.monotonic() - start, 1)}, indent=2))
+        print(json.dumps({"experiments": len(record), "differences": lines, "seconds": round(time.monotonic() - start, 1)}, indent=2))
     else:
-        print("\n".join(lines + [f"{len(found)} experiments computed in {time.monotonic() - start:.0f} s: {len(lines)} differences"]))
+        print("\n".join(lines + [f"{len(record)} experiments computed in {time.monotonic() - start:.0f} s: {len(lines)} differences"]))
     return FAILED if lines else 0
 
 

@@ -6,17 +6,91 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
+from experiments.kit.statistics import error_rate
 from mobee.errors import InvalidValue, UnknownName
 
-Verdict = Literal["confirmed", "refuted", "open"]
-Measured = tuple[str, bool | None]
-"""Our number with its interval as text, and whether the claim holds; None: the measurement does not decide it."""
+AIM = "aim of this reproduction"
+"""Source, or part of the source, of a claim that is our own: it is met or not met."""
+Verdict = Literal["confirmed", "stronger", "depends", "not reproduced", "refuted", "open", "met", "not met"]
+"""See `verdict_of`."""
+VERDICTS: Mapping[Verdict, str] = {
+    "confirmed": "our numbers agree with the publication",
+    "stronger": "the effect has the published direction, and is larger than published",
+    "depends": "the claim holds in some of the settings that the publications leave open, and fails in others",
+    "not reproduced": "the claim fails here, but something that the publications leave open was not varied, and could explain it",
+    "refuted": "the claim fails in every setting that the publications leave open, and at least two were measured",
+    "open": "not measured, not decided by the intervals, not distinguished from chance among all rows, or too few repetitions",
+    "met": "an aim of our own that is reached",
+    "not met": "an aim of our own that is not reached",
+}
+Holds = bool | None | Literal["stronger"]
+"""Whether a claim holds; None: the intervals do not decide it; "stronger": it holds, and the effect is larger than published."""
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Whether a claim holds in each setting of something that the publications leave open.
+
+    `what`: what differs between the settings, as "unit of distance".  `holds`: by setting, as "1 cm".
+    """
+
+    what: str
+    holds: Mapping[str, Holds]
+
+
+Measured = tuple[str, Holds | Envelope]
+"""Our numbers with their intervals as text, and whether the claim holds."""
 Rule = Callable[[Any], Measured | None]
 """Computes `Measured` from the runs of an experiment, in the form in which the experiment groups them; None: they are too few."""
-MIN_SEEDS = 5  # for a verdict: a bootstrap interval of fewer values is too narrow
+MIN_SEEDS = 5  # repetitions for a verdict: a bootstrap interval of fewer values is too narrow
+
+
+def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = True) -> Verdict:
+    """Return the verdict; `untested`: something that the publications leave open, and that could explain a failure, was not varied.
+
+    A claim that holds in some settings and fails in others depends on them.  One that fails in all is refuted if they are two or more
+    and nothing is `untested`, else it is not reproduced.  An aim is not met if it is not met in one setting.
+    """
+    each = list(holds.holds.values()) if isinstance(holds, Envelope) else [holds]
+    fails, undecided = False in each, None in each or not each
+    if is_aim:
+        return "not met" if fails else "open" if undecided else "met"
+    if fails and (True in each or "stronger" in each):
+        return "depends"
+    if undecided:
+        return "open"
+    if fails:
+        return "refuted" if len(each) > 1 and not untested else "not reproduced"
+    return "stronger" if set(each) == {"stronger"} else "confirmed"
+
+
+def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured | None:
+    """Judge by a rule in each setting of `what`; the text is that of the first setting, and of those with another verdict."""
+    each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
+    if not each:
+        return None
+    (_, (text, first)), *others = each.items()
+    text = "; ".join([text, *(f"with {name}: {other}" for name, (other, holds) in others if holds != first)])
+    if len(each) == 1:
+        return text, first
+    if not any(isinstance(holds, Envelope) for _, holds in each.values()):
+        return text, Envelope(what, {name: holds for name, (_, holds) in each.items() if not isinstance(holds, Envelope)})
+    inner = {name: holds for name, (_, holds) in each.items() if isinstance(holds, Envelope)}
+    both = {f"{outer}, {name}": found for outer, envelope in inner.items() for name, found in envelope.holds.items()}
+    return text, Envelope(f"{what}, {next(iter(inner.values())).what}", both)
+
+
+_WORDS: Mapping[Holds, str] = {True: "holds", "stronger": "stronger than published", None: "open", False: "fails"}
+
+
+def _by_setting(envelope: Envelope) -> str:
+    """Return in which settings the claim holds and fails, as text."""
+    grouped = {word: [name for name, holds in envelope.holds.items() if holds == found] for found, word in _WORDS.items()}
+    return f"{envelope.what}: " + "; ".join(f"{word} with {', '.join(names)}" for word, names in grouped.items() if names)
 
 
 @dataclass(frozen=True)
@@ -24,8 +98,21 @@ class Claim:
     """A row of the table of claims.
 
     An experiment returns its claims measured, as dicts, under "claims" in its results; see `judged`.
-    `source`: where it was published, as "thesis 7.2.1, fig. 7.5".  `ours`: our number with its interval.  `rule`: how the experiment
-    measures and judges it, a function of its own below the decorator `claim`, or one of experiments.kit.rules.
+
+    Args:
+        source: where it was published, as "thesis 7.2.1, fig. 7.5"; contains `AIM` if it is ours.
+        text: the claim.
+        published: the published number.
+        ours: our numbers with their intervals.
+        verdict: see `verdict_of`.
+        settings: in which settings it holds and fails, if there are several.
+        p: the smallest error rate of the intervals at which they give the same verdict, at least MIN_RATE; 1 if they decide nothing at the
+            usual rate, None if the verdict uses no interval.
+        rule: how the experiment measures and judges it, a function of its own below the decorator `claim`, or one of
+            experiments.kit.rules.
+        varies: what differs between the settings in which it is judged, as "unit of distance"; its rule gets the runs of one setting, and
+            the experiment groups its runs by setting.  "": there is one setting, or the rule itself returns an Envelope.
+        untested: what the publications leave open and no run varies, if it could explain a failure; "" if there is nothing.
     """
 
     source: str
@@ -33,48 +120,58 @@ class Claim:
     published: str
     ours: str = ""
     verdict: Verdict = "open"
+    settings: str = ""
+    p: float | None = None
     rule: Rule | None = field(default=None, compare=False, repr=False, kw_only=True)
+    varies: str = field(default="", compare=False, kw_only=True)
+    untested: str = field(default="", compare=False, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
             raise UnknownName("verdict", self.verdict, get_args(Verdict))
 
-    def measured(self, ours: str, holds: bool | None) -> Claim:
-        """Return the claim with the measured number `ours`; `holds` is None where the measurement does not decide it."""
-        return replace(self, ours=ours, verdict="open" if holds is None else "confirmed" if holds else "refuted")
+    @property
+    def is_aim(self) -> bool:
+        """Whether the claim is our own."""
+        return AIM in self.source
 
-    def record(self) -> dict[str, str]:
+    def measured(self, ours: str, holds: Holds | Envelope) -> Claim:
+        """Return the claim with the measured numbers `ours` and its verdict."""
+        settings = _by_setting(holds) if isinstance(holds, Envelope) else ""
+        return replace(self, ours=ours, verdict=verdict_of(holds, self.is_aim, bool(self.untested)), settings=settings)
+
+    def undecided(self, why: str) -> Claim:
+        """Return the claim as open, with the reason beside its numbers."""
+        return self if self.verdict == "open" else replace(self, ours=f"{self.ours} ({why})", verdict="open")
+
+    def record(self) -> dict[str, Any]:
         """Return the claim as a dict for JSON, without its rule."""
-        return {name: getattr(self, name) for name in ("source", "text", "published", "ours", "verdict")}
+        return {name: getattr(self, name) for name in ("source", "text", "published", "ours", "verdict", "settings", "p")}
 
 
-def claim(source: str, text: str, published: str) -> Callable[[Rule], Claim]:
-    """Return a decorator that makes a rule the claim that it measures."""
-    return lambda rule: Claim(source, text, published, rule=rule)
+def claim(source: str, text: str, published: str, varies: str = "", untested: str = "") -> Callable[[Rule], Claim]:
+    """Return a decorator that makes a rule the claim that it measures; see `Claim`."""
+    return lambda rule: Claim(source, text, published, rule=rule, varies=varies, untested=untested)
 
 
-def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, str]]:
+def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, Any]]:
     """Return the claims as dicts, measured by their rules from the runs; none is measured unless the runs are `complete`."""
     return [(_by_rule(claim, runs) if complete else claim).record() for claim in claims]
 
 
 def _by_rule(claim: Claim, runs: Any) -> Claim:
-    measured = claim.rule(runs) if claim.rule else None
-    return claim.measured(*measured) if measured else claim
-
-
-def open_with_few_seeds(results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return results in which all claims are open if the run had fewer than MIN_SEEDS `seeds`; the numbers are kept."""
-    seeds = options.get("seeds")
-    if seeds is None or seeds >= MIN_SEEDS or "claims" not in results:
-        return dict(results)
-    return {**results, "claims": [_undecided(Claim(**claim), seeds).record() for claim in results["claims"]]}
-
-
-def _undecided(claim: Claim, seeds: int) -> Claim:
-    if claim.verdict == "open":
+    if claim.rule is None:
         return claim
-    return claim.measured(f"{claim.ours} ({seeds} {'seed' if seeds == 1 else 'seeds'}, too few for a verdict)", None)
+    rule = partial(in_settings, claim.varies, claim.rule) if claim.varies else claim.rule
+
+    def key(measured: Measured | None) -> object:
+        return measured and verdict_of(measured[1], claim.is_aim, bool(claim.untested))
+
+    measured, rate = error_rate(lambda: rule(runs), key)
+    if measured is None:
+        return claim
+    found = claim.measured(*measured)
+    return replace(found, p=1.0 if rate is not None and found.verdict == "open" else rate)
 
 
 class Method(Protocol):
@@ -125,7 +222,8 @@ class Steps:
 class Experiment:
     """An experiment as `mobee experiment` lists and runs it; the module of a claim holds one as EXPERIMENT.
 
-    `claim`: one line.  `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".  `name` and
+    `claim`: one line.  `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".  `repeats`: the
+    option that says how often a run repeats its measurement; with fewer than MIN_SEEDS repetitions no claim is decided.  `name` and
     `notes`, the docstring of the module, which states claim, source, published numbers and run time, are set by `experiments.registry`.
     """
 
@@ -133,5 +231,14 @@ class Experiment:
     source: str
     method: Method
     claims: tuple[Claim, ...] = ()
+    repeats: str = "seeds"
     name: str = ""
     notes: str = ""
+
+    def decided(self, results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
+        """Return results in which all claims are open if the run repeated its measurement too rarely; the numbers are kept."""
+        made = options.get(self.repeats)
+        if "claims" not in results or (made is not None and made >= MIN_SEEDS):
+            return dict(results)
+        why = f"{made or 'no'} {self.repeats if made != 1 else self.repeats.removesuffix('s')}, too few for a verdict"
+        return {**results, "claims": [Claim(**claim).undecided(why).record() for claim in results["claims"]]}

@@ -20,12 +20,12 @@ MAX_BYTES = 2_000_000  # of one archive
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
-def record_path(name: str) -> Path:
-    """Return the archive of an experiment."""
-    return RECORDS / f"{name}.zip"
+def record_path(name: str, confirms: bool = False) -> Path:
+    """Return the archive of an experiment, or with `confirms` of its run with new seeds."""
+    return RECORDS / f"{name}{'-confirm' if confirms else ''}.zip"
 
 
-def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str]) -> Path:
+def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False) -> Path:
     """Write the archive of a finished run, whole or not at all.
 
     Args:
@@ -33,14 +33,16 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str]) -> Pa
         run: folder of the run, with config.json.
         versions: the versions.json of the run.
         kept: glob patterns of files in the folder.
+        confirms: whether the run confirms the first one with new seeds; its archive is written once.
 
     Raises:
-        InvalidValue: no file matches, or the archive would be larger than MAX_BYTES.
+        InvalidValue: no file matches, the archive would be larger than MAX_BYTES, or another run has confirmed the experiment.
     """
     files = sorted({path for pattern in kept for path in run.glob(pattern)})
     if not files:
         raise InvalidValue(f"{run} has none of the files {', '.join(kept) or '(the experiment names none)'}: there is nothing to record.")
-    path, unfinished = record_path(name), record_path(name).with_suffix(".unfinished")
+    path = record_path(name, confirms)
+    unfinished = path.with_suffix(".unfinished")
     path.parent.mkdir(exist_ok=True)
     with zipfile.ZipFile(unfinished, "w") as archive:
         for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(run)), file) for file in files)]:
@@ -49,17 +51,20 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str]) -> Pa
     if (size := unfinished.stat().st_size) > MAX_BYTES:
         unfinished.unlink()
         raise InvalidValue(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: keep fewer values a cell.")
+    if confirms and path.exists() and path.read_bytes() != unfinished.read_bytes():
+        unfinished.unlink()
+        raise InvalidValue(f"{path} exists: an experiment is confirmed once, with the first run of new seeds. {run} is another run.")
     unfinished.replace(path)
     return path
 
 
 @contextmanager
-def opened_record(name: str) -> Iterator[Path]:
+def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
     """Extract the archive of an experiment; yields a folder like that of its run, and removes it afterwards.
 
     Raises InvalidValue if there is none, or if it is damaged.
     """
-    path = record_path(name)
+    path = record_path(name, confirms)
     if not path.exists():
         raise InvalidValue(f"there is no record of {name!r} in {path.parent}: run the experiment, then `mobee experiment claims --write`.")
     with tempfile.TemporaryDirectory(prefix="mobee-record-") as folder:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows of results and rules of claims, for runs from which numbers are computed and compared between groups.
 
-A group is the runs of one setting.  A verdict is True, False, or None where the numbers leave the claim open.
+A group is the runs of one setting.  A rule finds True, False, or None where the numbers leave the claim open.  Intervals decide, never the
+estimates: a claim holds if the whole interval is on its side of a bound, and fails if the whole interval is on the other side.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.kit.experiment import Measured
+from experiments.kit.experiment import Holds, Measured
 from experiments.kit.statistics import (
+    LEVEL,
+    difference_interval,
     estimate,
     improvement_interval,
     interquartile_mean,
@@ -71,28 +74,53 @@ def ratio_within(
     return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
 
 
-def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool:
-    """Return whether the interval of one group lies above those of all others, and above `least`."""
-    return interval(values[name])[0] > max([least, *(interval(group)[1] for key, group in values.items() if key != name)])
+def at_least_all(verdicts: Iterable[Holds]) -> Holds:
+    """Combine verdicts as `all_hold`, where "stronger" holds too; "stronger" only if all are."""
+    given = list(verdicts)
+    return "stronger" if given and set(given) == {"stronger"} else all_hold(True if one == "stronger" else one for one in given)
 
 
-def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool:
-    """Return whether the interval of one group lies below those of all others."""
-    return interval(values[name])[1] < min(interval(group)[0] for key, group in values.items() if key != name)
+def about(span: tuple[float, float], least: float, most: float, stronger_below: bool) -> Holds:
+    """Judge an effect of a published size by its interval (low, high); "stronger" beyond the bounds on the side of a larger effect."""
+    found = decides(span, least, most)
+    is_stronger = span[1] < least if stronger_below else span[0] > most
+    return "stronger" if found is False and is_stronger else found
+
+
+def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | None:
+    """Return whether the means of two groups differ by less than a margin: two one-sided tests, by the interval of the difference."""
+    return decides(difference_interval(first, second), -margin, margin)
+
+
+def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
+    """Return whether the mean of the first group is above that of the second; None if the interval of the difference contains 0."""
+    return _sign(difference_interval(first, second))
+
+
+def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool | None:
+    """Return whether the mean of one group is above those of all others, and above `least`."""
+    apart = [is_above(values[name], group) for key, group in values.items() if key != name]
+    return all_hold([*apart, *([decides(interval(values[name]), least=least)] if least > -np.inf else [])])
+
+
+def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
+    """Return whether the mean of one group is below those of all others."""
+    return all_hold(is_above(group, values[name]) for key, group in values.items() if key != name)
 
 
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Measured:
     """Judge whether the runs of one group are above those of every rival (or, with `worse`, below them).
 
     They are above a rival if the interval of the probability of improvement lies above one half.  They are not if it lies below, or if the
-    interval of the ratio lies within a tenth of 1.
+    groups are equivalent: the interval of the ratio lies within a tenth of 1.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
     for rival in rivals:
         first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
-        chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second)
+        chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second, LEVEL)
         parts.append(f"{rival} {estimate(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
-        verdicts.append(True if low > 0.5 else False if high < 0.5 or _about_equal(first, second) else None)
+        decided = decides(improvement_interval(first, second), least=0.5)
+        verdicts.append(False if decided is None and _about_equal(first, second) else decided)
     return ", ".join(parts), all_hold(verdicts)
 
 
@@ -105,8 +133,12 @@ def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
 
 def rises(change: ArrayLike) -> bool | None:
     """Return whether the change of the runs is above 0; None if its interval contains 0."""
-    low, high = interval(change)
-    return True if low > 0.0 else False if high < 0.0 else None
+    return _sign(interval(change))
+
+
+def _sign(span: tuple[float, float]) -> bool | None:
+    """Return whether an interval (low, high) lies above 0; None if it contains 0."""
+    return True if span[0] > 0.0 else False if span[1] < 0.0 else None
 
 
 def changes(before: Array, after: Array) -> str:

@@ -6,7 +6,10 @@ Interquartile means and stratified bootstrap intervals as in Agarwal et al. 2021
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +22,60 @@ RESAMPLES = 2000  # bootstrap samples
 LEVEL = 0.95  # of the intervals
 Statistic = Callable[[Array], Array]  # of values along the last axis
 Run = TypeVar("Run")
+Found = TypeVar("Found")
+RATES = (0.05, 0.04, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
+"""Error rates of intervals at which a decision is repeated; a bootstrap of RESAMPLES does not resolve smaller ones."""
+MIN_RATE = RATES[-1]
+
+
+@dataclass
+class _Decisions:
+    """The level of the intervals that decide, and whether one was computed."""
+
+    level: float = LEVEL
+    used: bool = False
+
+
+_decisions: ContextVar[_Decisions] = ContextVar("decisions")
+
+
+@contextmanager
+def _deciding_at(level: float) -> Iterator[_Decisions]:
+    made = _Decisions(level)
+    token = _decisions.set(made)
+    try:
+        yield made
+    finally:
+        _decisions.reset(token)
+
+
+def decision_level() -> float:
+    """Return the level of the intervals that decide: LEVEL, or what `error_rate` asks for."""
+    made = _decisions.get(_Decisions())
+    made.used = True
+    return made.level
+
+
+def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lambda found: found) -> tuple[Found, float | None]:
+    """Return what `decide` finds with 95 % intervals, and the smallest of RATES for its intervals at which its `key` is the same.
+
+    This rate is a p value of the decision, rounded up to RATES: of several intervals that must all decide, the largest counts.  None if
+    `decide` computes no interval.
+    """
+
+    def found_at(rate: float) -> tuple[Found, bool]:
+        with _deciding_at(1.0 - rate) as made:
+            return decide(), made.used
+
+    first, has_interval = found_at(RATES[0])
+    if not has_interval:
+        return first, None
+    low, high = 0, len(RATES) - 1  # RATES[low] gives the same
+    middle = high  # most decisions hold at the smallest rate
+    while low < high:
+        low, high = (middle, high) if key(found_at(RATES[middle])[0]) == key(first) else (low, middle - 1)
+        middle = (low + high + 1) // 2
+    return first, RATES[low]
 
 
 def interquartile_mean(values: ArrayLike) -> float:
@@ -45,8 +102,9 @@ def interval(
     strata: ArrayLike | None = None,
     seed: int = 0,
     resamples: int = RESAMPLES,
+    level: float | None = None,
 ) -> tuple[float, float]:
-    """Return the 95 % interval of a statistic by the stratified percentile bootstrap.
+    """Return the interval of a statistic by the stratified percentile bootstrap.
 
     Args:
         values: (n,).
@@ -54,19 +112,21 @@ def interval(
         strata: (n,) labels; values are drawn anew within each label.  None: one stratum.
         seed: of the bootstrap.
         resamples: number of bootstrap samples.
+        level: of the interval; None: that of intervals that decide, 95 % unless `error_rate` asks for another.
     """
     given = _checked(values)
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
     if labels.shape != given.shape:
         raise InvalidValue(f"strata of shape {labels.shape}: give one label for each of the {len(given)} values.")
     found = statistic(given[_drawn(labels, resamples, seed)])
-    low, high = np.quantile(found, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
+    share = decision_level() if level is None else level
+    low, high = np.quantile(found, [(1.0 - share) / 2.0, (1.0 + share) / 2.0])
     return float(low), float(high)
 
 
 def estimate(values: ArrayLike, digits: int = 2) -> str:
     """Return the interquartile mean and its 95 % interval as text."""
-    low, high = interval(values)
+    low, high = interval(values, level=LEVEL)
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
@@ -85,14 +145,19 @@ def ratio(above: ArrayLike, below: ArrayLike) -> float:
     return interquartile_mean(above) / interquartile_mean(below)
 
 
-def ratio_interval(above: ArrayLike, below: ArrayLike) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval of `ratio`; both groups are resampled."""
-    return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second))
+def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = None) -> tuple[float, float]:
+    """Return the bootstrap interval of `ratio`; both groups are resampled.  `level`: as in `interval`."""
+    return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second), level)
+
+
+def difference_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
+    """Return the bootstrap interval of the difference of the interquartile means of two groups; both are resampled."""
+    return _of_both(first, second, lambda one, other: interquartile_means(one) - interquartile_means(other), level)
 
 
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
     """Return `ratio` and its 95 % interval as text."""
-    low, high = ratio_interval(above, below)
+    low, high = ratio_interval(above, below, LEVEL)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
@@ -101,9 +166,9 @@ def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
     return float(_improvements(_checked(first), _checked(second)))
 
 
-def improvement_interval(first: ArrayLike, second: ArrayLike) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval of `probability_of_improvement`; both groups are resampled."""
-    return _of_both(first, second, _improvements)
+def improvement_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
+    """Return the bootstrap interval of `probability_of_improvement`; both groups are resampled.  `level`: as in `interval`."""
+    return _of_both(first, second, _improvements, level)
 
 
 def _improvements(first: Array, second: Array) -> Array:
@@ -113,11 +178,12 @@ def _improvements(first: Array, second: Array) -> Array:
     return found
 
 
-def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Array], Array]) -> tuple[float, float]:
+def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Array], Array], level: float | None) -> tuple[float, float]:
     """Return the bootstrap interval of a statistic of two groups, which are along the last axes."""
     groups = [_checked(first), _checked(second)]
     sizes = [len(group) for group in groups]
-    return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), np.repeat([0, 1], sizes))
+    labels = np.repeat([0, 1], sizes)
+    return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), labels, level=level)
 
 
 def relative_spread(counts: ArrayLike) -> float:

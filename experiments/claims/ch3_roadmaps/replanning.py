@@ -281,4 +281,5 @@ EXPERIMENT = Experiment(
     source="thesis 4.3.2, fig. 4.7",
     method=Steps(add_arguments, run, figure, results, (f"launch-*/{MEASURED}", f"launch-000/{POSES}")),
     claims=CLAIMS,
+    repeats="crossings",
 )

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.command_line import positive_whole
-from experiments.kit.experiment import Experiment, Steps, open_with_few_seeds
+from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.run_folder import CONFIG, RESULTS, read, write
 from experiments.kit.sweep import ENGINES
@@ -77,7 +77,8 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
             own = dict(vars(options))
             write(place / CONFIG, {"experiment": name, "options": own})
             vars(options).update(runs=folder, resume=place, json=False)  # as the command has them
-            write(place / RESULTS, open_with_few_seeds(load_experiment(name).method.run(options, place), own))
+            experiment = load_experiment(name)
+            write(place / RESULTS, experiment.decided(experiment.method.run(options, place), own))
         drawn = _drawn(name, place)
         (place / _FAILURE).unlink(missing_ok=True)
     except Exception as error:  # of the experiment's own code: it is reported, and the others go on

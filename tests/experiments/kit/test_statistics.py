@@ -9,8 +9,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.kit.rules import all_hold, better, decides, ratio_within, rises, row, stands_above, stands_below, texts, within
+from experiments.kit.rules import (
+    about,
+    all_hold,
+    better,
+    decides,
+    equivalent,
+    ratio_within,
+    rises,
+    row,
+    stands_above,
+    stands_below,
+    texts,
+    within,
+)
 from experiments.kit.statistics import (
+    LEVEL,
+    RATES,
+    difference_interval,
+    error_rate,
     estimate,
     gini,
     interquartile_mean,
@@ -150,10 +167,47 @@ def test_a_change_rises_where_its_interval_is_above_zero(change, expected):
     assert rises(change + np.array([-0.1, 0.1, -0.08, 0.09, 0.0, 0.01])) is expected
 
 
-def test_a_group_stands_out_where_its_interval_is_apart_from_all_others():
+def test_a_group_stands_out_where_its_difference_from_all_others_is_decided():
     groups = {"low": [1.0, 1.1, 1.2], "middle": [2.0, 2.1, 2.2], "high": [3.0, 3.1, 3.2]}
-    assert stands_above(groups, "high") and not stands_above(groups, "middle") and not stands_above(groups, "high", least=4.0)
-    assert stands_below(groups, "low") and not stands_below(groups, "middle")
+    assert (
+        stands_above(groups, "high") is True
+        and stands_above(groups, "middle") is False
+        and stands_above(groups, "high", least=4.0) is False
+    )
+    assert stands_below(groups, "low") is True and stands_below(groups, "middle") is False
+    assert stands_above(groups | {"same": groups["high"]}, "high") is None
+
+
+@given(st.lists(st.floats(-10, 10), min_size=5, max_size=12), st.floats(-12, 12))
+def test_a_decision_at_a_smaller_rate_is_no_other_decision(values, bound):
+    def at(level):
+        return decides(interval(values, level=level, resamples=200), least=bound)
+
+    found = [at(1.0 - rate) for rate in RATES]
+    decided = [one for one in found if one is not None]
+    assert len(set(decided)) <= 1 and found == decided + [None] * (len(found) - len(decided))
+    first, rate = error_rate(lambda: decides(interval(values, resamples=200), least=bound))
+    assert first == found[0] and rate == (RATES[len(decided) - 1] if decided else RATES[-1])
+
+
+def test_the_text_of_an_estimate_is_the_same_at_every_rate():
+    said = []
+    values = [1.0, 2.0, 3.0, 4.0, 5.0]
+    error_rate(lambda: said.append(estimate(values)) or interval(values))
+    assert set(said) == {estimate(values)} and interval(values) == interval(values, level=LEVEL)
+
+
+@given(st.lists(st.floats(0, 10), min_size=5, max_size=12), st.lists(st.floats(0, 10), min_size=5, max_size=12), st.floats(0.1, 3))
+def test_equal_by_an_equivalence_test_is_never_different_by_more_than_the_margin(first, second, margin):
+    found = equivalent(first, second, margin)
+    low, high = difference_interval(first, second)
+    assert found is (True if -margin <= low and high <= margin else False if low > margin or high < -margin else None)
+    assert equivalent(second, first, margin) in (found, None) or found is None
+
+
+@pytest.mark.parametrize(("span", "verdict"), [((0.45, 0.55), True), ((0.2, 0.3), "stronger"), ((0.35, 0.45), None), ((0.7, 0.8), False)])
+def test_an_effect_beyond_its_published_size_is_stronger_on_one_side_alone(span, verdict):
+    assert about(span, 0.4, 0.6, stronger_below=True) == verdict
 
 
 def test_rules_tell_the_estimate_and_judge_its_interval():

@@ -381,4 +381,5 @@ EXPERIMENT = Experiment(
     source="aim of this reproduction; thesis 8, 9.3",
     method=Steps(add_arguments, run, figure, results, (f"start-*/*/{BLOCK}",)),
     claims=CLAIMS,
+    repeats="starts",
 )

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from experiments.claims.ch7_learning.constraint_discovery import (
     DISCOUNTS,
     FAILING,
     INITIAL,
+    LAWS,
+    PUBLISHED_LAW,
     fail,
     findings,
     numbers,
@@ -36,7 +40,10 @@ def explored(failing: int, discount: float = 0.9):
 def every_setting(work):
     return finished(
         work,
-        [Cell(f"{i}-{d}-{s}", s, {"initial": i, "discount": d, "least": 5}) for i in INITIAL for d in DISCOUNTS for s in range(2)],
+        [
+            Cell(f"{n}-{i}-{d}-{s}", s, {"law": law, "initial": i, "discount": d, "least": 5})
+            for (n, law), i, d, s in product(enumerate(LAWS), INITIAL, DISCOUNTS, range(2))
+        ],
     )
 
 
@@ -48,6 +55,8 @@ def test_tries_and_failures_decide_the_claims():
 
 
 def test_claims_stay_open_while_settings_were_not_run():
-    results = findings(finished(lambda cell: explored(0), [Cell("a", 0, {"initial": "50-50", "discount": 0.9, "least": 5})]))
+    results = findings(
+        finished(lambda cell: explored(0), [Cell("a", 0, {"law": PUBLISHED_LAW, "initial": "50-50", "discount": 0.9, "least": 5})])
+    )
     assert {claim["verdict"] for claim in results["claims"]} == {"open"}
-    assert results["runs"]["50-50, discount 0.9"]["failing_actions_fail"] == 1.0
+    assert results["runs"]["as published, 50-50, discount 0.9"]["failing_actions_fail"] == 1.0

@@ -17,7 +17,8 @@ def test_a_random_choice_has_relative_variance_one_and_equal_tries_zero():
 
 def test_every_action_of_the_hypercube_succeeds_and_is_tried_five_times():
     found = finished(
-        lambda cell: trial(cell.settings, cell.seed), [Cell(f"g{discount:g}-s0", 0, {"discount": discount}) for discount in (0.5, 0.9)]
+        lambda cell: trial(cell.settings, cell.seed),
+        [Cell(f"g{discount:g}-s0", 0, {"initial": "50-50", "discount": discount}) for discount in (0.5, 0.9)],
     )
     values = found["g0.9-s0"].values
     assert values["failed"] == 0 and values["tries"].min() == 5 and values["early_tries"].sum() == 50
