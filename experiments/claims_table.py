@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from experiments import chapters
 from experiments.frozen_rules import CONFIRMING_SEED, require_frozen
 from experiments.kit.experiment import MIN_SEEDS, VERDICTS, Claim
 from experiments.kit.raw_records import keep_record, opened_record, record_path
@@ -245,10 +246,11 @@ def all_differences(record: Recorded) -> list[str]:
 
 
 def write_page(record: Recorded) -> None:
-    """Write the record and the page; the claims of an experiment without a raw record are open."""
+    """Write the record, the page, and the chapters in docs/results.md; the claims of an experiment without a raw record are open."""
     kept = {name: _recorded_only(name, record[name]) for name in sorted(record) if name in EXPERIMENTS}
     RECORD.write_text(json.dumps(kept, indent=1) + "\n")
     PAGE.write_text(page(kept))
+    chapters.PAGE.write_text(chapters.with_section(chapters.PAGE.read_text(), chapters_text(kept)))
 
 
 def _recorded_only(name: str, entry: Entry) -> Entry:
@@ -275,6 +277,12 @@ def page(record: Recorded) -> str:
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
         lines.append("")
     return "\n".join(lines).rstrip() + "\n"
+
+
+def chapters_text(record: Recorded) -> str:
+    """Return the published claims by chapter of the thesis, as Markdown."""
+    untested = {(name, claim.text): claim.untested for name, claim in stated()}
+    return chapters.section(rows(record), lambda name, text: untested[name, text])
 
 
 def counts_text(table: Rows) -> str:

@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol, get_args
 from experiments.kit.statistics import error_rate
 from mobee.errors import InvalidValue, UnknownName
 
-AIM = "aim of this reproduction"
+OUR_AIM = "aim of this reproduction"
 """Source, or part of the source, of a claim that is our own: it is met or not met."""
 Verdict = Literal["confirmed", "stronger", "depends", "not reproduced", "refuted", "open", "met", "not met"]
 """See `verdict_of`."""
@@ -100,7 +100,7 @@ class Claim:
     An experiment returns its claims measured, as dicts, under "claims" in its results; see `judged`.
 
     Args:
-        source: where it was published, as "thesis 7.2.1, fig. 7.5"; contains `AIM` if it is ours.
+        source: where it was published, as "thesis 7.2.1, fig. 7.5"; contains `OUR_AIM` if it is ours.
         text: the claim.
         published: the published number.
         ours: our numbers with their intervals.
@@ -133,7 +133,7 @@ class Claim:
     @property
     def is_aim(self) -> bool:
         """Whether the claim is our own."""
-        return AIM in self.source
+        return OUR_AIM in self.source
 
     def measured(self, ours: str, holds: Holds | Envelope) -> Claim:
         """Return the claim with the measured numbers `ours` and its verdict."""

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import binomtest
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
@@ -184,6 +185,12 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
     sizes = [len(group) for group in groups]
     labels = np.repeat([0, 1], sizes)
     return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), labels, level=level)
+
+
+def share_interval(successes: int, tries: int, level: float | None = None) -> tuple[float, float]:
+    """Return the interval of a share of successes (Wilson 1927); `level`: as in `interval`.  Tries must be independent."""
+    given = binomtest(successes, tries).proportion_ci(decision_level() if level is None else level, method="wilson")
+    return float(given.low), float(given.high)
 
 
 def relative_spread(counts: ArrayLike) -> float:

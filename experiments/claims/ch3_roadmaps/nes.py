@@ -8,13 +8,15 @@ A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) 
 rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  Counted are the evaluations until f < 1e-8;
 a run that does not get there counts with 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
 default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
-tasks": on one of the twelve at most .95 of CMA-ES's evaluations; "comparable": at most 1.5 times as many, median of the tasks.
+tasks": fewer on one of the twelve or more, by intervals at a twelfth of the error rate; "comparable": at most 1.5 times as many, median of
+the tasks.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -22,17 +24,17 @@ import numpy as np
 
 from experiments.bench.nes import FUNCTIONS, MAX_EVALUATIONS, STRATEGIES, search
 from experiments.bench.peers import load_cma
-from experiments.kit.experiment import Claim, Experiment, Measured, Rule, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Envelope, Experiment, Measured, judged
 from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
 from experiments.kit.rules import within
-from experiments.kit.statistics import estimate, ratio, ratio_estimate, ratio_interval
+from experiments.kit.statistics import decision_level, estimate, ratio, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee.arrays import Array
 
 DIMENSIONS = (10, 20, 41)
 QUICK_MAX_EVALUATIONS = 20_000  # evaluations
 COSTS = {"nes": 1.0, "cma": 6.0, "xnes": 4.0, "snes": 8.0}  # beside each other
-FEWER, COMPARABLE, REQUIRED = 0.95, 1.5, 1.05  # evaluations over those of CMA-ES
+COMPARABLE, REQUIRED = 1.5, 1.05  # evaluations over those of CMA-ES
 NAMES = {"nes": "the library's default", "cma": "CMA-ES", "xnes": "xNES as published", "snes": "SNES as published"}
 
 Task = tuple[str, int]  # function and dimensions
@@ -91,53 +93,55 @@ def tasks(runs: Runs) -> list[Task]:
     return [(function, d) for function in FUNCTIONS for d in DIMENSIONS if any(task == (function, d) for _, task in runs)]
 
 
-def _better(name: str) -> Rule:
-    """Return the rule that the interval of one task lies below the bound; it fails if all lie above it."""
-
-    def of_runs(runs: Runs) -> Measured:
-        pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
-        spans = {task: ratio_interval(*pair) for task, pair in pairs.items()}
-        fewer = [task for task, span in spans.items() if span[1] <= FEWER]
-        best = min(pairs, key=lambda task: ratio(*pairs[task]))
-        text = (
-            f"fewer than {FEWER} x CMA-ES's evaluations on {len(fewer)} of {len(pairs)} tasks; at best"
-            f" {ratio_estimate(*pairs[best]).replace(' ', ' x ', 1)} ({best[0]}, {best[1]} dimensions)"
-        )
-        return text, True if fewer else False if all(span[0] > FEWER for span in spans.values()) else None
-
-    return of_runs
+def _fewer(name: str, runs: Runs) -> tuple[str, bool | None]:
+    """Judge whether a strategy needs fewer evaluations than CMA-ES on one task or more; each of the tasks is a look (Bonferroni)."""
+    pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
+    level = 1.0 - (1.0 - decision_level()) / len(pairs)
+    spans = {task: ratio_interval(*pair, level) for task, pair in pairs.items()}
+    found = [task for task, span in spans.items() if span[1] < 1.0]
+    best = min(pairs, key=lambda task: ratio(*pairs[task]))
+    text = (
+        f"{NAMES[name]}: fewer evaluations on {len(found)} of {len(pairs)} tasks, at best"
+        f" {ratio_estimate(*pairs[best]).replace(' ', ' x ', 1)} ({best[0]}, {best[1]} dimensions)"
+    )
+    return text, True if found else False if all(span[0] > 1.0 for span in spans.values()) else None
 
 
-def _at_most(name: str, most: float) -> Rule:
-    """Return the rule for the evaluations over those of CMA-ES from the same start, median over the tasks."""
-
-    def of_runs(runs: Runs) -> Measured:
-        medians = np.median([runs[name, task] / runs["cma", task] for task in tasks(runs)], axis=0)
-        return within(medians, most=most, text="{} x CMA-ES's evaluations, median of the tasks")
-
-    return of_runs
+def _medians(name: str, runs: Runs) -> Array:
+    """Return the evaluations over those of CMA-ES from the same start, median over the tasks, (seeds,)."""
+    medians: Array = np.median([runs[name, task] / runs["cma", task] for task in tasks(runs)], axis=0)
+    return medians
 
 
-_OURS = ("xnes", "snes", "nes")
+def _with_each(rule: Callable[[str, Runs], Measured], runs: Runs) -> Measured:
+    each = {NAMES[name]: rule(name, runs) for name in OURS}
+    found = {name: holds for name, (_, holds) in each.items() if not isinstance(holds, Envelope)}
+    return "; ".join(text for text, _ in each.values()), Envelope("strategy", found)
+
+
+def _comparable(name: str, runs: Runs) -> Measured:
+    return within(_medians(name, runs), most=COMPARABLE, text=f"{NAMES[name]} {{}} x CMA-ES's evaluations, median of the tasks")
+
+
+OURS = ("xnes", "snes", "nes")
 CLAIMS = (
-    *(
-        Claim("thesis 3.1", f"NES outperforms CMA on some tasks: {NAMES[name]}", "no number, some tasks", rule=_better(name))
-        for name in _OURS
-    ),
-    *(
-        Claim(
-            "thesis 3.1",
-            f"NES is in many ways comparable to CMA (at most {COMPARABLE} x the evaluations): {NAMES[name]}",
-            "no number",
-            rule=_at_most(name, COMPARABLE),
-        )
-        for name in _OURS
+    Claim(
+        "thesis 3.1",
+        "NES outperforms CMA on some tasks: fewer evaluations on one of the twelve or more",
+        "no number, some tasks",
+        rule=partial(_with_each, _fewer),
     ),
     Claim(
-        "aim of this reproduction",
-        "the default NES needs at most 1.05 x CMA-ES's evaluations, median of the tasks",
+        "thesis 3.1",
+        f"NES is in many ways comparable to CMA: at most {COMPARABLE} x the evaluations",
+        "no number",
+        rule=partial(_with_each, _comparable),
+    ),
+    Claim(
+        OUR_AIM,
+        f"the default NES needs at most {REQUIRED} x CMA-ES's evaluations, median of the tasks",
         f"at most {REQUIRED}",
-        rule=_at_most("nes", REQUIRED),
+        rule=lambda runs: within(_medians("nes", runs), most=REQUIRED, text="{} x CMA-ES's evaluations, median of the tasks"),
     ),
 )
 

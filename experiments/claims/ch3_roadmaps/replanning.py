@@ -43,7 +43,7 @@ from experiments.claims.ch3_roadmaps.replanning_live import (
     robot,
 )
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
+from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, add_backend, launch, read_done, write_job
 from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
 from experiments.kit.plots import finish, new_figure
@@ -204,7 +204,7 @@ def around(crossings: Crossings) -> Measured:
     return text, _if_enough(crossings, arrived == len(bumped))
 
 
-@claim("aim of this reproduction", "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms")
+@claim(OUR_AIM, "the new path is under way within 200 ms of the bump, live, on robot_sim's clock", "at most 200 ms")
 def soon(crossings: Crossings) -> Measured:
     command, turn = (np.array([getattr(one, name) for one in crossings if one.bumped]) for name in ("command", "turn"))
     text = (
@@ -214,7 +214,7 @@ def soon(crossings: Crossings) -> Measured:
     return text, _if_enough(crossings, bool(command.max() <= SOON))
 
 
-@claim("aim of this reproduction", "no solid contact with the ball deeper than 2 mm while it re-plans", "0")
+@claim(OUR_AIM, "no solid contact with the ball deeper than 2 mm while it re-plans", "0")
 def harmless(crossings: Crossings) -> Measured:
     deepest, clear = 1e3 * max(one.deepest for one in crossings), sum(one.deepest == 0.0 for one in crossings)
     text = f"{deepest:.1f} mm; no contact in {clear} of {len(crossings)} crossings: the ball may become solid around the hand"

@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.kit.cells import CellResult
-from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space, robot
 from experiments.kit.learning.exploration import explore
 from experiments.kit.learning.truth import Truth, l1, truth_of, walk
 from experiments.kit.plots import new_figure
-from experiments.kit.rules import of_each, row, texts
+from experiments.kit.rules import all_hold, decides, is_above, of_each, row, texts
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, Gains, Model, MotorParameters, OfflinePlant, World, sphere
@@ -242,12 +242,12 @@ def _above(number: Number, control: Number, rival: str, text: str) -> Rule:
     """Return the rule that a number of the curious agent is above 1, and above the rival's control, with both changes."""
 
     def of_runs(runs: Runs) -> Measured:
-        parts, holds = [], True
+        parts, holds = list[str](), list[bool | None]()
         for change in CHANGES:
             here, there = [number(run) for run in runs[change, "curious", 1.0]], [control(run) for run in runs[change, rival, 1.0]]
             parts.append(text.format(CHANGES[change], estimate(here), estimate(there)))
-            holds = holds and interval(here)[0] > max(1.0, interval(there)[1])
-        return "; ".join(parts), holds
+            holds += [decides(interval(here), least=1.0), is_above(here, there)]
+        return "; ".join(parts), all_hold(holds)
 
     return of_runs
 
@@ -256,15 +256,15 @@ def _sooner(explorer: str, forgetting: float) -> Rule:
     """Return the rule that an agent that forgets relearns sooner than one that does not, with both changes."""
 
     def of_runs(runs: Runs) -> Measured:
-        parts, holds = [], True
+        parts, holds = list[str](), list[bool | None]()
         for change in CHANGES:
             groups = [runs[change, explorer, factor] for factor in (forgetting, 1.0)]
             values = [[run.relearned_within for run in group] for group in groups]
             never = [sum(np.isinf(run.relearned) for run in group) for group in groups]
             with_, without = (f"{estimate(group, 0)} ({count} runs not relearned)" for group, count in zip(values, never, strict=True))
             parts.append(f"{CHANGES[change]}: {with_}, without forgetting {without}")
-            holds = holds and interval(values[0])[1] < interval(values[1])[0]
-        return "; ".join(parts), holds
+            holds.append(is_above(values[1], values[0]))
+        return "; ".join(parts), all_hold(holds)
 
     return of_runs
 
@@ -290,7 +290,7 @@ tried = Claim(
 )
 def corrected(runs: Runs) -> Measured:
     left = of_each({name: runs[change, "curious", 1.0] for change, name in CHANGES.items()}, lambda run: run.error_left)
-    return texts(left, form="{}: {}"), all(interval(errors)[1] <= RELEARNED for errors in left.values())
+    return texts(left, form="{}: {}"), all_hold(decides(interval(errors), most=RELEARNED) for errors in left.values())
 
 
 CLAIMS = (
@@ -299,7 +299,7 @@ CLAIMS = (
     corrected,
     *(
         Claim(
-            "aim of this reproduction",
+            OUR_AIM,
             f"a {agent} agent that forgets old counts (factor {factor:g}) relearns sooner: "
             "transitions until the error of changed outcomes is halved",
             "sooner",

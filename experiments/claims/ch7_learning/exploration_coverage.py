@@ -29,7 +29,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import shortest_path
 
-from experiments.kit.experiment import Claim, Experiment, Measured, claim, in_settings, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, claim, in_settings, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, Neighbours, arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import first_places, first_tries, goals_of
@@ -280,7 +280,7 @@ def _near_floor(world: str, published: Published) -> Measured:
 
 near_floor = {
     world: Claim(
-        "aim of this reproduction",
+        OUR_AIM,
         f"to try every action the curious agent needs at most {most} times the transitions of the shortest possible walk ({world} arm)",
         f"at most {most}",
         rule=partial(_near_floor, world),
@@ -290,7 +290,7 @@ near_floor = {
 
 
 @claim(
-    "aim of this reproduction",
+    OUR_AIM,
     "curiosity that uses up rewards along its plan needs no more transitions than going to the nearest untried action: their ratio",
     "at most 1.01",
 )

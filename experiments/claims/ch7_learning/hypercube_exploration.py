@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment, Measured, claim, judged
+from experiments.kit.experiment import Claim, Envelope, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.learning.outcomes import first_tries, goals_of
@@ -138,23 +138,24 @@ def flat(priors: Priors) -> Measured:
 
 
 def _proportional(groups: Groups) -> Measured:
-    """Compare the growth of the values with that of the discount; their limit, mean reward / (1 - discount), grows much faster."""
-    means = {discount: interquartile_mean([run["values"].mean() for run in runs]) for discount, runs in groups.items()}
+    """Judge whether the values grow with the discount, and in proportion to it; their limit, mean reward / (1 - discount), grows faster."""
+    values = {discount: [float(run["values"].mean()) for run in runs] for discount, runs in groups.items()}
     shares = [interquartile_mean([_share_of_limit(run, discount) for run in runs]) for discount, runs in groups.items()]
     of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))
-    low, high = min(means), max(means)
+    low, high = min(values), max(values)
     text = (
-        f"mean value {', '.join(f'{1e3 * value:.3g}' for value in means.values())} x 1e-3 nats at {', '.join(f'{d:g}' for d in means)}: "
-        f"{of_limit} of mean reward / (1 - discount), to which they are proportional"
+        f"mean value {', '.join(f'{1e3 * interquartile_mean(value):.3g}' for value in values.values())} x 1e-3 nats at"
+        f" {', '.join(f'{d:g}' for d in values)}: {of_limit} of mean reward / (1 - discount), to which they are proportional"
     )
-    values = [[run["values"].mean() for run in groups[discount]] for discount in (high, low)]
-    bounds = (high / low * (1.0 - ROUGHLY), high / low * (1.0 + ROUGHLY))
-    return text, decides(ratio_interval(*values), *bounds)
+    bounds = high / low * (1.0 - ROUGHLY), high / low * (1.0 + ROUGHLY)
+    readings = {"they grow with it": is_above(values[high], values[low])}
+    readings["in proportion to it, within one half"] = decides(ratio_interval(values[high], values[low]), *bounds)
+    return text, Envelope("reading", readings)
 
 
 proportional = Claim(
     "thesis 7.1, figs. 7.2, 7.3",
-    "on the hypercube, values are roughly (within one half) proportional to the discount factor",
+    "on the hypercube, values are roughly proportional to the discount factor",
     "figures only",
     rule=_proportional,
     varies="prior",

@@ -7,8 +7,8 @@ live).  Published number: none.  Run time: 20 minutes on 2 cores, of which the l
 
 The robot `icub` on its motor model (no physics), the published gains and graphs, whole-tree forces.  Test: the total variation
 between the outcomes observed live and those of all offline seeds but one, mean over the state-actions that both tried at least twice; then
-the rank of this number among the same numbers of the offline seeds.  The models are equal if the live run is not among the farthest 5 %, so
-19 seeds are needed.  With the same encoder noise both plants make the same run to the last bit (`mobee bench agree`); here they have
+the rank of this number among the same numbers of the offline seeds, p.
+With the same encoder noise both plants make the same run to the last bit (`mobee bench agree`); here they have
 different seeds.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
-from experiments.kit.experiment import Experiment, Measured, Steps, claim, judged
+from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.learning.live import TASKS, Compared, compared, draw_distances, learn_live, learn_offline
 from experiments.kit.plots import saved
 from experiments.kit.sweep import run_cells, sweep_arguments
@@ -32,7 +32,8 @@ TASK, ROBOT = "published", "kinematic"
 TRANSITIONS, FEW = 2000, 20  # per part
 MIN_TRIES = 2  # of a state-action that is compared
 PIECE = 1000  # transitions per part between two launches
-SEEDS = 19  # offline runs, as many as a test at the 5 % level needs
+SEEDS = 19  # offline runs, as many as a rank test at the 5 % level needs
+MARGIN = 0.01  # of total variation
 LIVE_SEED = 900  # different from those of the offline runs
 
 
@@ -87,18 +88,20 @@ def p_value(found: Compared) -> float:
 
 
 @claim(
-    "aim of this reproduction; thesis 7.4",
-    "transition models learned live at the table, in lockstep, are statistically those learned offline",
-    "rank test against offline seeds, p above .05",
+    f"{OUR_AIM}; thesis 7.4",
+    f"transition models learned live at the table, in lockstep, are those learned offline: total variation at most {MARGIN} above that of "
+    "another offline run",
+    "equivalent",
 )
 def equal(found: Compared) -> Measured:
-    """Open with fewer offline seeds than the test needs."""
+    """Not met if the live run is too far; one live run has no interval, so it cannot show that they are equivalent."""
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     text = (
         f"total variation {one.variation:.4f} over {one.compared} state-actions, of offline runs {min(offline):.4f} to {max(offline):.4f}: "
         f"p = {p_value(found):.2f}"
     )
-    return text, p_value(found) > 0.05 if len(found.offline) >= SEEDS and one.compared > 0 else None
+    is_far = one.variation > max(offline) + MARGIN
+    return f"{text} (1 live run, too few for a verdict)", False if is_far and len(found.offline) >= SEEDS and one.compared else None
 
 
 def figure(folder: Path) -> Path:

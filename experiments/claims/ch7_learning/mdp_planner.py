@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from experiments.claims.ch7_learning.planned_queries import TESTS, UP, Queries, TablePlant, roadmaps
-from experiments.kit.experiment import Claim, Experiment, Measured, Rule, claim, judged
+from experiments.kit.experiment import Claim, Envelope, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.learning.exploration import explore
 from experiments.kit.plots import draw_curve, draw_points, finish, new_figure
-from experiments.kit.rules import rises
+from experiments.kit.rules import all_hold, decides, rises, texts
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import CuriousAgent, Lattice, TransitionModel
@@ -175,7 +175,7 @@ def ends(runs: Runs) -> Measured:
     elsewhere, sometimes = (np.array([float(c[name]) for c in counts]) for name in ("elsewhere", "sometimes"))
     text = f"of the state-actions tried {MIN_TRIES} times or more a share of {estimate(share)} reaches its goal; "
     text += f"{estimate(elsewhere)} state-actions always end elsewhere, {estimate(sometimes)} sometimes"
-    return text, interval(share)[0] > 0.5 and interval(elsewhere)[0] > 0.0 and interval(sometimes)[0] > 0.0
+    return text, all_hold([decides(interval(share), least=0.5), rises(elsewhere), rises(sometimes)])
 
 
 @claim("paper 2, 3.2", "the learned MDP planner needs no static workspace: it adapts to a table that enters", "no number")
@@ -186,18 +186,20 @@ def adapts(runs: Runs) -> Measured:
         f"success {estimate(success[:, 0])} when it enters, {estimate(success[:, -1])} {after[-1]} transitions later;"
         f" actions per query {estimate(actions[:, 0])} and {estimate(actions[:, -1])}"
     )
-    return text, rises(success[:, -1] - success[:, 0]) is True and rises(actions[:, 0] - actions[:, -1]) is True
+    return text, all_hold([rises(success[:, -1] - success[:, 0]), rises(actions[:, 0] - actions[:, -1])])
 
 
-@claim("paper 3.2", "a PRM planner does not work in an environment that moves", "no number")
+@claim(
+    "paper 3.2",
+    "a PRM planner does not work in an environment that moves (it succeeds in less than 0.9 of the queries)",
+    "no number",
+    untested="how the obstacle moves",
+)
 def inoperable(runs: Runs) -> Measured:
-    once, repairs = (tested(runs, "roadmap", "moving", "success", mode) for mode in ("planned once", "repairs"))
-    text = (
-        f"success with the moving table: roadmap planned once {estimate(once)}, repaired when a motion fails {estimate(repairs)};"
-        f" MDP trained with the moving table {estimate(tested(runs, 'moving', 'moving', 'success'))}"
-    )
-    low, high = interval(repairs)
-    return text, False if low > OPERABLE else True if high < OPERABLE else None
+    success = {mode: tested(runs, "roadmap", "moving", "success", mode) for mode in ROADMAPS}
+    text = f"success with the moving table: roadmap that is {texts(success, form='{} {}')};"
+    text += f" MDP trained with the moving table {estimate(tested(runs, 'moving', 'moving', 'success'))}"
+    return text, Envelope("when a motion fails", {mode: decides(interval(values), most=OPERABLE) for mode, values in success.items()})
 
 
 def _less(measure: str) -> Rule:

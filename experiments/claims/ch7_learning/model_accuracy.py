@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.kit.experiment import Claim, Experiment, Measured, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, judged
 from experiments.kit.learning.arm import RANK3, RANK4, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_nearby, explore
 from experiments.kit.learning.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
@@ -204,11 +204,10 @@ def _without(found: Last) -> Measured | None:
     return _ratio(counts, debiased, DEBIASED_RATIO)
 
 
-_AIM = "aim of this reproduction"
 CLAIMS = (
     *(
         Claim(
-            _AIM,
+            OUR_AIM,
             f"after 4000 curious transitions the L1 error of the model with debiased counts is at most {MAX_ERROR} ({text})",
             f"at most {MAX_ERROR}",
             rule=partial(_overall, world),
@@ -217,7 +216,7 @@ CLAIMS = (
     ),
     *(
         Claim(
-            _AIM,
+            OUR_AIM,
             f"on stochastic actions the {explorer} agent's model has a smaller error than the least-tried agent's: ratio ({text})",
             f"at least {times} x",
             rule=partial(_stochastic, world, explorer, times),
@@ -226,7 +225,7 @@ CLAIMS = (
         for explorer, times in (("curious", CURIOUS_RATIO), ("depleting", DEPLETING_RATIO))
     ),
     Claim(
-        _AIM,
+        OUR_AIM,
         "without imagined outcomes the error of the model is many times smaller: ratio (arm, 81 states)",
         f"at least {DEBIASED_RATIO:.0f} x",
         rule=_without,

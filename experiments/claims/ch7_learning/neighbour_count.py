@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,8 +26,8 @@ from experiments.kit.experiment import Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.plots import draw_points, finish, new_figure
-from experiments.kit.rules import decides, of_each, texts
-from experiments.kit.statistics import estimate, interquartile_mean, interval, mean_over, ratio_interval
+from experiments.kit.rules import all_hold, decides, is_above, of_each, texts
+from experiments.kit.statistics import difference_interval, estimate, interquartile_mean, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, OfflinePlant, Space, TransitionModel, value_iteration
 from mobee.errors import InvalidValue
@@ -181,9 +182,7 @@ def sooner(grouped: Groups) -> Measured:
     unfinished = sum(len(grouped[PUBLISHED]) - len(found) for found in times.values())
     if unfinished:
         return f"{text}; {unfinished} runs had not tried every action", None
-    fewest, *_, most = times.values()
-    ordered = list(middle.values())
-    return text, decides(ratio_interval(fewest, most), most=1.0) if ordered == sorted(ordered) else False
+    return text, all_hold(is_above(more, fewer) for fewer, more in pairwise(times.values()))
 
 
 @claim(
@@ -194,18 +193,20 @@ def sooner(grouped: Groups) -> Measured:
 def denser(grouped: Groups) -> Measured:
     fewer = _fewer(grouped)
     shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))
-    enough = any(
-        all(interval(values[graph])[0] >= interquartile_mean(values[PUBLISHED]) - MARGIN for values in (shares, straight))
+    sparser = [
+        all_hold(decides(difference_interval(values[graph], values[PUBLISHED]), least=-MARGIN) for values in (shares, straight))
         for graph in fewer
         if graph < PUBLISHED
-    )
+    ]
+    enough = True if True in sparser else None if None in sparser else False
     each = (f"{graph} neighbours: solved {estimate(shares[graph])}, directly {estimate(straight[graph])}" for graph in fewer)
     return "; ".join(each), enough
 
 
 @claim("paper 4.1", "with fewer neighbours plans are longer: actions per solved task, after the last transition", "-")
 def longer(grouped: Groups) -> Measured:
-    return texts(of_each(_fewer(grouped), length), form="{} neighbours: {}"), None
+    lengths = of_each(_fewer(grouped), length)
+    return texts(lengths, form="{} neighbours: {}"), all_hold(is_above(less, more) for less, more in pairwise(lengths.values()))
 
 
 CLAIMS = (sooner, denser, longer)

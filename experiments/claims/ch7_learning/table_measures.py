@@ -120,6 +120,14 @@ class Run:
         return {part: tries_of(spaces()[part], seen) for part, seen in self.seen.items()}
 
     @cached_property
+    def ends(self) -> dict[str, Ints]:
+        """How often each action of a part ended in each state, (S, A, S)."""
+        found = {part: np.zeros((*spaces()[part].goals.shape, len(spaces()[part])), dtype=np.int32) for part in PARTS}
+        for part, counts in found.items():
+            np.add.at(counts, tuple(self.seen[part].T), 1)
+        return found
+
+    @cached_property
     def outcomes(self) -> dict[str, Ints]:
         """The number of states in which each action of a part ended, (S, A)."""
         return {part: outcome_counts(spaces()[part], seen) for part, seen in self.seen.items()}
@@ -197,19 +205,23 @@ class Run:
         return float(max(self.result.values[f"ends_{part}"][-1] for part in PARTS)) / 3600.0
 
 
-Runs = Mapping[tuple[str, str, str], list[Run]]  # by propagation, explorer and world
+Runs = Mapping[tuple[str, str], list[Run]]  # by explorer and world
 
 
-def runs_of(found: Cells) -> Runs:
-    """Return the finished runs of each condition, by seed, in the order of the conditions."""
+def runs_of(found: Cells) -> dict[str, Runs]:
+    """Return the finished runs by propagation of the forces, of each condition by seed, in the order of the conditions."""
     grouped = runs_by(found, Run, "propagate", "explorer", "world")
-    return {key: grouped[key] for key in product(PROPAGATIONS, EXPLORERS, WORLDS) if key in grouped}
+    forces: dict[str, dict[tuple[str, str], list[Run]]] = {}
+    for propagate, *key in product(PROPAGATIONS, EXPLORERS, WORLDS):
+        if (propagate, *key) in grouped:
+            forces.setdefault(propagate, {})[key[0], key[1]] = grouped[propagate, *key]
+    return dict(forces)
 
 
-def with_ghosts(runs: Runs, propagate: str, explorer: str) -> list[tuple[Run, Run]]:
+def with_ghosts(runs: Runs, explorer: str) -> list[tuple[Run, Run]]:
     """Return each run at the table with the run of the same seed at the ghost."""
-    ghosts = {run.seed: run for run in runs.get((propagate, explorer, "ghost"), [])}
-    return [(run, ghosts[run.seed]) for run in runs.get((propagate, explorer, "table"), []) if run.seed in ghosts]
+    ghosts = {run.seed: run for run in runs.get((explorer, "ghost"), [])}
+    return [(run, ghosts[run.seed]) for run in runs.get((explorer, "table"), []) if run.seed in ghosts]
 
 
 def log_ratios(run: Run, ghost: Run, part: str) -> Array:
@@ -324,10 +336,9 @@ def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
     """Return which actions (S, A) of these parts end differently at the table than at the ghost, by all seeds but one."""
     shares = []
     for world in ("table", "ghost"):
-        counts = np.zeros((*spaces()[parts[0]].goals.shape, len(spaces()[parts[0]])))
-        for run in (run for explorer in EXPLORERS for run in runs.get(("tree", explorer, world), []) if run.seed != but):
-            for part in parts:
-                np.add.at(counts, tuple(run.seen[part].T), 1.0)
+        others = [run for explorer in EXPLORERS for run in runs.get((explorer, world), []) if run.seed != but]
+        empty = np.zeros((*spaces()[parts[0]].goals.shape, len(spaces()[parts[0]])))
+        counts = sum((run.ends[part] for run in others for part in parts), start=empty)
         shares.append(counts / np.maximum(counts.sum(axis=-1, keepdims=True), 1.0))
     different: NDArray[np.bool_] = 0.5 * np.abs(shares[0] - shares[1]).sum(axis=-1) > DIFFERENT
     return different
@@ -336,7 +347,7 @@ def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
 def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
     """Judge every run of an explorer; empty if there is no other seed, or no action depends on other parts in the other seeds' runs."""
     found = []
-    for run, ghost in with_ghosts(runs, "tree", explorer):
+    for run, ghost in with_ghosts(runs, explorer):
         truth = dependent(runs, LEARNERS[learner], run.seed)
         if truth.any():
             ranked = (SCORES[score](run, ghost, part) for part in LEARNERS[learner])

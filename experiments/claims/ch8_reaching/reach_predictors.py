@@ -27,7 +27,7 @@ import numpy as np
 
 from experiments.kit.cells import CELL_FILES, Cell, CellResult, load_cells
 from experiments.kit.command_line import positive_number
-from experiments.kit.experiment import Claim, Experiment, Measured, Steps, claim, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, Steps, claim, judged
 from experiments.kit.plots import new_figure, saved
 from experiments.kit.reaching.arm import MARKER, laws, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS, learn, of_evaluations
@@ -194,7 +194,7 @@ def _reaches(name: str, checkpoint: int, found: Evaluated) -> Measured | None:
 
 aimed = [
     Claim(
-        "aim of this reproduction",
+        OUR_AIM,
         f"after {checkpoint} problem-tries the recommended predictor reaches at least {least:.2f} of the oracle's score {_SETS[name]}",
         f"at least {least:.2f}",
         rule=partial(_reaches, name, checkpoint),

@@ -32,14 +32,14 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.control.plant_runs import place
-from experiments.kit.experiment import Claim, Experiment, Measured, Rule, judged
+from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, Rule, judged
 from experiments.kit.plots import draw_bars, finish, new_figure
 from experiments.kit.reaching.arm import PART, TRANSITIONS, JudgedPlant, arm_belief, body
 from experiments.kit.reaching.belief import PeerBelief, approach, rrt_connect, shortened
 from experiments.kit.reaching.cases import EVERY, Attempt, Case, attempt, begun, make_cases, trained
 from experiments.kit.reaching.planner_peer import PlannerPeer
 from experiments.kit.reaching.targets import GOOD
-from experiments.kit.rules import decides, within
+from experiments.kit.rules import all_hold, decides
 from experiments.kit.statistics import estimate, interquartile_mean, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee import Gains, Model, MotorParameters, OfflinePlant, World, box, cylinder
@@ -267,24 +267,22 @@ def _no_worse(scene: str) -> Rule:
     return of_runs
 
 
-def _takes_long(measure: str, published: float) -> Rule:
-    """Return the rule that the planner takes at least a tenth of the published time."""
-
-    def of_runs(runs: Both) -> Measured:
-        took = of_queries(runs[1], measure)
-        if not len(took):
-            return "no path was found", None
-        share = estimate([values["found"].mean() for values in runs[1]])
-        text = f"{{}} s of processor time with a compiled test of poses; a path is found in {share} of the queries"
-        return within(took, 3, least=SLOW * published, text=text)
-
-    return of_runs
+def _takes_long(runs: Both) -> Measured:
+    """Judge whether the planner takes at least a tenth of the published times."""
+    took, more = (of_queries(runs[1], measure) for measure in ("seconds", "smoothing"))
+    if not len(more):
+        return "no path was found", None
+    share = estimate([values["found"].mean() for values in runs[1]])
+    text = f"{estimate(took, 3)} s of processor time, and {estimate(more, 3)} s for smoothing, with a compiled test of poses;"
+    text += f" a path is found in {share} of the queries"
+    pairs = ((took, FEASIBLE), (more, SMOOTHED))
+    return text, all_hold(decides(interval(values), least=SLOW * published) for values, published in pairs)
 
 
 CLAIMS = (
     *(
         Claim(
-            "thesis 9.3; aim of this reproduction",
+            f"thesis 9.3; {OUR_AIM}",
             f"with {SITUATIONS[scene]} the learned reacher is no worse than {PEER[scene]} "
             f"(at most {100 * MARGIN:.0f} points of success below)",
             "-",
@@ -293,17 +291,12 @@ CLAIMS = (
         for scene in SCENES
     ),
     Claim(
-        "thesis 1.5",
+        "thesis 1.5, with a problem of our own",
         "single query planning is too slow to be used online: a path of both arms (12 DOF) around a table's edge to a cup takes at least "
-        f"{SLOW * FEASIBLE:.0f} s of processor time, a tenth of the published time",
-        f"{FEASIBLE:.0f} s",
-        rule=_takes_long("seconds", FEASIBLE),
-    ),
-    Claim(
-        "thesis 1.5",
-        f"smoothing the path of both arms around a table's edge takes at least {SLOW * SMOOTHED:.1f} s more, a tenth of the published time",
-        f"another {SMOOTHED:.0f} s",
-        rule=_takes_long("smoothing", SMOOTHED),
+        f"{SLOW * FEASIBLE:.0f} s of processor time, and smoothing it {SLOW * SMOOTHED:.1f} s more, a tenth of the published times",
+        f"{FEASIBLE:.0f} s, another {SMOOTHED:.0f} s",
+        rule=_takes_long,
+        untested="the published problem, program and computer",
     ),
 )
 

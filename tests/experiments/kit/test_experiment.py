@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
-from experiments.kit.experiment import AIM, MIN_SEEDS, VERDICTS, Claim, Envelope, Experiment, Steps, claim, judged, verdict_of
+from experiments.kit.experiment import MIN_SEEDS, OUR_AIM, VERDICTS, Claim, Envelope, Experiment, Steps, claim, judged, verdict_of
 from experiments.kit.rules import decides
 from experiments.kit.statistics import interval
 from experiments.registry import EXPERIMENTS, load_experiment
@@ -46,7 +46,7 @@ def test_an_aim_is_met_in_every_setting_or_not_met(holds):
 
 
 def test_an_aim_has_its_own_verdicts():
-    aim = Claim(f"thesis 9.3; {AIM}", "something is soon", "at most 3")
+    aim = Claim(f"thesis 9.3; {OUR_AIM}", "something is soon", "at most 3")
     assert [aim.measured("3.1", holds).verdict for holds in (True, False, None)] == ["met", "not met", "open"]
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch3_roadmaps import ngik
-from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, RIVALS, WHOLE, Solver
+from experiments.claims.ch3_roadmaps.ngik import CLAIMS, FEW, NES, RIVALS, WHOLE, XNES, Solver
 from experiments.kit.experiment import judged
 from tests.experiments.finished_cells import finished_trials
 from tests.experiments.options import options_of
@@ -18,12 +18,12 @@ def solver(evaluations: float, reached: float = 1.0) -> Solver:
 
 
 def test_fewer_evaluations_outperform():
-    known = {(NES, WHOLE): solver(2500.0), ("cma", WHOLE): solver(4000.0), ("annealing", WHOLE): solver(2000.0)}
-    found = judged(CLAIMS, known)
-    cma, annealing, particles = found[:3]
-    assert (cma["verdict"], annealing["verdict"], particles["verdict"]) == ("confirmed", "refuted", "open")
-    assert cma["ours"].startswith("the rival needs 1.60 x")
-    assert not particles["ours"]
+    rivals = {("cma", WHOLE): solver(4000.0), ("annealing", WHOLE): solver(3000.0), ("particles", WHOLE): solver(6000.0)}
+    for xnes, verdict in ((2500.0, "confirmed"), (3500.0, "depends")):
+        (found,) = judged(CLAIMS, rivals | {(NES, WHOLE): solver(2500.0), (XNES, WHOLE): solver(xnes)})
+        assert found["verdict"] == verdict and "CMA-ES needs 1.60 x" in found["ours"]
+    (slow,) = judged(CLAIMS, rivals | {(name, WHOLE): solver(5000.0) for name in (NES, XNES)})
+    assert slow["verdict"] == "refuted"
 
 
 def test_without_41_motors_all_is_open():

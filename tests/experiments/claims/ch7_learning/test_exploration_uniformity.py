@@ -25,8 +25,8 @@ def verdicts(fails=True):
 
 
 def test_uniform_tries_with_spikes_where_actions_fail_confirm_the_claims():
-    assert verdicts() == ["confirmed"] * 5
+    assert verdicts() == ["confirmed"] * 4 + ["met"]
 
 
 def test_where_no_action_fails_spikes_are_open():
-    assert verdicts(fails=False) == ["confirmed", "confirmed", "open", "open", "confirmed"]
+    assert verdicts(fails=False) == ["confirmed", "confirmed", "open", "open", "met"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch7_learning.plant_sensitivity import PUBLISHED, VARIANTS, Row, normalised
+from experiments.claims.ch7_learning.plant_sensitivity import CLAIMS, PUBLISHED, VARIANTS, Row, normalised
 from experiments.claims.ch7_learning.unreachable_states import NEVER
+from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import arm_plant, robot
 
 
@@ -45,6 +46,21 @@ def row(**changed):
 )
 def test_a_finding_is_lost_where_one_of_its_numbers_is_not_as_published(changed, rank4, rank3):
     assert (row(**changed).rank4, row(**changed).rank3) == (rank4, rank3)
+
+
+def test_every_run_must_reproduce_the_findings_and_intervals_decide_what_they_depend_on():
+    each = {variant: [row(uncertain=9.0 + seed) for seed in range(5)] for variant in VARIANTS}
+    for variant, runs in each.items():
+        if variant.startswith("settle speed, deg/s (1): 0.2"):
+            runs[:] = [row(failing=0.0)] * 5
+        if variant.startswith("encoder noise, deg (0.1): 0.4"):
+            runs[:] = [row(uncertain=40.0 + seed) for seed in range(5)]
+        if variant.endswith("(0.1): 0"):
+            runs[:] = [row(uncertain=1.0 + seed) for seed in range(5)]
+    assert [claim["verdict"] for claim in judged(CLAIMS, each)] == ["met", "met", "confirmed", "confirmed"]
+    each[PUBLISHED][0] = row(failing=0.2)
+    lost, *_ = judged(CLAIMS, each)
+    assert lost["verdict"] == "not met" and "both in 4 of 5 runs" in lost["ours"]
 
 
 def test_the_first_variant_is_the_published_plant():

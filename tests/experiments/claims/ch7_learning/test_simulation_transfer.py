@@ -31,7 +31,7 @@ def test_one_more_value_is_below_the_bound_with_95_percent():
 def test_offline_seeds_that_differ_widely_leave_the_claim_open():
     wide = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.05, 0.1))
     assert judged([equal], {"arms": Compared({"pybullet": Distance(0.06, 1.0, 300)}, wide, {})})[0]["verdict"] == "open"
-    assert judged([equal], {"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})})[0]["verdict"] == "refuted"
+    assert judged([equal], {"arms": Compared({"pybullet": Distance(0.9, 1.0, 300)}, wide, {})})[0]["verdict"] == "not met"
 
 
 def test_without_compared_actions_the_claim_is_open():
@@ -39,8 +39,8 @@ def test_without_compared_actions_the_claim_is_open():
     assert judged([equal], {"arms": Compared({"pybullet": none}, (none, none), {})})[0]["verdict"] == "open"
 
 
-@pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "confirmed"), (0.05, 0.995, "refuted"), (0.0, 0.9, "refuted")])
-def test_a_live_robot_must_be_as_near_as_another_seed(variation, agree, verdict):
+@pytest.mark.parametrize(("variation", "agree", "verdict"), [(0.009, 0.995, "open"), (0.05, 0.995, "not met"), (0.0, 0.9, "not met")])
+def test_one_live_robot_can_show_a_difference_but_not_that_there_is_none(variation, agree, verdict):
     offline = tuple(Distance(v, 1.0, 300) for v in (0.0, 0.001, 0.002))
     found = Compared({"pybullet": Distance(variation, agree, 300)}, offline, {})
     assert judged([equal], {"arms": found})[0]["verdict"] == verdict

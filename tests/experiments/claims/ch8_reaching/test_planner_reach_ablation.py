@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.claims.ch8_reaching.planner_reach_ablation import LAWS, does_more, findings
+from experiments.claims.ch8_reaching.planner_reach_ablation import LAWS, findings
 from experiments.kit.reaching.cases import METHODS, SCENES
 from tests.experiments.finished_cells import Cell, finished
 
@@ -22,13 +22,8 @@ def sweep(**shares):
     return finished(work, [Cell(f"{law}-s{seed}", seed, {"law": law}) for seed in range(6) for law in LAWS])
 
 
-@pytest.mark.parametrize(("planner", "reach", "expected"), [(0.2, 0.6, True), (0.2, 0.8, None), (0.9, 0.1, False)])
-def test_both_together_must_succeed_more_often_than_each_alone(planner, reach, expected):
-    both = np.full(6, 0.8)
-    assert does_more(both, {"planner": np.full(6, planner), "reach": np.full(6, reach)}) is expected
-
-
-def test_each_scene_has_a_claim_about_the_measure_of_its_law():
-    found = findings(sweep(planner=0.3, reach=0.5, both=0.9))["claims"]
-    assert len(found) == len(LAWS) * len(SCENES) and {claim["verdict"] for claim in found} == {"confirmed"}
-    assert "reward planner alone 0.03" in found[0]["ours"] and "success planner alone 0.30" in found[-1]["ours"]
+@pytest.mark.parametrize(("reach", "expected"), [(0.5, ["confirmed", "met"]), (0.9, ["open", "open"]), (1.0, ["refuted", "not met"])])
+def test_both_together_must_achieve_more_than_the_reach_alone_in_every_situation(reach, expected):
+    found = findings(sweep(planner=0.3, reach=reach, both=0.9))["claims"]
+    assert [claim["verdict"] for claim in found] == expected
+    assert f"reach alone 0.{int(10 * reach):02}" in found[0]["ours"] or reach != 0.5

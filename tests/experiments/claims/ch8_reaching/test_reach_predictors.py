@@ -36,9 +36,9 @@ def test_scores_are_divided_by_the_oracles():
 
 
 def test_the_aims_decide_the_claims():
-    assert verdicts(found(0.98, 0.4)) == ["confirmed"] * 5
-    assert verdicts(found(0.92, 0.5)) == ["confirmed", "confirmed", "refuted", "confirmed", "refuted"]
-    assert verdicts(found(0.5, 0.6)) == ["refuted"] * 5
+    assert verdicts(found(0.98, 0.4)) == ["met"] * 4 + ["confirmed"]
+    assert verdicts(found(0.92, 0.5)) == ["met", "met", "not met", "met", "not reproduced"]
+    assert verdicts(found(0.5, 0.6)) == ["not met"] * 4 + ["not reproduced"]
 
 
 def test_claims_about_a_learner_that_was_not_run_stay_open():

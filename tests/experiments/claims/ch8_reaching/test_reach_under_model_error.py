@@ -56,10 +56,12 @@ def test_a_lead_whose_interval_contains_the_bound_is_open():
 
 
 def test_each_claim_is_about_its_own_number_of_tries():
-    found = judged(CLAIMS, sweep([0.2, 0.5, 0.8], peers()))
-    assert [claim["verdict"] for claim in found] == ["confirmed"] * 4 + ["refuted"]
-    found = judged(CLAIMS, sweep([0.9, 0.3, 0.6], peers()))
-    assert [claim["verdict"] for claim in found[:4]] == ["refuted"] * 4
+    found = judged(CLAIMS, sweep([0.2, 0.5, 0.8], peers(missed=0.5)))
+    assert [claim["verdict"] for claim in found] == ["met"] * 4 + ["not reproduced"]
+    for beaten in (peers(missed=0.5), peers(none=0.1, blocked=0.1, missed=0.5)):  # the strongest peer decides
+        found = judged(CLAIMS, sweep([0.9, 0.3, 0.6], beaten))
+        assert [claim["verdict"] for claim in found[:4]] == ["not met"] * 4
+    found = judged(CLAIMS, sweep([0.9, 0.3, 0.6], peers(missed=0.5)))
     assert "0.60" in found[1]["ours"] and "lead 0.10" in found[1]["ours"]
 
 

@@ -29,11 +29,13 @@ def verdicts(**given):
     return [claim["verdict"] for claim in sweep(**given)["claims"]]
 
 
-@pytest.mark.parametrize(("learner", "expected"), [(0.9, "confirmed"), (1.0, "confirmed"), (0.8, "refuted")])
+@pytest.mark.parametrize(("learner", "expected"), [(0.9, "met"), (1.0, "met"), (0.8, "not met")])
 def test_the_learner_may_be_at_most_5_points_below_the_planner(learner, expected):
     assert verdicts(learner=learner)[:3] == [expected] * 3
 
 
-@pytest.mark.parametrize(("seconds", "smoothing", "expected"), [(0.01, 0.1, "refuted"), (5.0, 60.0, "confirmed")])
+@pytest.mark.parametrize(
+    ("seconds", "smoothing", "expected"), [(0.01, 0.1, "not reproduced"), (5.0, 60.0, "confirmed"), (5.0, 0.1, "not reproduced")]
+)
 def test_a_planner_is_slow_if_it_takes_a_tenth_of_the_published_time(seconds, smoothing, expected):
-    assert verdicts(seconds=seconds, smoothing=smoothing)[3:] == [expected] * 2
+    assert verdicts(seconds=seconds, smoothing=smoothing)[3:] == [expected]

@@ -77,9 +77,9 @@ def results(few: int, many: int, around: int, arrived: bool = True) -> dict[str,
 @pytest.mark.parametrize(
     ("found", "verdicts"),
     [
-        (results(9, 90, 5), ["confirmed", "confirmed", "confirmed"]),
-        (results(90, 9, 9), ["confirmed", "refuted", "open"]),
-        (results(9, 90, 99, arrived=False), ["refuted", "confirmed", "refuted"]),
+        (results(9, 90, 5), ["confirmed", "confirmed", "met"]),
+        (results(90, 9, 9), ["confirmed", "not reproduced", "open"]),
+        (results(9, 90, 99, arrived=False), ["not reproduced", "confirmed", "not met"]),
     ],
 )
 def test_bumps_and_failed_queries_decide_the_claims(found: dict[str, Any], verdicts: list[str], tmp_path: Path) -> None:

@@ -36,27 +36,27 @@ def verdicts(blocks: list[Block]) -> list[str]:
 
 
 def test_success_is_judged_for_the_targets_that_can_be_reached() -> None:
-    assert verdicts(both(1)) == ["confirmed", "confirmed", "confirmed", "open", "confirmed"]
-    assert verdicts(both(8))[:2] == ["refuted", "refuted"]
+    assert verdicts(both(1)) == ["open", "open", "met", "open", "met"]  # 19 of 20 are not yet 0.95
+    assert verdicts(both(8))[:2] == ["not met", "not met"]
     assert all(text in measured(both(1))[0]["ours"] for text in ("19 of 20", "for the 19 from", "19 of 19", "for all 27 19 of 27"))
 
 
 def test_a_share_that_is_too_small_perhaps_by_chance_is_open() -> None:
     tries = [a_try(FRESH, number, 0.05 if number < 3 else 0.0) for number in range(20)]
-    assert enough(tries, 0.9) is None and enough(tries, 0.8) is True and enough([], 0.9) is None
+    assert enough(tries, 0.9) is None and enough(tries, 0.8) is None and enough(tries, 0.6) is True and enough([], 0.9) is None
     assert share(tries).startswith("17 of 20, 0.85 [")
 
 
 def test_a_deep_contact_of_the_learner_refutes_and_one_of_the_peer_does_not() -> None:
     touch = Touch("r_hand table", 1, 2, 0.004)
-    assert measured([*both(1), block("refine", [], [touch])])[2]["verdict"] == "refuted"
-    assert measured([*both(1), block("peer", [], [touch])])[2]["verdict"] == "confirmed"
+    assert measured([*both(1), block("refine", [], [touch])])[2]["verdict"] == "not met"
+    assert measured([*both(1), block("peer", [], [touch])])[2]["verdict"] == "met"
 
 
 def test_the_slowest_reach_decides_the_time_to_the_first_motion() -> None:
     quick, slow = (block("first motion", [a_try(FRESH, 0, 0.0, 2), a_try(FRESH, 1, 0.0, ticks)], rate=500.0) for ticks in (2, 3))
-    assert measured([*both(1), quick])[3]["verdict"] == "confirmed"
-    assert measured([*both(1), slow])[3]["verdict"] == "refuted"
+    assert measured([*both(1), quick])[3]["verdict"] == "met"
+    assert measured([*both(1), slow])[3]["verdict"] == "not met"
 
 
 def test_blocks_give_tables_and_a_figure(tmp_path) -> None:
