@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from experiments import chapters
 from experiments.frozen_rules import CONFIRMING_SEED, require_frozen
 from experiments.kit.experiment import MIN_SEEDS, VERDICTS, Claim
-from experiments.kit.raw_records import keep_record, opened_record, record_path
+from experiments.kit.raw_records import all_records, keep_record, opened_record, record_path
 from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
 from experiments.kit.statistics import RATES
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
@@ -242,7 +242,9 @@ def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> 
 def all_differences(record: Recorded) -> list[str]:
     """Compare all raw records with the table; returns a line for each difference."""
     lines = [line for name, entry in record.items() for line in differences(name, entry)]
-    return lines + [line for name, entry in record.items() if CONFIRMED in entry for line in differences(name, entry[CONFIRMED], True)]
+    lines += [line for name, entry in record.items() if CONFIRMED in entry for line in differences(name, entry[CONFIRMED], True)]
+    known = {record_path(name) for name in record} | {record_path(name, True) for name, entry in record.items() if CONFIRMED in entry}
+    return lines + [f"{path.name}: a raw record without an entry in the table" for path in all_records() if path not in known]
 
 
 def write_page(record: Recorded) -> None:

@@ -26,12 +26,12 @@ def rules_of(name: str) -> dict[str, Any]:
     """Return the claims of an experiment, and the plain constants of its module, as JSON has them."""
     module = importlib.import_module(EXPERIMENTS[name])
     claims = [{"text": claim.text, "published": claim.published} for claim in load_experiment(name).claims]
-    return _plain({"claims": claims, "constants": _constants(module)})
+    return {"claims": claims, "constants": _plain(_constants(module))}
 
 
 def shared_rules() -> dict[str, Any]:
     """Return the constants that the rules of all experiments use."""
-    return _plain({"constants": {name: value for module in (statistics, rules, experiment) for name, value in _constants(module).items()}})
+    return {"constants": _plain({name: value for module in (statistics, rules, experiment) for name, value in _constants(module).items()})}
 
 
 def freeze(names: Sequence[str]) -> None:

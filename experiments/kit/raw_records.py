@@ -16,13 +16,18 @@ from experiments.kit.run_folder import CONFIG, VERSIONS
 from mobee.errors import InvalidValue
 
 RECORDS = Path(__file__).parent.parent / "records"
-MAX_BYTES = 2_000_000  # of one archive
+MAX_BYTES, MAX_ALL = 2_000_000, 10_000_000  # of one archive, and of all together
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
 def record_path(name: str, confirms: bool = False) -> Path:
     """Return the archive of an experiment, or with `confirms` of its run with new seeds."""
     return RECORDS / f"{name}{'-confirm' if confirms else ''}.zip"
+
+
+def all_records() -> list[Path]:
+    """Return all archives, sorted."""
+    return sorted(RECORDS.glob("*.zip"))
 
 
 def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False) -> Path:

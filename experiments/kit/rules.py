@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.kit.experiment import Holds, Measured
+from experiments.kit.experiment import Holds
 from experiments.kit.statistics import (
     LEVEL,
     difference_interval,
@@ -30,6 +30,7 @@ from mobee.arrays import Array
 
 Key = TypeVar("Key")
 Run = TypeVar("Run")
+Decided = tuple[str, bool | None]  # a `Measured` of one setting
 ABOUT_EQUAL = (0.9, 1.1)
 
 
@@ -62,22 +63,16 @@ def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
     return False if False in given else None if None in given else True
 
 
-def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Measured:
+def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Decided:
     """Judge whether the mean of the runs lies within bounds, by its interval; `text`: holds the estimate."""
     return text.format(estimate(values, digits)), decides(interval(values), least, most)
 
 
 def ratio_within(
     above: ArrayLike, below: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}"
-) -> Measured:
+) -> Decided:
     """Judge whether the ratio of two groups of runs lies within bounds, by its interval; `text`: holds the estimate."""
     return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
-
-
-def at_least_all(verdicts: Iterable[Holds]) -> Holds:
-    """Combine verdicts as `all_hold`, where "stronger" holds too; "stronger" only if all are."""
-    given = list(verdicts)
-    return "stronger" if given and set(given) == {"stronger"} else all_hold(True if one == "stronger" else one for one in given)
 
 
 def about(span: tuple[float, float], least: float, most: float, stronger_below: bool) -> Holds:
@@ -108,7 +103,7 @@ def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
     return all_hold(is_above(group, values[name]) for key, group in values.items() if key != name)
 
 
-def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Measured:
+def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Decided:
     """Judge whether the runs of one group are above those of every rival (or, with `worse`, below them).
 
     They are above a rival if the interval of the probability of improvement lies above one half.  They are not if it lies below, or if the

@@ -170,7 +170,7 @@ def toy(tmp_path, monkeypatch):
         (chapters, "PAGE", "results.md"),
     ):
         monkeypatch.setattr(module, name, tmp_path / path)
-    (tmp_path / "results.md").write_text(f"before\n{chapters.BEGIN}\nold\n{chapters.END}\nafter\n")
+    (tmp_path / "results.md").write_text(f"before\n{chapters.BEGIN}\nformer text\n{chapters.END}\nafter\n")
     experiment = load_experiment("hypercube-exploration")
     cells = experiment.method.cells(options_of(experiment, "--seeds", "5"))
     values = experiment.method.trial(cells[0].settings, 0)
@@ -203,7 +203,7 @@ def test_new_seeds_confirm_frozen_rules_once_and_stand_beside_the_first(toy, tmp
     assert entry["confirmed"]["claims"] == found_in([again])["hypercube-exploration"]["claims"]
     assert "| confirmed: " in claims_table.PAGE.read_text()
     results = (tmp_path / "results.md").read_text()
-    assert results.startswith("before\n") and results.endswith("after\n") and "### Chapter 7" in results and "old" not in results
+    assert results.startswith("before\n") and results.endswith("after\n") and "### Chapter 7" in results and "former text" not in results
     toy(CONFIRMING_SEED + 1)
     with pytest.raises(UserError, match="is confirmed once"):
         command("--write", "--confirm", *runs)

@@ -235,15 +235,15 @@ half = {
 )
 def best(published: Published) -> Measured:
     pairs = {
-        (world, rival): (covered(published[world, rival]), covered(published[world, "curious"]))
+        (world, rival): (covered(published[world, "curious"]), covered(published[world, rival]))
         for world in FLOORS
         for rival in ("least_tried", "random")
     }
-    worst = min(probability_of_improvement(*pair) for pair in pairs.values())
-    by_random = ratio(*reversed(pairs["constrained", "random"]))
+    worst = min(probability_of_improvement(slower, curious) for curious, slower in pairs.values())
+    by_random = ratio(*pairs["constrained", "random"])
     bound = "at most " if unfinished(published["constrained", "random"]) else ""
     text = f"probability that a curious run is sooner: at least {worst:.2f}; transitions over the random agent's: {bound}{by_random:.2f}"
-    return text, all_hold(decides(ratio_interval(*reversed(pair)), most=ABOUT_HALF[1]) for pair in pairs.values())
+    return text, all_hold(decides(ratio_interval(curious, slower), most=ABOUT_HALF[1]) for curious, slower in pairs.values())
 
 
 @claim(

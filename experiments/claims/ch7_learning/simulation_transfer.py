@@ -130,8 +130,7 @@ def equal(tasks: Mapping[str, Compared]) -> Measured:
             f" share with the same most frequent outcome {one.agree:.3f} (another: at least {1.0 - prediction_bound(differ):.3f}),"
             f" {one.compared} state-actions; differences from {detectable:.3f} on are detectable (margin {MARGIN})"
         )
-    found = all_hold(verdicts)
-    return f"{'; '.join(texts)} (1 live run, too few for a verdict)", False if found is False else None
+    return f"{'; '.join(texts)} (1 live run, too few for a verdict)", False if all_hold(verdicts) is False else None
 
 
 def _as_near(value: float, offline: Sequence[float]) -> bool | None:

@@ -364,7 +364,7 @@ def _leads(wrong: str, by: int, least: float) -> Rule:
         leads = {memory: learner[:, at] - values for memory, values in theirs.items()}
         each = [f"{LABELS[memory]} {estimate(theirs[memory])}, learner's lead {estimate(leads[memory])}" for memory in MEMORIES]
         text = "; ".join([f"success: {LABELS['learner']} {estimate(learner[:, at])}", *each])
-        return text, verdict(leads, least)
+        return text, verdict({str(memory): lead for memory, lead in leads.items()}, least)
 
     return of_cells
 

@@ -51,3 +51,12 @@ def test_a_record_that_is_empty_too_large_absent_or_damaged_is_refused(run, monk
 
 def test_the_table_is_what_the_raw_records_give():
     assert claims_table.all_differences(claims_table.recorded()) == []
+
+
+def test_all_raw_records_together_are_small_enough_for_the_repository():
+    assert sum(path.stat().st_size for path in raw_records.all_records()) <= raw_records.MAX_ALL
+
+
+def test_a_record_without_an_entry_in_the_table_is_a_difference(run):
+    keep_record("reward-decay", run, run / "versions.json", CELL_FILES)
+    assert claims_table.all_differences({}) == ["reward-decay.zip: a raw record without an entry in the table"]
