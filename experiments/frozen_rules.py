@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.kit import experiment, rules, statistics
+from experiments.kit import rules, statistics
+from experiments.kit.experiment import MIN_SEEDS
 from experiments.registry import EXPERIMENTS, load_experiment
 from mobee.errors import InvalidValue
 
@@ -31,12 +32,12 @@ def rules_of(name: str) -> dict[str, Any]:
 
 def shared_rules() -> dict[str, Any]:
     """Return the constants that the rules of all experiments use."""
-    return {"constants": _plain({name: value for module in (statistics, rules, experiment) for name, value in _constants(module).items()})}
+    return {"constants": _plain({"MIN_SEEDS": MIN_SEEDS} | _constants(statistics) | _constants(rules))}
 
 
 def freeze(names: Sequence[str]) -> None:
-    """Write the rules of these experiments into `frozen.json`; the others stay as they are frozen."""
-    kept = frozen() | {_ALL: shared_rules()} | {name: rules_of(name) for name in names}
+    """Write the rules of those of these experiments that have claims into `frozen.json`; the others stay as they are frozen."""
+    kept = frozen() | {_ALL: shared_rules()} | {name: rules_of(name) for name in names if load_experiment(name).claims}
     FROZEN.write_text(json.dumps(dict(sorted(kept.items())), indent=1) + "\n")
 
 
