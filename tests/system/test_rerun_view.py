@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rerun's view in a browser that draws in software: it shows a robot, the robot moves, and frames are asked for one by one."""
+"""Rerun's view in a browser that draws in software: it shows a robot that moves, asks for frames one by one, and passes keys on."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ pytestmark = [pytest.mark.system, pytest.mark.skipif(find_chromium() is None, re
 
 PATIENCE = 150.0  # s for what takes some seconds on a free machine
 DRAW_IN_SOFTWARE = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
-SIZE = {"width": 400, "height": 300}  # pixels
+SIZE = {"width": 800, "height": 500}  # pixels
 BRIGHT = 60  # of 255: brighter than the ground
 
 
@@ -68,14 +68,15 @@ def test_rerun_s_view_shows_a_robot_that_moves(served: PageServer) -> None:
         page = browser.new_page(viewport=SIZE)
         begin, asked = time.monotonic(), list[str]()
         page.on("request", lambda request: asked.append(request.url))
-        page.goto(f"http://127.0.0.1:{served.port}/viewer.html")
+        page.goto(f"http://127.0.0.1:{served.port}/")
+        page.keyboard.press("v")
 
         def picture() -> NDArray[np.float64]:
-            shot = np.frombuffer(page.screenshot(timeout=0), dtype=np.uint8)
+            shot = np.frombuffer(page.locator("#viewer").screenshot(timeout=0), dtype=np.uint8)
             return np.asarray(cv2.imdecode(shot, cv2.IMREAD_COLOR), dtype=np.float64)
 
         first = picture()
-        while (first.max(axis=2) > BRIGHT).mean() < 0.02:
+        while not page.evaluate("document.querySelector('#scene').hidden") or (first.max(axis=2) > BRIGHT).mean() < 0.02:
             assert time.monotonic() - begin < PATIENCE, "there is no robot in Rerun's view"
             first = picture()
         print(f"Rerun's view: the robot after {time.monotonic() - begin:.1f} s")
@@ -83,4 +84,8 @@ def test_rerun_s_view_shows_a_robot_that_moves(served: PageServer) -> None:
             assert time.monotonic() - begin < PATIENCE, "the robot in Rerun's view does not move"
         numbers = [int(address.partition("after=")[2]) for address in asked if "/frame?" in address]
         assert numbers[0] == 0 and numbers == sorted(numbers)
+        page.locator("#viewer").click()  # Rerun has the keys now, and passes them on
+        page.keyboard.press("v")
+        while not page.evaluate("!document.querySelector('#viewer').src && !document.querySelector('#scene').hidden"):
+            assert time.monotonic() - begin < PATIENCE, "Rerun's view is not left by a key that it hears"
         browser.close()

@@ -24,7 +24,7 @@ const picture = new BodyPicture($("body"), $("tip"), {
     say(place ? "A place is picked: H lets the nearest hand reach for it." : `The ${name} is picked: H lets the nearest hand reach for it; or drag it.`);
   },
 });
-const view = new View({ frame: $("viewer"), canvas: $("scene"), legend: $("view-legend"), note: $("loading"), button: $("other-view") });
+const view = new View({ frame: $("viewer"), canvas: $("scene"), legend: $("view-legend"), note: $("loading"), button: $("other-view"), pressed: (key) => press(key) });
 const move = new MovePanel($("move"), { send, state });
 
 // ---- calls
@@ -387,13 +387,17 @@ function help() {
   $("help").showModal();
 }
 
+// Do what a key stands for; returns whether there is something.
+function press(key) {
+  const found = $("help").open ? null : actions[key.length === 1 ? key.toLowerCase() : key];
+  found?.[2]();
+  return Boolean(found);
+}
+
 addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "INPUT" && event.key !== "s") return;
-  if ($("help").open) return;
-  const found = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-  if (!found || (event.target.tagName === "BUTTON" && event.key === " ")) return;
-  event.preventDefault();
-  found[2]();
+  if (event.ctrlKey || event.metaKey || event.altKey || (event.target.tagName === "INPUT" && event.key !== "s")) return;
+  if (event.target.tagName === "BUTTON" && event.key === " ") return;
+  if (press(event.key)) event.preventDefault();
 });
 document.addEventListener("click", (event) => {
   const name = event.target.closest?.("[data-do]")?.dataset.do;

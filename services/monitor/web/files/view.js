@@ -16,13 +16,14 @@ function viewerAddress() {
 }
 
 export class View {
-  constructor({ frame, canvas, legend, note, button }) {
+  constructor({ frame, canvas, legend, note, button, pressed }) {
     this.scene = new SceneView(canvas);
     this.frame = frame;
     this.canvas = canvas;
     this.legend = legend;
     this.note = note;
     this.button = button;
+    this.pressed = pressed; // (key): a key was pressed in Rerun's view
     this.rerunTime = null; // s of robot time that Rerun shows
     this.isAsked = false; // a person wants Rerun, however late
     this.late = 0; // frames
@@ -83,7 +84,8 @@ export class View {
     this.say(why);
   }
 
-  heard({ kind, share, time, delay, text }) {
+  heard({ kind, share, time, delay, text, key }) {
+    if (kind === "key") this.pressed(key);
     if (kind === "loading") this.say(`Rerun's view loads: ${Math.round(100 * share)} %`);
     if (kind === "ready") this.say("Rerun's view draws its first picture.");
     if (kind === "shown") {

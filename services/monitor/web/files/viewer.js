@@ -23,6 +23,15 @@ function tell(message) {
   window.parent.postMessage(message, page);
 }
 
+// Rerun takes the keys when it starts or is clicked; the page must hear them, above all that of the emergency stop.
+addEventListener(
+  "keydown",
+  (event) => {
+    if (!event.ctrlKey && !event.metaKey && !event.altKey) tell({ kind: "key", key: event.key });
+  },
+  { capture: true },
+);
+
 function pieces(buffer) {
   const view = new DataView(buffer);
   const found = [];
