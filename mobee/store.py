@@ -12,9 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from mobee.claims import claim, release
 from mobee.database import damaged, explained, json_of, opened, transaction
 from mobee.errors import MobeeError
+from mobee.write_locks import lock, unlock
 
 
 class AgentFile:
@@ -39,11 +39,11 @@ class AgentFile:
         self._db: sqlite3.Connection = opened(self.path, read_only, durable)
         if not read_only:
             try:
-                claim(self.path, agent)
+                lock(self.path, agent)
             except BaseException:
                 self._db.close()
                 raise
-            self._release = weakref.finalize(self, release, self.path, agent)
+            self._release = weakref.finalize(self, unlock, self.path, agent)
 
     def bind(self, settings: dict[str, Any]) -> None:
         """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which process writes what in a file: a claim excludes other processes, and ends with its process at the latest.
+"""Locks by which one process alone writes the data of an agent into a file; a lock ends with its process at the latest.
 
-A claim is a lock on one byte of a file beside the data.  Such locks belong to a process: the same process may claim twice, and all its
-locks on a file end when it closes any descriptor of that file.  Therefore a process opens the file once and counts its claims.
+A lock covers one byte of a file beside the data.  Such locks belong to a process: the same process may lock twice, and all its locks
+on a file end when it closes any descriptor of that file.  Therefore a process opens the file once and counts its locks.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ class _LockFile:
 
     def __init__(self, path: Path) -> None:
         self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        self.claims: Counter[str] = Counter()
+        self.held: Counter[str] = Counter()
 
 
 _open: dict[Path, _LockFile] = {}
 
 
-def claim(path: Path, name: str) -> None:
-    """Claim the right to write what `name` has in a file; raises InUse while another process has it."""
+def lock(path: Path, name: str) -> None:
+    """Lock what `name` has in a file against other processes; raises InUse while another process holds the lock."""
     if fcntl is None:
         return
     where = path.with_name(path.name + "-lock").absolute()
@@ -50,24 +50,24 @@ def claim(path: Path, name: str) -> None:
         raise MobeeError(f"{path}: {where.name} beside it cannot be made ({error.strerror}).") from None
     except OSError as error:
         raise NoRoom(f"{path}: {where.name} beside it cannot be made ({error.strerror}).") from None
-    file.claims[name] += 1
+    file.held[name] += 1
 
 
-def release(path: Path, name: str) -> None:
-    """End a claim."""
+def unlock(path: Path, name: str) -> None:
+    """Release a lock."""
     where = path.with_name(path.name + "-lock").absolute()
     file = _open.get(where)
-    if file is None or fcntl is None or not file.claims[name]:
+    if file is None or fcntl is None or not file.held[name]:
         return
-    file.claims[name] -= 1
-    if not file.claims[name]:
+    file.held[name] -= 1
+    if not file.held[name]:
         with suppress(OSError):
             fcntl.lockf(file.descriptor, fcntl.LOCK_UN, 1, _byte(name))
     _close_if_unused(where)
 
 
 def _close_if_unused(where: Path) -> None:
-    if not any(_open[where].claims.values()):
+    if not any(_open[where].held.values()):
         os.close(_open.pop(where).descriptor)
 
 
