@@ -29,7 +29,7 @@ _GARBAGE = b"\xc1" + bytes(99)  # no msgpack
 
 
 def _paced(rate: float, send: Callable[[], object]) -> None:
-    """Call `send` at a rate, for ever."""
+    """Call `send` at a rate, without end."""
     begun, sent = time.monotonic(), 0
     while True:
         due = int((time.monotonic() - begun) * rate)
