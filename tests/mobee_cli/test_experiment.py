@@ -185,7 +185,7 @@ def test_resume_without_a_name_goes_on_with_the_newest_run(tmp_path, capsys):
 def test_claims_are_printed_as_on_the_page(capsys):
     assert main(["experiment", "claims", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert {"experiment", "source", "text", "published", "ours", "verdict"} == set(told[0])
+    assert {"experiment", "source", "text", "published", "ours", "verdict", "p", "settings"} == set(told[0])
     assert main(["experiment", "claims"]) == 0
     said = capsys.readouterr().out
     assert all(len(line) <= 80 for line in said.splitlines())
@@ -200,4 +200,4 @@ def test_cells_that_fail_fail_the_command_and_are_named(tmp_path, capsys, monkey
     monkeypatch.setattr(hypercube_exploration, "EXPERIMENT", failing)
     assert main(["experiment", "run", "hypercube-exploration", "--seeds", "1", "--jobs", "1", "--runs", str(tmp_path)]) == 1
     said = capsys.readouterr().err
-    assert "g0.9-s0: ValueError: broken" in said and "--resume" in said
+    assert "50-50-0.9-s0: ValueError: broken" in said and "--resume" in said
