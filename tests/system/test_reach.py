@@ -67,6 +67,7 @@ def test_the_command_reaches_a_place_in_the_running_system(live: tuple[Launch, W
 def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], tmp_path: Path) -> None:
     system, watcher = live
     played = command("roadmap", "play", str(two_poses(tmp_path / "map.npz")), "--to", "1", "--live", "--endpoint", system.endpoint)
+    print(f"remaining error {1e3 * played['remaining_error']:.1f} mm")
     assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
     until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be released")
 
@@ -117,7 +118,7 @@ def command(*words: str) -> dict[str, Any]:
         done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, timeout=100)
         if "interrupted" not in done.stderr:
             break
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stderr + done.stdout
     return dict(json.loads(done.stdout))
 
 
