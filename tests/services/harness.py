@@ -127,7 +127,7 @@ class Rig:
     # Liveliness
 
     def instances(self, who: str) -> set[str]:
-        return {instance for name, instance in self.alive if name == who}
+        return {instance for name, instance in tuple(self.alive) if name == who}  # another thread adds to it
 
     def token(self, who: str, instance: str) -> None:
         self._tokens[who, instance] = self.session.liveliness().declare_token(keys.alive(who, instance))
