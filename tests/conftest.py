@@ -14,9 +14,6 @@ import numpy as np
 import psutil
 import pytest
 
-# A shell that starts the tests in the background has them ignore Ctrl-C, and all programs that they start would inherit it.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-
 hypothesis.settings.register_profile("mobee", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("mobee")
 
@@ -69,6 +66,16 @@ def pytest_collection_finish() -> None:
     """What has been imported stays: the garbage collector is not to walk through it again and again."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """Handle signals as a new process does, before a test and its fixtures start programs, which would inherit that they are ignored.
+
+    A shell has the programs that it starts in the background ignore Ctrl-C, and a service of ours ignores signals from its end on.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @pytest.hookimpl(trylast=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -33,15 +32,6 @@ def robot(bus: Rig) -> Rig:
     """The example, with a switch for each fault."""
     bus.run("robot_sim", "-m", "tests.mobee_cli.conform.broken_robot", "--endpoint", bus.endpoint)
     return bus
-
-
-@pytest.fixture(autouse=True)
-def signals() -> Iterator[None]:
-    """A service handles the signals of its process, and ignores them at its end: not so in the process of the tests."""
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in kept.items():
-        signal.signal(number, handler)
 
 
 def conform(bus: Rig, capsys: pytest.CaptureFixture[str], *options: str) -> tuple[int, dict[str, str | None]]:
