@@ -13,10 +13,11 @@ import numpy as np
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Commands, EStop, Message, Mode, Order, PartStatus, State, Tick
-from bus_schema.rpc import Driven, Reply, Request, Stat, Take, Taken, WithEpoch
+from bus_schema.rpc import Driven, Empty, Reply, Request, Stat, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.observe import Heard, listen
+from services.common.rpc import CallFailed
 from services.common.service import Service
 
 ANSWER = 1.0  # s within which a call is answered and a stop is obeyed
@@ -105,11 +106,9 @@ class Player:
 
     def stat(self) -> Stat:
         """The status of robot_sim."""
-        from bus_schema.rpc import Empty
-
         return self.call(keys.service_rpc("robot_sim", "stat"), Empty, Stat)
 
-    def take(self, part: str, who: str = "controller", instance: str = "") -> int:
+    def take(self, part: str, instance: str = "") -> int:
         """Take a part's drive; returns the epoch."""
         taken = self.call(keys.drive(part, "take"), Take, Taken, instance=instance or self.service.instance)
         self.epochs[part] = taken.epoch
@@ -124,7 +123,7 @@ class Player:
     def armed(self, part: str) -> Iterator[None]:
         """Take and arm a part; release it at the end, in whatever state it is."""
         self.take(part)
-        gate = self.drive(part, "arm")
+        gate = self._armed_when_known(part)
         if gate != "armed":
             raise Broken(f"arm of {part} answers gate {gate!r}, expected 'armed'")
         try:
@@ -132,6 +131,17 @@ class Player:
         finally:
             self.take(part)
             self.drive(part, "release")
+
+    def _armed_when_known(self, part: str) -> str:
+        """Arm a part; the liveliness token of this process may reach the robot after the call, which then refuses with 'no_token'."""
+        end = time.monotonic() + ANSWER
+        while True:
+            try:
+                return self.drive(part, "arm")
+            except CallFailed as refused:
+                if refused.code != "no_token" or time.monotonic() > end:
+                    raise
+                self.wait(0.01)
 
     # Commands
 
