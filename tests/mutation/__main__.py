@@ -22,7 +22,7 @@ from tests.mutation.running import ROOT, copy_of_project, is_noticed
 SIM, CONTROLLER = "tests/services/robot_sim", "tests/services/controller"
 
 SAFETY = {  # between a command and a motor: all mutants
-    "services/robot_sim/gate.py": (f"{SIM}/test_gate.py",),
+    "services/robot_sim/gate.py": (f"{SIM}/test_gate.py", f"{SIM}/test_admission.py"),
     "services/robot_sim/guard.py": (
         f"{SIM}/test_process_admission.py",
         f"{SIM}/test_process_modes.py",

@@ -6,8 +6,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
-from bus_schema import VERSION
+from bus_schema import VERSION, Refused
 from bus_schema.messages import Command
 from mobee.arrays import Array
 from mobee.robot.load import load_robot
@@ -62,3 +63,10 @@ class Gated:
         substeps = self.motors.parameters.substeps(self.dt)
         self.motors.move(substeps, self.dt / substeps)
         return self.velocity - before
+
+
+def refusal(gated: Gated, *args: object, **changes: object) -> str:
+    """Return the reason for which a command is refused."""
+    with pytest.raises(Refused) as caught:
+        gated.command(*args, **changes)
+    return caught.value.reason
