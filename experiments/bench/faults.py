@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live system under schedules of faults: who holds how fast, when every part is back, and whether a transition is lost or mixed.
+"""A live system under schedules of faults: time until parts hold, time until all are back, and lost or mixed transitions.
 
 Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine
 that does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, doubled or mixed; no motor
@@ -9,7 +9,6 @@ shrunk.  Times are judged only if the load was low; the load is part of the resu
 
 from __future__ import annotations
 
-import logging
 import os
 import tempfile
 import time
@@ -21,12 +20,11 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.command_line import Progress
-from experiments.kit.live.faults import VITAL, Culprit, Fault, draw, shrunk
+from experiments.kit.live.faults import VITAL, Fault, FaultInjector, draw, shrunk
 from experiments.kit.live.launch import LaunchFailed
-from experiments.kit.live.system import System, running, stat_of, wait_for
-from experiments.kit.live.witness import Witness, compare_transitions, stop_after, survived, violations
+from experiments.kit.live.observer import Kept, Observer, compare_transitions, stop_after, survived, violations
+from experiments.kit.live.system import System, running, wait_for
 from mobee.robot.load import load_robot
-from services.common.bus import Bus
 from services.common.session import open_client
 
 AGENTS = ("torso", "left_arm", "right_arm")
@@ -55,26 +53,24 @@ class Settings:
 QUICK = Settings(schedules=2)
 
 
-class _Patient:
-    """One system that is disturbed schedule by schedule."""
+class _DisturbedSystem:
+    """One system on which schedules of faults are performed, one after the other."""
 
     def __init__(self, system: System, session: Any) -> None:
-        self.system, self._session, self._robot = system, session, load_robot("icub")
-        self.witness = Witness()
-        self.witness.attach(session)
-        pids = {who: wait_for(lambda who=who: stat_of(session, who), 60.0, f"{who} answers").pid for who in SERVICES}  # type: ignore[misc]
-        bus = Bus(session, "bench", logging.getLogger("bench"))
-        self._culprit = Culprit(session, system.endpoint, pids, bus, lambda part: None, AGENTS[0])
+        self.system, self._robot = system, load_robot("icub")
+        self.observer = Observer()
+        self.observer.attach(session)
+        self._injector = FaultInjector(session, system.endpoint)
         self._wait_until_back()
 
     def _wait_until_back(self) -> None:
         """Wait until all parts follow commands."""
-        wait_for(lambda: self.witness.all_armed(len(self._robot.parts)), _BACK_PATIENCE, "every part follows commands again")
+        wait_for(lambda: self.observer.all_armed(len(self._robot.parts)), _BACK_PATIENCE, "every part follows commands again")
 
     def disturb(self, schedule: Sequence[Fault]) -> dict[str, Any]:
         """Perform a schedule; return what was measured and which promises were broken."""
-        self.witness.take_states()
-        times, broken = self._culprit.perform(schedule), list[str]()
+        self.observer.take_states()
+        times, broken = self._injector.perform(schedule), list[str]()
         over = max(at + fault.duration for at, fault in zip(times, schedule, strict=True))
         time.sleep(_ALONE)  # the last fault has its effect
         try:
@@ -83,23 +79,23 @@ class _Patient:
             broken.append(str(failed))
         if self.system.process.poll() is not None:
             raise LaunchFailed(f"the launcher has ended: {(self.system.says.splitlines() or ['no message'])[-1]}")
-        states = self.witness.take_states()
+        states = self.observer.take_states()
         back = max([0.0, *(moment.at - over for moments in states.values() for moment in moments if moment.gate != "armed")])
         alone = list(_alone(schedule, times))
         stops = [
             (fault.kind, stop)
             for fault, at, until in alone
-            if fault.kind in HOLD_AT_MOST and fault.who in ("controller", "model") and not 0.0 < fault.duration < _NOTICED
+            if fault.kind in HOLD_AT_MOST and fault.target in ("controller", "model") and not 0.0 < fault.duration < _NOTICED
             for moments in states.values()
             if (stop := stop_after(moments, at, min(until, at + 2.0))) is not None
         ]
-        with self.witness.lock:
+        with self.observer.lock:
             actions = [
-                ("model" if fault.who == "model" else "agent", lasted)
+                ("model" if fault.target == "model" else "agent", lasted)
                 for fault, at, until in alone
-                if fault.kind == "kill" and (fault.who == "model" or fault.who.startswith("agent_"))
-                for part, changes in self.witness.motions.items()
-                if fault.who != f"agent_{part}" and (lasted := survived(changes, at, until)) is not None
+                if fault.kind == "kill" and (fault.target == "model" or fault.target.startswith("agent_"))
+                for part, changes in self.observer.motions.items()
+                if fault.target != f"agent_{part}" and (lasted := survived(changes, at, until)) is not None
             ]
         return {"back_s": back, "broken": [*broken, *violations(states, self._robot, NOISE)], "stops": stops, "actions": actions}
 
@@ -119,24 +115,24 @@ def measure(settings: Settings) -> dict[str, Any]:
     begun = time.monotonic()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:
         with open_client(system.endpoint) as session:
-            patient = _Patient(system, session)
+            disturbed = _DisturbedSystem(system, session)
             for n in range(settings.schedules):
                 progress.show(n / settings.schedules, f"schedule {settings.seed + n}")
-                rows.append(_performed(patient, settings.seed + n, settings))
-            time.sleep(1.0)  # what was published last is heard
-            kept = compare_transitions(patient.witness, system.run_dir, list(AGENTS))
+                rows.append(_performed(disturbed, settings.seed + n, settings))
+            time.sleep(1.0)  # what was published last arrives
+            kept = compare_transitions(disturbed.observer, system.run_dir, list(AGENTS))
     return _result(settings, rows, kept, time.monotonic() - begun)
 
 
-def _performed(patient: _Patient, seed: int, settings: Settings) -> dict[str, Any]:
+def _performed(system: _DisturbedSystem, seed: int, settings: Settings) -> dict[str, Any]:
     schedule = draw(seed, SERVICES, settings.seconds, settings.period)
-    result = patient.disturb(schedule)
+    result = system.disturb(schedule)
     if result["broken"] and settings.shrink:
-        schedule = shrunk(schedule, lambda shorter: bool(patient.disturb(shorter)["broken"]), settings.shrink)
+        schedule = shrunk(schedule, lambda shorter: bool(system.disturb(shorter)["broken"]), settings.shrink)
     return {"seed": seed, "schedule": [str(fault) for fault in schedule], "load": os.getloadavg()[0], **result}
 
 
-def _result(settings: Settings, rows: list[dict[str, Any]], kept: Any, seconds: float) -> dict[str, Any]:
+def _result(settings: Settings, rows: list[dict[str, Any]], kept: Kept, seconds: float) -> dict[str, Any]:
     stops = [each for row in rows for each in row.pop("stops")]
     actions = [each for row in rows for each in row.pop("actions")]
     load = float(np.median([row["load"] for row in rows]))

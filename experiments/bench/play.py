@@ -19,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,7 @@ def measure(settings: Settings) -> dict[str, Any]:
         speeds = Calibration(crew.loops)
         for number, robot in enumerate(todo):
             progress.show(number / len(todo), robot)
-            start, speed = speeds.around(lambda robot=robot: _start(robot, settings.python, browser))  # type: ignore[misc]
+            start, speed = speeds.around(partial(_start, robot, settings.python, browser))
             learning = start["steps"]["learned offline"] - start["steps"]["derived"]
             standard = LEARNING + (start["steps"][SHOWN] - min(learning, LEARNING)) * speed
             starts.append(start | {"robot": robot, "speed": speed, "standard_s": standard, "load": os.getloadavg()[0]})
@@ -133,7 +134,7 @@ def _left(home: str) -> list[int]:
     """Return the processes whose command names a file in a home, as each service names its settings; on Linux."""
     found = []
     for line in Path("/proc").glob("[0-9]*/cmdline"):
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):  # the process has ended meanwhile
             if f"{home}/" in line.read_text(errors="replace"):
                 found.append(int(line.parent.name))
     return found

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""After an emergency stop nothing moves before its reset, whatever dies, freezes, starts or says otherwise."""
+"""After an emergency stop nothing moves before its reset, whatever ends, freezes, starts or is sent meanwhile."""
 
 from __future__ import annotations
 
 import json
-import logging
 import os
 import signal
 import subprocess
@@ -16,9 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.common.bus import Bus
+from experiments.kit.live.faults import FORGED_PART, FaultInjector, draw_around_stop
 from services.common.session import open_client
-from tests.system.faults import culprit, draw_stop_schedule
 from tests.system.live import AGENTS, PARTS, Launch, Watcher, launch, until
 
 pytestmark = pytest.mark.system
@@ -51,6 +49,12 @@ def all_stopped(endpoint: str) -> bool:
     return set(parts) == set(PARTS) and all(part["gate"] == "estop" for part in parts.values())
 
 
+def epoch_of(watcher: Watcher) -> int | None:
+    """The newest drive epoch of the part that forged calls name."""
+    states = watcher.states[FORGED_PART]
+    return states[-1].epoch if states else None
+
+
 def motion_after(watcher: Watcher, since: float) -> tuple[int, float]:
     """Number of states of an armed part, and the largest move [rad] within one run, from a monotonic time on."""
     armed, moved = 0, 0.0
@@ -70,12 +74,12 @@ def campaign(folder: Path, seeds: range) -> None:
     try:
         for seed in seeds:
             watchers[-1].wait_until_moved(AGENTS, faster=0.02)
-            schedule = draw_stop_schedule(seed)
+            schedule = draw_around_stop(seed)
             print(f"{seed}: {'; '.join(map(str, schedule))}", flush=True)
             with open_client(system.endpoint) as session:
-                times = culprit(system, watchers[-1], Bus(session, "test", logging.getLogger("test"))).perform(schedule)
+                times = FaultInjector(session, system.endpoint, system.process.pid, partial(epoch_of, watchers[-1])).perform(schedule)
             stopped = next(at for at, fault in zip(times, schedule, strict=True) if fault.kind == "stop")
-            if any((fault.kind, fault.who) == ("kill", "launcher") for fault in schedule):
+            if any((fault.kind, fault.target) == ("kill", "launcher") for fault in schedule):
                 system.process.wait(20.0)
                 system = start(folder / f"after-{seed}", system.endpoint)
                 watchers.append(Watcher(system.endpoint).__enter__())

@@ -3,74 +3,101 @@
 
 from __future__ import annotations
 
-import contextlib
+import logging
 import os
+import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from bus_schema import keys
 from bus_schema.messages import EStop
-from bus_schema.rpc import Driven, Reply, Take, Taken, WithEpoch
+from bus_schema.rpc import Driven, Reply, Request, Take, Taken, WithEpoch
 from experiments.kit.live.floods import flood
 from experiments.kit.live.system import stat_of
 from services.common import rpc
 from services.common.bus import Bus
 
-FORGED = ("false_stop", "release", "arm")
-"""Messages of a client that says what it must not: none may release a stop."""
+_R = TypeVar("_R", bound=Reply)
 
-KINDS = ("kill", "freeze", "stutter", "disk", "files", "flood", "squat", "second")
-"""What a schedule may hold, see `Culprit`."""
+FORGED = ("false_stop", "release", "arm")
+"""Messages and calls in the name of another client: none may release a stop."""
+
+FORGED_PART = "left_arm"
+"""The part that forged calls name."""
+
+KINDS = ("kill", "freeze", "throttle", "disk", "files", "flood", "token", "duplicate")
+"""What a schedule may hold, see `FaultInjector`."""
 _SHARES = (0.34, 0.24, 0.08, 0.08, 0.06, 0.08, 0.06, 0.06)  # of KINDS
 _FREEZES = (0.2, 1.0, 3.0)  # s; a service that is frozen for longer than 2 s is killed by the launcher
 _FLOODS = ("estop, set = false", "calls of robot_sim's stat", "tick, garbage", "commands, garbage", "tokens")
 VITAL = ("robot_sim", "controller", "model")
+STOP_AT = 1.0  # s after the beginning of a schedule around a stop
 _FILES = 20  # that a process may open while it has too few
+_THROTTLE_PERIOD = 0.05  # s
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What happens to a process `at` s after the beginning of a schedule, for `duration` s if it does not happen at once.
+    """A fault that begins `at` s after the beginning of a schedule, and lasts for `duration` s; 0: it is over at once.
 
-    `who`: the process, or the flood.
+    `kind`: see `FaultInjector`; `target`: the process, or the name of the flood.
     """
 
     at: float
     kind: str
-    who: str = ""
+    target: str = ""
     duration: float = 0.0
 
     def __str__(self) -> str:
         lasts = f" for {self.duration:.1f} s" if self.duration else ""
-        return f"{self.at:.2f} s {self.kind} {self.who}{lasts}".replace("  ", " ").strip()
+        return f"{self.at:.2f} s {self.kind} {self.target}{lasts}".replace("  ", " ").strip()
 
 
 def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> list[Fault]:
     """Return the schedule of a seed: faults of all KINDS on these services, about one in each `period` s, within `seconds`."""
     rng = np.random.default_rng(seed)
-    agents = [who for who in services if who.startswith("agent_")]
+    agents = [name for name in services if name.startswith("agent_")]
     faults = []
     for at in np.sort(rng.uniform(0.0, seconds, max(1, rng.poisson(seconds / period)))):
         kind = str(rng.choice(KINDS, p=_SHARES))
-        who, duration = str(rng.choice(services)), 0.0
+        target, duration = str(rng.choice(services)), 0.0
         if kind == "freeze":
             duration = float(rng.choice(_FREEZES))
-        elif kind in ("stutter", "squat", "second"):
-            who, duration = str(rng.choice(VITAL if kind == "second" else services)), 1.5
+        elif kind in ("throttle", "token", "duplicate"):
+            target, duration = str(rng.choice(VITAL if kind == "duplicate" else services)), 1.5
         elif kind in ("disk", "files"):
-            who, duration = str(rng.choice(agents)) if agents else who, 2.0
+            target, duration = str(rng.choice(agents)) if agents else target, 2.0
         elif kind == "flood":
-            who, duration = str(rng.choice(_FLOODS)), 1.5
-        faults.append(Fault(round(float(at), 3), kind, who, duration))
+            target, duration = str(rng.choice(_FLOODS)), 1.5
+        faults.append(Fault(round(float(at), 3), kind, target, duration))
     return faults
+
+
+def draw_around_stop(seed: int) -> list[Fault]:
+    """Return the schedule of a seed: an emergency stop at STOP_AT among two to five faults, some of which come before it.
+
+    The launcher, which is the router, fails only after the stop: without a router no process receives it, which `mobee estop` reports.
+    """
+    rng = np.random.default_rng(seed)
+    faults = [Fault(STOP_AT, "stop")]
+    for _ in range(rng.integers(2, 6)):
+        at = float(rng.uniform(0.7, 4.0))
+        kind = str(rng.choice(["kill", "kill", "freeze", "forge"]))
+        if kind == "forge":
+            faults.append(Fault(at, str(rng.choice(FORGED))))
+        else:
+            duration = float(rng.choice([0.3, 1.0, 3.0])) if kind == "freeze" else 0.0
+            faults.append(Fault(at, kind, str(rng.choice((*VITAL, "launcher") if at > STOP_AT + 0.05 else VITAL)), duration))
+    return sorted(faults, key=lambda fault: fault.at)
 
 
 def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], tries: int) -> list[Fault]:
@@ -92,18 +119,19 @@ def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], 
     return kept
 
 
-class Culprit:
+class FaultInjector:
     """Performs faults on the processes of one system.
 
-    kill and freeze send signals; stutter freezes and continues a process every 50 ms; disk lets it write no byte to a file, files lets
-    it open no more files; flood is one of `floods.FLOODS`; squat keeps a liveliness token with the name of a service, and second starts
-    a second process of it.  stop says an emergency stop, and FORGED says otherwise in the name of the controller.
+    kill and freeze send signals; throttle stops and continues a process every 50 ms; disk: it can write no byte to a file; files: it can
+    open no more files; flood: one of `floods.FLOODS`; token: a liveliness token with the name of a service and of no process; duplicate:
+    a second process of a service; stop: an emergency stop.  Of FORGED, false_stop is an EStop with `set = false`; release and arm are
+    calls in the name of the controller.
     """
 
-    def __init__(self, session: Any, endpoint: str, pids: dict[str, int], bus: Bus, epoch: Callable[[str], int | None], part: str) -> None:
-        """`pids`: processes at the beginning; `epoch`: the drive epoch of a part in its newest state; `part`: on which FORGED calls act."""
-        self._session, self._endpoint, self._pids = session, endpoint, pids
-        self._stops, self._epoch, self._part = bus.publisher(EStop), epoch, part
+    def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:
+        """`launcher`: its process, if schedules name it; `epoch`: returns the newest drive epoch of FORGED_PART, None if not known."""
+        self._session, self._endpoint, self._launcher, self._epoch = session, endpoint, launcher, epoch
+        self._stops = Bus(session, "faults", logging.getLogger("faults")).publisher(EStop)
         self._ends: list[tuple[float, ExitStack]] = []  # monotonic time at which what lasts for a while is over
 
     def perform(self, schedule: Sequence[Fault]) -> list[float]:
@@ -137,62 +165,62 @@ class Culprit:
         elif fault.kind in FORGED:
             self._forge(fault.kind)
         elif fault.kind == "kill":
-            if (pid := self._pid(fault.who)) is not None:
+            if (pid := self._pid(fault.target)) is not None:
                 _send(pid, signal.SIGKILL)
         else:
             lasting = ExitStack()
             lasting.enter_context(self._lasting(fault))
             self._ends.append((time.monotonic() + fault.duration, lasting))
 
-    def _lasting(self, fault: Fault) -> contextlib.AbstractContextManager[Any]:
+    def _lasting(self, fault: Fault) -> AbstractContextManager[None]:
         if fault.kind == "flood":
-            return flood(self._endpoint, fault.who)
-        if fault.kind == "squat":
-            return contextlib.closing(_Token(self._session, fault.who))
-        if fault.kind == "second":
-            return _second(self._endpoint, fault.who)
-        pid = self._pid(fault.who)
+            return flood(self._endpoint, fault.target)
+        if fault.kind == "token":
+            return _forged_token(self._session, fault.target)
+        if fault.kind == "duplicate":
+            return _duplicate(self._endpoint, fault.target)
+        pid = self._pid(fault.target)
         if pid is None:
-            return contextlib.nullcontext()
-        return {"freeze": _frozen, "stutter": _stuttering, "disk": _without_disk, "files": _without_files}[fault.kind](pid)
+            return nullcontext()
+        return {"freeze": _frozen, "throttle": _throttled, "disk": _without_disk, "files": _without_files}[fault.kind](pid)
 
-    def _pid(self, who: str) -> int | None:
-        """The process of a service; None while none answers.  The launcher, which is also the router, cannot be asked once it is frozen."""
-        if who == "launcher":
-            return self._pids[who]
-        stat = stat_of(self._session, who, timeout=0.2)
-        if stat is not None:
-            self._pids[who] = stat.pid
+    def _pid(self, service: str) -> int | None:
+        """Return the process of a service; None if it does not answer: then there is nothing to kill or freeze.
+
+        The launcher is also the router: nothing answers while it is frozen.
+        """
+        if service == "launcher":
+            return self._launcher
+        stat = stat_of(self._session, service, timeout=0.2)
         return None if stat is None else stat.pid
 
     def _forge(self, kind: str) -> None:
-        """Take a part in the controller's name and arm it, or release it by its public epoch."""
-        epoch = self._epoch(self._part)
-        if kind == "release" and epoch is not None:
-            self._call(keys.drive(self._part, "release"), WithEpoch, Driven, epoch=epoch)
-        elif kind == "arm" and isinstance(taken := self._call(keys.drive(self._part, "take"), Take, Taken, instance="i1_forged"), Taken):
-            self._call(keys.drive(self._part, "arm"), WithEpoch, Driven, epoch=taken.epoch)
+        """Take FORGED_PART in the controller's name and arm it, or release it by its public epoch."""
+        if kind == "release" and (epoch := self._epoch()) is not None:
+            self._call(keys.drive(FORGED_PART, "release"), WithEpoch, Driven, epoch=epoch)
+        elif kind == "arm" and (taken := self._call(keys.drive(FORGED_PART, "take"), Take, Taken, instance="i1_forged")) is not None:
+            self._call(keys.drive(FORGED_PART, "arm"), WithEpoch, Driven, epoch=taken.epoch)
 
-    def _call(self, key: str, request: Any, reply: type[Reply], **fields: Any) -> Reply | None:
-        with suppress(rpc.CallFailed):
+    def _call(self, key: str, request: type[Request], reply: type[_R], **fields: object) -> _R | None:
+        with suppress(rpc.CallFailed):  # refused, as it should be, or robot_sim is down
             return rpc.call(self._session, "controller", key, request, reply, timeout=0.2, **fields)
         return None
 
 
-class _Token:
-    """A liveliness token with the name of a service, of no process."""
-
-    def __init__(self, session: Any, who: str) -> None:
-        self._token = session.liveliness().declare_token(keys.alive(who, "i1_squatter"))
-
-    def close(self) -> None:
-        self._token.undeclare()
+@contextmanager
+def _forged_token(session: Any, service: str) -> Iterator[None]:
+    """Declare a liveliness token with the name of a service, of no process."""
+    token = session.liveliness().declare_token(keys.alive(service, "i1_forged"))
+    try:
+        yield
+    finally:
+        token.undeclare()
 
 
 @contextmanager
-def _second(endpoint: str, who: str) -> Iterator[None]:
-    """A second process of a service; it ends by itself when it finds the first."""
-    argv = [sys.executable, "-m", "mobee_system.run", f"services.{who}", "--endpoint", endpoint]
+def _duplicate(endpoint: str, service: str) -> Iterator[None]:
+    """Start a second process of a service; it ends by itself when it finds the first."""
+    argv = [sys.executable, "-m", "mobee_system.run", f"services.{service}", "--endpoint", endpoint]
     process = subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield
@@ -211,45 +239,53 @@ def _frozen(pid: int) -> Iterator[None]:
 
 
 @contextmanager
-def _stuttering(pid: int) -> Iterator[None]:
-    script = f"import os, time\nwhile True:\n    for s in (19, 18):\n        os.kill({pid}, s)\n        time.sleep(0.05)"
-    process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.DEVNULL)
+def _throttled(pid: int) -> Iterator[None]:
+    """Stop and continue a process in turn; at the end it is continued."""
+    over = threading.Event()
+
+    def alternate() -> None:
+        while not over.is_set():
+            for number in (signal.SIGSTOP, signal.SIGCONT):
+                _send(pid, number)
+                over.wait(_THROTTLE_PERIOD)
+
+    thread = threading.Thread(target=alternate, daemon=True)
+    thread.start()
     try:
         yield
     finally:
-        process.kill()
-        process.wait()
-        _send(pid, signal.SIGCONT)
+        over.set()
+        thread.join()
 
 
 @contextmanager
 def _without_disk(pid: int) -> Iterator[None]:
-    with _limited(pid, "RLIMIT_FSIZE", 0):
+    with _limited(pid, resource.RLIMIT_FSIZE, 0):
         yield
 
 
 @contextmanager
 def _without_files(pid: int) -> Iterator[None]:
-    with _limited(pid, "RLIMIT_NOFILE", _FILES):
+    with _limited(pid, resource.RLIMIT_NOFILE, _FILES):
         yield
 
 
 @contextmanager
-def _limited(pid: int, name: str, soft: int) -> Iterator[None]:
-    """Lower a limit of a process; it may have ended."""
-    import resource
-
-    kind = getattr(resource, name)
-    with suppress(OSError):
-        before = resource.prlimit(pid, kind)
-        resource.prlimit(pid, kind, (soft, before[1]))
+def _limited(pid: int, limit: int, soft: int) -> Iterator[None]:
+    """Lower a limit of a process, and restore it at the end; if the process has ended before, there is nothing to lower."""
+    try:
+        before = resource.prlimit(pid, limit)
+        resource.prlimit(pid, limit, (soft, before[1]))
+    except ProcessLookupError:
+        yield
+        return
     try:
         yield
     finally:
-        with suppress(OSError, UnboundLocalError):
-            resource.prlimit(pid, kind, before)
+        with suppress(ProcessLookupError):  # it has ended meanwhile
+            resource.prlimit(pid, limit, before)
 
 
 def _send(pid: int, number: int) -> None:
-    with suppress(ProcessLookupError):
+    with suppress(ProcessLookupError):  # it has ended meanwhile
         os.kill(pid, number)

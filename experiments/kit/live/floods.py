@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Floods of messages, calls, tokens and connections, each made by a process of its own: `python -m experiments.kit.live.floods`.
+"""Floods of messages, calls, tokens and connections, each from a process of its own: `python -m experiments.kit.live.floods`.
 
-They speak from the documented contract alone, as any program on the machine can.
+Any program on the machine can send them: they need no more than the documented contract of the bus.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bus_schema.rpc import Empty
 from services.common.session import open_client
 
 MESSAGES, BIG_MESSAGES, CALLS, TOKENS = 10_000, 100, 1_400, 500  # a second
-IDLE = 1000  # connections that say nothing
+IDLE = 1000  # connections on which nothing is sent
 _BURST = 0.005  # s between two bursts of a flood
 _BIG = bytes(1_000_000)
 _GARBAGE = b"\xc1" + bytes(99)  # no msgpack

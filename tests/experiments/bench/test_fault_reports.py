@@ -9,7 +9,7 @@ import pytest
 
 from experiments.bench import faults, stop
 from experiments.kit.live.faults import Fault
-from experiments.kit.live.witness import Kept, Stop
+from experiments.kit.live.observer import Kept, Stop
 
 FINE = Kept(97, 0, 0, 0)
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.kit.live.faults import KINDS, Fault, _frozen, _stuttering, _without_disk, draw, shrunk
-from experiments.kit.live.witness import Moment, Witness, compare_transitions, stop_after, survived, violations
+from experiments.kit.live.faults import KINDS, Fault, _frozen, _throttled, _without_disk, draw, shrunk
+from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, survived, violations
 from mobee.robot.load import load_robot
 from mobee.store import STORE, Transition, TransitionStore
 
@@ -27,7 +27,7 @@ def test_a_seed_is_a_schedule_and_every_kind_is_drawn() -> None:
     assert draw(7, SERVICES, 10.0, 4.0) == draw(7, SERVICES, 10.0, 4.0)
     drawn = [fault for seed in range(200) for fault in draw(seed, SERVICES, 10.0, 4.0)]
     assert {fault.kind for fault in drawn} == set(KINDS)
-    assert {fault.who for fault in drawn if fault.kind == "kill"} == set(SERVICES)
+    assert {fault.target for fault in drawn if fault.kind == "kill"} == set(SERVICES)
     assert all(0.0 <= fault.at <= 10.0 for fault in drawn)
     assert 1.5 < len(drawn) / 200 < 3.5
 
@@ -36,14 +36,14 @@ def test_a_seed_is_a_schedule_and_every_kind_is_drawn() -> None:
 def test_a_schedule_is_shrunk_to_the_faults_that_fail_together(seed: int) -> None:
     rng = np.random.default_rng(seed)
     schedule = [Fault(float(at), "kill", f"s{at}") for at in range(10)]
-    culprits = {schedule[i] for i in rng.choice(10, size=rng.integers(1, 4), replace=False)}
+    needed = {schedule[i] for i in rng.choice(10, size=rng.integers(1, 4), replace=False)}
     performed = []
 
     def fails(shorter: Sequence[Fault]) -> bool:
         performed.append(shorter)
-        return culprits <= set(shorter)
+        return needed <= set(shorter)
 
-    assert set(shrunk(schedule, fails, tries=1000)) == culprits
+    assert set(shrunk(schedule, fails, tries=1000)) == needed
     performed.clear()
     shrunk(schedule, fails, tries=3)
     assert len(performed) == 3
@@ -93,12 +93,12 @@ def test_a_transition_that_is_lost_or_differs_is_found(tmp_path: Path) -> None:
     with TransitionStore(tmp_path / STORE, "torso") as store:
         for n in (1, 2):
             store.append(Transition(n, 1, 2, 3, 0.5, True, 4.0, (0.0,)))
-    witness = Witness()
-    witness.published = {("torso", n): (1, 2, 3, True, 4.0) for n in (1, 2)}
-    kept = compare_transitions(witness, tmp_path, ["torso"])
+    observer = Observer()
+    observer.published = {("torso", n): (1, 2, 3, True, 4.0) for n in (1, 2)}
+    kept = compare_transitions(observer, tmp_path, ["torso"])
     assert (kept.kept, kept.lost, kept.differing, kept.gaps) == (2, 0, 0, 0)
-    witness.published |= {("torso", 3): (1, 2, 3, True, 4.0), ("torso", 2): (1, 2, 4, True, 4.0)}
-    kept = compare_transitions(witness, tmp_path, ["torso"])
+    observer.published |= {("torso", 3): (1, 2, 3, True, 4.0), ("torso", 2): (1, 2, 4, True, 4.0)}
+    kept = compare_transitions(observer, tmp_path, ["torso"])
     assert (kept.lost, kept.differing) == (1, 1)
 
 
@@ -125,7 +125,7 @@ def test_a_process_without_disk_writes_nothing_and_goes_on_afterwards_and_one_th
             said = [process.stdout.readline() for _ in range(10)]
             assert said[-1] == "File too large\n"
         assert "written\n" in [process.stdout.readline() for _ in range(10)]
-        for lasting in (_frozen, _stuttering):
+        for lasting in (_frozen, _throttled):
             with lasting(process.pid):
                 time.sleep(0.1)
             assert process.poll() is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a running system did while it was disturbed: from its stream of states and what agents publish, beside what is on disk."""
+"""What a running system did while it was disturbed: its states, and the transitions that agents published beside those on disk."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ class Moment:
 
 
 @dataclass
-class Witness:
+class Observer:
     """Records the states of all parts and the transitions that agents publish."""
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
     motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, with their time
     published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
-    unlike: list[str] = field(default_factory=list)  # two different transitions of one number
+    conflicts: list[str] = field(default_factory=list)  # a line for each number under which two different transitions were published
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def attach(self, session: Any) -> None:
-        """Begin to listen."""
+        """Subscribe to the streams of all parts and agents."""
         listen(session, State.stream.keys(), self._note_state)
         listen(session, Motion.stream.keys(), self._note_motion)
         listen(session, Transition.stream.keys(), self._note_transition)
@@ -83,7 +83,7 @@ class Witness:
         key, values = (made["agent"], made["n"]), tuple(made[name] for name in ("s", "a", "s_next", "settled", "duration"))
         with self.lock:
             if self.published.setdefault(key, values) != values:
-                self.unlike.append(f"{key[0]} published two transitions {key[1]}")
+                self.conflicts.append(f"{key[0]} published two transitions {key[1]}")
 
     def newest(self, part: str) -> Moment | None:
         """The last state of a part."""
@@ -106,7 +106,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class Stop:
-    """How a part came to rest after a fault: times [s] from the fault, and the distance [rad]; None: not within the time looked at."""
+    """How a part came to rest after a fault: times [s] from the fault, and the distance [rad]; None: not within the time given."""
 
     hold: float | None
     rest: float | None
@@ -144,7 +144,7 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
     """Return a line for each broken promise in the states of one schedule; `noise`: largest of the encoders, rad.
 
-    Within a run time never goes back, no motor is faster than the gate allows, and a part moves only if it is armed or comes to rest.
+    Within a run time never goes back, and no motor is faster than the gate allows.
     """
     found = []
     for part, moments in states.items():
@@ -171,7 +171,7 @@ class Kept:
     gaps: int  # numbers that are missing or twice
 
 
-def compare_transitions(witness: Witness, run_dir: Path, agents: list[str]) -> Kept:
+def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
     """Compare what was published with the store of a run."""
     kept = lost = differing = gaps = 0
     with TransitionStore(run_dir / STORE, "", read_only=True) as store:
@@ -182,10 +182,10 @@ def compare_transitions(witness: Witness, run_dir: Path, agents: list[str]) -> K
     for agent, made in on_disk.items():
         kept += counts[agent]
         gaps += counts[agent] - len(made)
-    with witness.lock:
-        for (agent, n), values in witness.published.items():
+    with observer.lock:
+        for (agent, n), values in observer.published.items():
             if agent in agents:
                 found = on_disk.get(agent, {}).get(n)
                 lost += found is None
                 differing += found is not None and found != values
-    return Kept(kept, lost, differing + len(witness.unlike), gaps)
+    return Kept(kept, lost, differing + len(observer.conflicts), gaps)
