@@ -6,19 +6,19 @@ Any program on the machine can send them: they need no more than the documented 
 
 from __future__ import annotations
 
-import contextlib
 import secrets
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from bus_schema import VERSION, encode, encoding_of, keys
 from bus_schema.messages import Clock, Commands, EStop, Event, Forces, Image, Message, Motion, State, Tick, Transition, WorldObject
 from bus_schema.rpc import Empty
+from experiments.kit.live.launch import LaunchFailed
 from services.common.session import open_client
 
 MESSAGES, BIG_MESSAGES, CALLS, TOKENS = 10_000, 100, 1_400, 500  # a second
@@ -70,20 +70,28 @@ def _come_and_go(endpoint: str) -> None:
 
 
 def _connect(endpoint: str) -> None:
-    """Keep IDLE connections; one that the router closes is opened again."""
+    """Keep IDLE connections; one that the router closes or refuses is opened again."""
     host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
     held: list[socket.socket] = []
     while True:
-        for connection in list(held):
-            with contextlib.suppress(BlockingIOError):
-                if not connection.recv(1):
-                    held.remove(connection)
-                    connection.close()
-        while len(held) < IDLE:
-            connection = socket.create_connection((host, int(port)), timeout=1.0)
-            connection.setblocking(False)
-            held.append(connection)
+        for connection in [each for each in held if _is_closed(each)]:
+            held.remove(connection)
+            connection.close()
+        with suppress(OSError):  # the router refuses, or does not answer in time: the next round tries again
+            while len(held) < IDLE:
+                connection = socket.create_connection((host, int(port)), timeout=1.0)
+                connection.setblocking(False)
+                held.append(connection)
         time.sleep(0.05)
+
+
+def _is_closed(connection: socket.socket) -> bool:
+    try:
+        return not connection.recv(1)
+    except BlockingIOError:  # nothing was sent
+        return False
+    except OSError:
+        return True
 
 
 FLOODS: dict[str, Callable[[str], None]] = {
@@ -109,18 +117,20 @@ FLOODS: dict[str, Callable[[str], None]] = {
 
 @contextmanager
 def flood(endpoint: str, name: str) -> Iterator[None]:
-    """One of FLOODS while the body of the `with` statement runs."""
-    process = subprocess.Popen([sys.executable, "-m", "experiments.kit.live.floods", endpoint, name])
+    """One of FLOODS while the body of the `with` statement runs; raises LaunchFailed at its end if the flood has ended before."""
+    process = subprocess.Popen([sys.executable, "-m", "mobee_system.run", "experiments.kit.live.floods", endpoint, name])
     try:
         yield
+        if process.poll() is not None:
+            raise LaunchFailed(f"the flood {name!r} ended with code {process.returncode} while it was needed")
     finally:
         process.kill()
         process.wait()
 
 
-def main(arguments: Any = None) -> None:
+def main() -> None:
     """Flood until the process is killed."""
-    endpoint, name = arguments or sys.argv[1:]
+    endpoint, name = sys.argv[1:]
     FLOODS[name](endpoint)
 
 

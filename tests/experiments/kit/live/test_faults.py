@@ -12,9 +12,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from experiments.kit.live.faults import KINDS, Fault, _frozen, _throttled, _without_disk, draw, shrunk
+from experiments.kit.live.floods import flood
+from experiments.kit.live.launch import LaunchFailed
 from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, survived, violations
 from mobee.robot.load import load_robot
 from mobee.store import STORE, Transition, TransitionStore
@@ -116,6 +119,10 @@ while True:
 """
 
 
+def is_stopped(pid: int) -> bool:
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+
+
 def test_a_process_without_disk_writes_nothing_and_goes_on_afterwards_and_one_that_is_frozen_does_nothing(tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path / "file")], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -127,11 +134,21 @@ def test_a_process_without_disk_writes_nothing_and_goes_on_afterwards_and_one_th
         assert "written\n" in [process.stdout.readline() for _ in range(10)]
         for lasting in (_frozen, _throttled):
             with lasting(process.pid):
-                time.sleep(0.1)
+                give_up = time.monotonic() + 10.0
+                while not is_stopped(process.pid):
+                    assert time.monotonic() < give_up
             assert process.poll() is None
-            with open(f"/proc/{process.pid}/stat") as file:
-                assert file.read().rpartition(")")[2].split()[0] != "T"
+            assert not is_stopped(process.pid)
     finally:
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         process.stdout.close()
+
+
+def test_a_flood_that_ends_before_its_time_is_an_error() -> None:
+    with pytest.raises(LaunchFailed, match="'idle connections' ended with code 1"), flood("no endpoint", "idle connections"):
+        (started,) = (each for each in psutil.Process().children() if "experiments.kit.live.floods" in each.cmdline())
+        give_up = time.monotonic() + 30.0
+        while started.status() != psutil.STATUS_ZOMBIE:
+            assert time.monotonic() < give_up
+            time.sleep(0.01)
