@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 from bus_schema.version import VERSION
 
 _S = TypeVar("_S", bound=Struct)
+_PREFIX = "application/msgpack;icub/"
 _encoder = msgspec.msgpack.Encoder()
 
 
@@ -27,7 +28,12 @@ class Refused(Exception):
 @cache
 def encoding_of(cls: type[Struct]) -> str:
     """Return the encoding string that is sent with a message of this type."""
-    return f"application/msgpack;icub/{cls.__name__}/{VERSION}"
+    return f"{_PREFIX}{cls.__name__}/{VERSION}"
+
+
+def type_of(encoding: str) -> str:
+    """Return the name of the message's type in an encoding string; "" if it is not one of this contract."""
+    return encoding.removeprefix(_PREFIX).partition("/")[0] if encoding.startswith(_PREFIX) else ""
 
 
 def encode(message: Struct) -> bytes:
@@ -57,8 +63,8 @@ def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = N
 
 
 def _refuse_encoding(cls: type[Struct], encoding: str) -> None:
-    name, _, version = encoding.removeprefix("application/msgpack;icub/").partition("/")
-    if name == cls.__name__ and version:
+    own = f"{_PREFIX}{cls.__name__}/"
+    if encoding.startswith(own) and (version := encoding.removeprefix(own)):
         raise Refused("version", f"{cls.__name__}: version {version[:20]}, this side speaks {VERSION}")
     raise Refused("type", f"expected {encoding_of(cls)!r}, got {encoding[:80]!r}")
 

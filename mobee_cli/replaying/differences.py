@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from bus_schema.page import streams
+from mobee.errors import MobeeError
 from mobee_cli.replaying.ticks import Item, TickOf, ticks
 from services.recorder.reader import Recording
 
@@ -29,10 +30,6 @@ class Difference:
     field: str
     first: Any
     second: Any
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
 
     def __str__(self) -> str:
         return f"tick {self.tick}, {self.key}, {self.field}: {_short(self.first)} and {_short(self.second)}"
@@ -102,13 +99,18 @@ class Compared:
 
 
 def compare_runs(first: Recording, second: Recording) -> Compared:
-    """Compare the control streams of two runs from tick 1 on, until they part; tick 0 is repeated as often as the start takes."""
+    """Compare the control streams of two runs from tick 1 on, until they part; raises MobeeError if a run has no such tick.
+
+    Tick 0 is repeated as often as the start takes.
+    """
     kinds = {cls.__name__ for cls in streams() if cls.stream.delivery in _REPEATABLE} - set(_LEFT_OUT)
     counted = messages = 0
     sides = [_from_tick_1(ticks(first)), _from_tick_1(ticks(second))]
     while True:
         one, other = (next(side, None) for side in sides)
         if one is None or other is None:
+            if not counted:
+                raise MobeeError("nothing was compared: a recording has no whole tick after tick 0")
             return Compared(counted, messages, None, "" if one is other else "first" if one is None else "second")
         if one.k != other.k:
             return Compared(counted, messages, Difference(min(one.k, other.k), "tick", "k", one.k, other.k), "")

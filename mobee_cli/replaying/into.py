@@ -23,7 +23,6 @@ from mobee.errors import MobeeError
 from mobee_cli.replaying.differences import OF_THE_RUN, Difference, compare
 from mobee_cli.replaying.stage import PATIENCE, Stage, Stopped
 from mobee_cli.replaying.ticks import Item, TickOf
-from services.recorder.reader import Recorded
 
 START = 30.0  # s until the service has answered tick 0
 START_PERIOD = 0.1  # s between two repetitions of tick 0, as of robot_sim
@@ -71,6 +70,8 @@ def replay_into(stage: Stage, run: Iterable[TickOf], last: int) -> Result:
     for tick in run:
         if tick.k > last or not replay.play(tick):
             break
+    if not replay.result.ticks:
+        raise MobeeError("nothing was compared: the recording needs two ticks after tick 0, and --ticks at least 2")
     replay.result.seconds = time.monotonic() - begin
     return replay.result
 
@@ -257,9 +258,8 @@ class _Replay:
         epoch = self._epochs.get(content["epoch"], content["epoch"])
         if epoch == content["epoch"]:
             return item
-        old = item.message
         payload = msgspec.msgpack.encode({**content, "epoch": epoch})
-        return Item(Recorded(old.key, old.encoding, payload, old.received, old.published), item.type, item.src)
+        return Item(msgspec.structs.replace(item.message, payload=payload), item.src)
 
 
 def _epoch(taken: bytes) -> int:

@@ -18,8 +18,9 @@ from mobee.errors import MobeeError
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.robot.load import load_robot
 from mobee_cli.replaying.stage import Stage
+from services.common.tap import Raw
 from services.common.worlds import world_around
-from services.recorder.reader import Recorded, Recording
+from services.recorder.reader import Recording
 
 STATE_PERIOD = 50_000_000  # ns of the robot's time between two states of its parts
 _HEADER = ("v", "run", "src", "seq", "k", "t", "tw")
@@ -62,7 +63,7 @@ class Player:
         self._last = self._offset + tick.t
         return self._last
 
-    def _publish(self, message: Recorded) -> None:
+    def _publish(self, message: Raw) -> None:
         if not message.type:
             token = json.loads(message.payload)
             if token["who"] not in ("monitor", "router"):

@@ -23,7 +23,6 @@ from services.common.observe import alive
 from services.common.session import LOCAL_ENDPOINT, local_endpoint, open_router, spare_threads
 from services.common.tap import Raw, RawPublisher, answer_raw, call_raw, receive_raw
 from services.launcher.catalogue import entry_of
-from services.recorder.reader import Recorded
 
 READY = 60.0  # s until the service is ready
 PATIENCE = 10.0  # s for an answer of the service
@@ -122,8 +121,7 @@ class Stage:
         return answer
 
     def _hear(self, raw: Raw) -> None:
-        recorded = Recorded(raw.key, raw.encoding, raw.payload, raw.received, raw.published)
-        self.said.put(Item(recorded, recorded.type, self.who))
+        self.said.put(Item(raw, self.who))
 
     def _has_token(self) -> bool:
         return self.who in alive(self.session)

@@ -12,7 +12,8 @@ from msgspec import Struct
 
 from mobee.errors import MobeeError
 from services.common.bus import NO_RUN
-from services.recorder.reader import Recorded, Recording
+from services.common.tap import Raw
+from services.recorder.reader import Recording
 
 SLACK = 20  # ticks after which a message of a tick is no longer expected: in free mode streams of low priority arrive late
 
@@ -30,14 +31,18 @@ _header = msgspec.msgpack.Decoder(_Header)
 class Item:
     """A recorded message, or a liveliness token (`type` empty)."""
 
-    message: Recorded
-    type: str
+    message: Raw
     src: str
 
     @property
     def key(self) -> str:
         """Its key on the bus."""
         return self.message.key
+
+    @property
+    def type(self) -> str:
+        """The name of the message's type."""
+        return self.message.type
 
     def content(self) -> dict[str, Any]:
         """Return the message as dicts, lists and values; raises MobeeError if it cannot be decoded."""
@@ -81,7 +86,7 @@ def ticks(recording: Recording) -> Iterator[TickOf]:
         k = header.k if header.run == run and run and header.k >= 0 else newest
         if k <= last:
             continue  # it arrived too late to be placed
-        waiting.setdefault(k, TickOf(k)).items.append(Item(message, message.type, header.src))
+        waiting.setdefault(k, TickOf(k)).items.append(Item(message, header.src))
         while waiting and (first := min(waiting)) < newest - SLACK:
             last = first
             yield waiting.pop(first)
@@ -92,7 +97,7 @@ def ticks(recording: Recording) -> Iterator[TickOf]:
             yield waiting[k]
 
 
-def _header_of(message: Recorded) -> _Header:
+def _header_of(message: Raw) -> _Header:
     if not message.type:
         return _Header()
     try:

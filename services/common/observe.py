@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import zenoh
 
-from bus_schema import keys
+from bus_schema import keys, type_of
 from bus_schema.rpc import Stat
 from services.common import rpc
 
@@ -28,7 +28,7 @@ class Heard:
     @property
     def type(self) -> str:
         """The name of the message's type, or the whole encoding string if it is not a message of this project."""
-        return self.encoding.removeprefix("application/msgpack;icub/").partition("/")[0]
+        return type_of(self.encoding) or self.encoding
 
     def content(self) -> Any:
         """Return the message as dicts, lists and values, unchecked; raises ValueError if it is not msgpack."""

@@ -11,17 +11,23 @@ import zenoh
 from msgspec import Struct
 from zenoh.handlers import Callback, RingChannel
 
+from bus_schema import type_of
 from services.common.listener import stay_known
 
 
 class Raw(Struct, frozen=True, gc=False):
-    """A message as it is on the bus; times in ns since 1970."""
+    """A message as it is on the bus, and in a recording; times in ns since 1970."""
 
     key: str
     encoding: str
     payload: bytes
     received: int
     published: int  # by the sender's clock
+
+    @property
+    def type(self) -> str:
+        """The name of the message's type; "" for what is no message of the contract, such as a recorded liveliness token."""
+        return type_of(self.encoding)
 
 
 class Tap:

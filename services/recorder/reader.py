@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from struct import error as StructError
 from typing import IO, cast
@@ -15,26 +14,11 @@ from mcap.records import Attachment, Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from mobee.errors import MobeeError
+from services.common.tap import Raw
 from services.recorder.files import parts_of
 
 LARGEST_RECORD = 64_000_000  # bytes: many times a chunk of a recorder
 _DAMAGE = (McapError, StructError, zstandard.ZstdError, ValueError, EOFError)  # of a file that ends in the middle, or was changed
-
-
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A message as it was on the bus, or a liveliness token (key `alive`, encoding `json`)."""
-
-    key: str
-    encoding: str
-    payload: bytes
-    received: int  # ns since 1970
-    published: int  # ns since 1970
-
-    @property
-    def type(self) -> str:
-        """The name of the message's type; "" for a token."""
-        return self.encoding.removeprefix("application/msgpack;icub/").partition("/")[0] if ";icub/" in self.encoding else ""
 
 
 class Recording:
@@ -64,8 +48,8 @@ class Recording:
                     found[record.name] = record.data.decode(errors="replace")
         return found
 
-    def __iter__(self) -> Iterator[Recorded]:
-        """Yield all messages and tokens in the order in which they arrived, without the copies for viewers."""
+    def __iter__(self) -> Iterator[Raw]:
+        """Yield all messages, and liveliness tokens (key `alive`), in the order of arrival, without the copies for viewers."""
         for path in self.files:
             channels: dict[int, Channel] = {}
             with path.open("rb") as file:
@@ -95,7 +79,7 @@ def _records(file: IO[bytes]) -> Iterator[McapRecord]:
         return
 
 
-def _in_chunk(chunk: Chunk, channels: dict[int, Channel]) -> Iterator[Recorded]:
+def _in_chunk(chunk: Chunk, channels: dict[int, Channel]) -> Iterator[Raw]:
     try:
         records = breakup_chunk(chunk, validate_crc=True) if _size(chunk) <= LARGEST_RECORD else []
     except _DAMAGE:
@@ -106,7 +90,7 @@ def _in_chunk(chunk: Chunk, channels: dict[int, Channel]) -> Iterator[Recorded]:
         elif isinstance(record, Message):
             channel = channels.get(record.channel_id)
             if channel is not None and "encoding" in channel.metadata:
-                yield Recorded(channel.topic, channel.metadata["encoding"], record.data, record.log_time, record.publish_time)
+                yield Raw(channel.topic, channel.metadata["encoding"], record.data, record.log_time, record.publish_time)
 
 
 def _size(chunk: Chunk) -> int:

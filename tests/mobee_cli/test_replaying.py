@@ -105,6 +105,12 @@ def test_the_command_says_where_they_part(tmp_path: Path, capsys: pytest.Capture
     assert "holds no controller.toml" in capsys.readouterr().err
 
 
+def test_recordings_without_a_whole_tick_are_not_called_equal(tmp_path: Path) -> None:
+    short = Recording(recorded(tmp_path / "a", last=1))
+    with pytest.raises(MobeeError, match="nothing was compared"):
+        compare_runs(short, short)
+
+
 def test_a_recording_without_a_robot_has_no_ticks(tmp_path: Path) -> None:
     writer = Writer(tmp_path)
     writer.add("event/x", "Event", message(1, src="x"))
