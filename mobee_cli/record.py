@@ -7,7 +7,7 @@ import argparse
 import os
 from pathlib import Path
 
-from msgspec import ValidationError, convert, to_builtins
+from msgspec import ValidationError, convert
 
 from mobee.errors import MobeeError
 from mobee_cli.connect import add_endpoint
@@ -40,16 +40,9 @@ def run(arguments: argparse.Namespace) -> int:
     if not folder.is_dir():
         raise UserError(f"{folder}: there is no such folder", BAD_INPUT)
     print(f"recording {arguments.endpoint} to {folder}/messages-*.mcap; Ctrl-C ends it", flush=True)
-    config = Config(
-        endpoint=arguments.endpoint,
-        namespace=arguments.namespace,
-        robot=arguments.robot,
-        run_dir=str(folder),
-        largest=arguments.largest,
-        everything=arguments.everything,
-    )
+    settings = {name: getattr(arguments, name) for name in ("endpoint", "namespace", "robot", "largest", "everything")}
     try:
-        record(f"record_{os.getpid()}", convert(to_builtins(config), Config))
+        record(f"record_{os.getpid()}", convert({**settings, "run_dir": str(folder)}, Config))
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     except (MobeeError, ValidationError) as error:

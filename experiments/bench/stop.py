@@ -26,6 +26,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop, State
 from bus_schema.rpc import Done, Empty
 from experiments.kit.command_line import Progress
+from experiments.kit.live.faults import VITAL
 from experiments.kit.live.floods import FLOODS, flood
 from experiments.kit.live.launch import LaunchFailed
 from experiments.kit.live.system import System, running, stat_of, wait_for
@@ -37,7 +38,7 @@ from services.common.session import open_client
 AT_MOST = 50.0  # ms, p99
 QUIET = 3.0  # load of the machine up to which times are judged; system and flood together take about two processors
 NOTHING = "nothing"
-VITAL = ("robot_sim", "controller", "model", "launcher")
+ALL_VITAL = (*VITAL, "launcher")
 _SETTLE = 1.0  # s of the flood before the first stop
 _REPEAT, _GIVE_UP = 0.1, 5.0  # s, as `mobee estop`
 _ARMED = 3.0  # s after a release in which the robot should move again
@@ -99,7 +100,7 @@ def _under(system: System, name: str, stops: int) -> dict[str, Any]:
     result: dict[str, Any] = {"flood": name}
     for what, times in (("stop_ms", stopped), ("connect_ms", connected)):
         result |= {f"{what}_p50": float(np.percentile(times, 50)), f"{what}_p99": float(np.percentile(times, 99))}
-    ended = [who for who in VITAL if after[who] != before[who]]
+    ended = [who for who in ALL_VITAL if after[who] != before[who]]
     return result | {"armed_again": sum(armed), "ended": ended, "load": os.getloadavg()[0]}
 
 
@@ -137,7 +138,7 @@ def _release(session: Any) -> None:
 
 def _processes(session: Any) -> dict[str, int]:
     """Return the process of each vital service."""
-    return {who: wait_for(partial(stat_of, session, who), 60.0, f"{who} answers").pid for who in VITAL}
+    return {who: wait_for(partial(stat_of, session, who), 60.0, f"{who} answers").pid for who in ALL_VITAL}
 
 
 def report(result: dict[str, Any]) -> str:

@@ -12,14 +12,13 @@ from typing import Any
 import msgspec
 
 from bus_schema import VERSION, encode, encoding_of, keys
-from bus_schema.messages import Clock, Geometry, Message, PartStatus, Served, State, Tick
-from bus_schema.rpc import ObjectState, World
+from bus_schema.messages import Clock, Message, PartStatus, Served, State, Tick
+from bus_schema.rpc import World
 from mobee.errors import MobeeError
-from mobee.model.kinematics import quaternion_from_matrix
 from mobee.robot.load import load_robot
 from mobee_cli.replaying.stage import Stage
 from services.common.tap import Raw
-from services.common.worlds import world_around
+from services.common.worlds import object_state, world_around
 from services.recorder.reader import Recording
 
 STATE_PERIOD = 50_000_000  # ns of the robot's time between two states of its parts
@@ -96,15 +95,4 @@ def _fields(status: PartStatus) -> dict[str, Any]:
 
 def _described(world: str, robot: str) -> World:
     """Return the objects of a world as the model lists them."""
-    objects = [
-        ObjectState(
-            name=one.name,
-            geometry=Geometry(kind=one.kind, size=list(one.size)),  # type: ignore[arg-type]  # no convex volumes in a world
-            position=one.position.tolist(),
-            quaternion=quaternion_from_matrix(one.rotation).tolist(),
-            role=one.role,
-            link=one.link or "",
-        )
-        for one in world_around(world, robot).objects.values()
-    ]
-    return World(v=VERSION, objects=objects)
+    return World(v=VERSION, objects=[object_state(thing) for thing in world_around(world, robot).objects.values()])

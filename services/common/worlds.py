@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The default world of a robot, and a hash of the robot that processes compare."""
+"""The default world of a robot, its objects as messages hold them, and a hash of the robot that processes compare."""
 
 from __future__ import annotations
 
@@ -8,8 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from bus_schema.messages import Geometry
+from bus_schema.rpc import ObjectState
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.world import World
 from mobee.model.world_file import load_world
+from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot
 
 NO_WORLD = "none"  # setting for a world without objects
@@ -39,6 +44,20 @@ def world_around(given: str | None, robot: str | Path) -> World:
     """Return a new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
     name = effective_world(given, robot)
     return World() if name == NO_WORLD else load_world(name)
+
+
+def object_state(thing: WorldObject, link: str = "") -> ObjectState:
+    """Return an object as the model lists it on the bus; `link`: to which it is attached.  Raises InvalidValue for a convex volume."""
+    if thing.kind == "convex":  # of links only: World.add takes none
+        raise InvalidValue(f"{thing.name!r} is a convex volume, for which the bus has no message")
+    return ObjectState(
+        name=thing.name,
+        geometry=Geometry(kind=thing.kind, size=list(thing.size)),
+        position=thing.position.tolist(),
+        quaternion=quaternion_from_matrix(thing.rotation).tolist(),
+        role=thing.role,
+        link=link,
+    )
 
 
 def robot_hash(robot: Robot) -> str:

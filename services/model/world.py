@@ -9,18 +9,19 @@ import numpy as np
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Geometry, WorldObject
-from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, ObjectState, OneName, SetRole
+from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, OneName, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee import Model, World
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model import WorldObject as Thing
 from mobee.model import world_object as geometry
-from mobee.model.kinematics import matrix_from_quaternion, quaternion_from_matrix
+from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.world import placed
 from mobee.model.world_object import valid_position, valid_shape
 from mobee.reach import TARGET
 from services.common.service import CallRefused, Service
+from services.common.worlds import object_state
 
 DONE = Done(v=VERSION)
 
@@ -141,18 +142,8 @@ class WorldServer:
         world.move(request.name, position=request.position, rotation=rotation)
 
     def _list(self) -> WorldReply:
-        objects = [
-            ObjectState(
-                name=o.name,
-                geometry=_geometry(o),
-                position=here.position.tolist(),
-                quaternion=quaternion_from_matrix(here.rotation).tolist(),
-                role=o.role,
-                link=o.link or "",
-            )
-            for o, here in ((o, self._in_root_frame(o)) for o in self._model.world.objects.values())
-        ]
-        return WorldReply(v=VERSION, objects=objects)
+        things = self._model.world.objects.values()
+        return WorldReply(v=VERSION, objects=[object_state(self._in_root_frame(thing), thing.link or "") for thing in things])
 
     def _in_root_frame(self, thing: Thing) -> Thing:
         if thing.link is None:
@@ -166,12 +157,6 @@ def _shape(given: Geometry) -> geometry.Geometry:
     if len(given.size) != expected:
         raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
     return geometry.Geometry(given.kind, tuple(given.size))
-
-
-def _geometry(thing: Thing) -> Geometry:
-    if thing.kind == "convex":  # of links only: World.add takes none
-        raise InvalidValue(f"{thing.name!r} is a convex volume, for which the bus has no message")
-    return Geometry(kind=thing.kind, size=list(thing.size))
 
 
 def _rotation(quaternion: list[float]) -> Array:

@@ -31,8 +31,11 @@ class Channel:
 
 def parts_of(folder: Path) -> list[Path]:
     """Return the files of the recording in a folder, the oldest first."""
-    found = {int(match[1]): path for path in folder.iterdir() if (match := _NAME.match(path.name))}
-    return [found[number] for number in sorted(found)]
+    return [path for _, path in sorted(_numbered(folder).items())]
+
+
+def _numbered(folder: Path) -> dict[int, Path]:
+    return {int(match[1]): path for path in folder.iterdir() if (match := _NAME.match(path.name))}
 
 
 class Files:
@@ -77,8 +80,7 @@ class Files:
                 self._writer.finish()  # type: ignore[no-untyped-call]  # as above
 
     def _begin(self) -> None:
-        parts = parts_of(self._folder)
-        number = 1 + int(_NAME.match(parts[-1].name)[1]) if parts else 0  # type: ignore[index]  # all parts match
+        number = 1 + max(_numbered(self._folder), default=-1)
         self._file = (self._folder / f"messages-{number:04}.mcap").open("xb")
         self._channels.clear()
         self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD)

@@ -43,7 +43,7 @@ class Disk:
 
 def test_what_the_disk_refuses_is_written_once_when_there_is_room_however_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
     service, disk = Quick(monkeypatch), Disk([NoRoom("full")] * 3600)
-    waits = Room(service)  # type: ignore[arg-type]
+    waits = Room(service)  # type: ignore[arg-type]  # a service without a bus
     waits.patient(disk)
     disk.append(1, "a")
     disk.append(2, "b")
@@ -53,7 +53,7 @@ def test_what_the_disk_refuses_is_written_once_when_there_is_room_however_long_i
 
 def test_a_predecessor_is_waited_for_but_not_for_ever_and_other_errors_are_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     service = Quick(monkeypatch)
-    waits = Room(service)  # type: ignore[arg-type]
+    waits = Room(service)  # type: ignore[arg-type]  # a service without a bus
     assert waits.when_there_is(iter_of([InUse("old"), InUse("old"), "opened"])) == "opened" and service.now == 2.0
     with pytest.raises(InUse):
         waits.when_there_is(iter_of([InUse("other")] * 100))
