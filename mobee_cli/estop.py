@@ -15,7 +15,7 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.observe import Heard, alive, listen
+from services.common.observe import Received, alive, listen
 
 _REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under attack is slow
 
@@ -46,8 +46,8 @@ def _stop(session: Any, reason: str) -> list[str]:
     """Repeat the stop until every part reports it; raises UserError if one does not, or if none is there."""
     gates: dict[str, str] = {}
 
-    def note(heard: Heard) -> None:
-        gates[heard.key.partition("/")[0]] = heard.content()["gate"]
+    def note(received: Received) -> None:
+        gates[received.key.partition("/")[0]] = received.content()["gate"]
 
     listen(session, State.stream.keys(), note)
     publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(EStop)
@@ -59,6 +59,6 @@ def _stop(session: Any, reason: str) -> list[str]:
         if seen and all(gate == "estop" for gate in seen.values()):
             return sorted(seen)
     moving = [part for part, gate in gates.items() if gate != "estop"]
-    result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot is heard"
+    result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot publishes its state"
     kept = ". The launcher keeps the stop: robot_sim comes up stopped" if "launcher" in alive(session) else ""
     raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {result}: use the robot's own emergency button{kept}")

@@ -14,7 +14,7 @@ from bus_schema.messages import State
 from bus_schema.rpc import Stat
 from mobee_cli.connect import add_endpoint, connected
 from services.common.exit_codes import FAILED
-from services.common.observe import Heard, alive, listen, stats
+from services.common.observe import Received, alive, listen, stats
 from services.common.text import printable
 
 _LISTEN = 0.3  # s: longer than the pause between two states of a part
@@ -32,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask all services and print their states."""
-    states: dict[str, Heard] = {}
+    states: dict[str, Received] = {}
     with connected(arguments.endpoint) as session:
-        listen(session, State.stream.keys(), lambda heard: states.update({heard.key: heard}))
+        listen(session, State.stream.keys(), lambda received: states.update({received.key: received}))
         begun = time.monotonic()
         present = alive(session)
         answers = stats(session, [who for who in present if who != "router"])
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     status = {
         "endpoint": arguments.endpoint,
         "services": _services(present, answers),
-        "parts": {heard.key.partition("/")[0]: _part(heard) for heard in list(states.values())},
+        "parts": {received.key.partition("/")[0]: _part(received) for received in list(states.values())},
         "agents": {who.removeprefix(_AGENT): stat.numbers for who, stat in answers.items() if who.startswith(_AGENT)},
     }
     print(json.dumps(status, indent=2) if arguments.json else _as_text(status))
@@ -75,9 +75,9 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
     return services
 
 
-def _part(heard: Heard) -> dict[str, Any]:
+def _part(received: Received) -> dict[str, Any]:
     try:
-        state = heard.content()
+        state = received.content()
         part = {name: state[name] for name in ("gate", "mode", "epoch", "cmd_age", "faults")}
         return part | {"cmd_age": None if part["cmd_age"] == NO_COMMAND else part["cmd_age"]}
     except (ValueError, KeyError, TypeError):
@@ -120,7 +120,7 @@ _BEYOND = {"rate": "rate", "gap": "gap_ms", "refused": "refused_rate", "memory":
 
 
 def _health_lines(services: dict[str, Any]) -> list[str]:
-    """Return a table of what each process needs and hears; a number beyond its limit is marked with !."""
+    """Return a table of what each process needs and receives; a number beyond its limit is marked with !."""
     known = {who: service for who, service in services.items() if service["health"]}
     if not known:
         return []

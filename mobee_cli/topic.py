@@ -16,7 +16,7 @@ from typing import Any
 from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, FAILED, OK
-from services.common.observe import Heard, listen
+from services.common.observe import Received, listen
 
 HINT_DELAY = 1.0  # s without a message until `echo` prints a hint
 HZ_WINDOW = 1.0  # s that each line of `hz` covers
@@ -54,8 +54,8 @@ def _add_list(parser: argparse.ArgumentParser) -> None:
 
 def _list(session: Any, arguments: argparse.Namespace) -> int:
     """Listen to all keys for a while, then print them."""
-    heard: dict[str, list[Heard]] = {}
-    listen(session, "**", lambda message: heard.setdefault(message.key, []).append(message))
+    received: dict[str, list[Received]] = {}
+    listen(session, "**", lambda message: received.setdefault(message.key, []).append(message))
     time.sleep(arguments.duration)
     topics = [
         {
@@ -64,7 +64,7 @@ def _list(session: Any, arguments: argparse.Namespace) -> int:
             "rate_hz": len(messages) / arguments.duration,
             "bytes": sum(len(message.payload) for message in messages) / len(messages),
         }
-        for key, messages in sorted(list(heard.items()))
+        for key, messages in sorted(list(received.items()))
     ]
     if arguments.json:
         print(json.dumps(topics, indent=2))
@@ -84,27 +84,27 @@ def _add_echo(parser: argparse.ArgumentParser) -> None:
 
 def _echo(session: Any, arguments: argparse.Namespace) -> int:
     """Print messages until the count, the duration or Ctrl-C ends it."""
-    queue: SimpleQueue[Heard] = SimpleQueue()
+    queue: SimpleQueue[Received] = SimpleQueue()
     listen(session, arguments.key, queue.put)
     begun, count, hinted = time.monotonic(), 0, False
     while count < arguments.count and time.monotonic() < begun + arguments.duration:
         try:
-            heard = queue.get(timeout=0.1)
+            received = queue.get(timeout=0.1)
         except Empty:
             if not (count or hinted) and time.monotonic() > begun + HINT_DELAY:
                 hinted = True
                 print(f"nothing on {arguments.key!r} yet; `mobee topic list` shows the keys in use", file=sys.stderr)
             continue
-        print(json.dumps({"key": heard.key, "type": heard.type, **_message(heard)}), flush=True)
+        print(json.dumps({"key": received.key, "type": received.type, **_message(received)}), flush=True)
         count += 1
     return OK
 
 
-def _message(heard: Heard) -> dict[str, Any]:
+def _message(received: Received) -> dict[str, Any]:
     try:
-        return {"message": _printable(heard.content())}
+        return {"message": _printable(received.content())}
     except ValueError as error:
-        return {"error": str(error), "bytes": len(heard.payload)}
+        return {"error": str(error), "bytes": len(received.payload)}
 
 
 def _printable(value: Any) -> Any:
@@ -127,7 +127,7 @@ def _add_hz(parser: argparse.ArgumentParser) -> None:
 def _hz(session: Any, arguments: argparse.Namespace) -> int:
     """Print a line per second; the exit code is 1 if no message came."""
     times: list[float] = []
-    listen(session, arguments.key, lambda heard: times.append(heard.at))
+    listen(session, arguments.key, lambda received: times.append(received.at))
     end, seen, came = time.monotonic() + arguments.duration, 0, False
     while time.monotonic() < end:
         time.sleep(max(0.0, min(HZ_WINDOW, end - time.monotonic())))

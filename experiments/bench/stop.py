@@ -32,7 +32,7 @@ from experiments.kit.live.launch import LaunchFailed
 from experiments.kit.live.system import System, running, stat_of, wait_for
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.observe import Heard, listen
+from services.common.observe import Received, listen
 from services.common.session import open_client
 
 AT_MOST = 50.0  # ms, p99
@@ -62,8 +62,8 @@ class _Gate:
         self.now, self.since = "", 0.0
         listen(session, State.stream.key("head"), self._note)
 
-    def _note(self, heard: Heard) -> None:
-        state = heard.content()
+    def _note(self, received: Received) -> None:
+        state = received.content()
         if state["gate"] != self.now:
             self.now, self.since = state["gate"], 1e-9 * state["tw"]
 

@@ -16,7 +16,7 @@ from bus_schema.messages import Clock, Commands, EStop, Message, Mode, Order, Pa
 from bus_schema.rpc import Driven, Empty, Reply, Request, Stat, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
-from services.common.observe import Heard, listen
+from services.common.observe import Received, listen
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
@@ -32,7 +32,7 @@ class Broken(Exception):
 
 
 class Player:
-    """The session, what was heard, and the drive epochs that are held."""
+    """The session, what was received, and the drive epochs that are held."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         self.service, self.robot = service, robot
@@ -43,25 +43,25 @@ class Player:
         self.refused: list[str] = []  # streams that the contract does not allow
         self.epochs = dict.fromkeys(robot.parts, 0)
         self._seq = 0
-        self._hear(Tick, lambda heard, tick: self.ticks.append((heard.at, tick)))
-        self._hear(Clock, lambda heard, clock: self.clocks.append(clock))
-        self._hear(EStop, lambda heard, stop: self.stops.append(stop))
+        self._subscribe(Tick, lambda received, tick: self.ticks.append((received.at, tick)))
+        self._subscribe(Clock, lambda received, clock: self.clocks.append(clock))
+        self._subscribe(EStop, lambda received, stop: self.stops.append(stop))
         for part in robot.parts:
-            self._hear(State, partial(self._note_state, part), part)
+            self._subscribe(State, partial(self._note_state, part), part)
 
-    def _note_state(self, part: str, heard: Heard, state: State) -> None:
+    def _note_state(self, part: str, received: Received, state: State) -> None:
         self.states[part].append(state)
 
-    def _hear(self, cls: type[_M], note: Callable[[Heard, _M], object], part: str = "") -> None:
+    def _subscribe(self, cls: type[_M], note: Callable[[Received, _M], object], part: str = "") -> None:
         size = len(self.robot.part(part)) if part else None
 
-        def read(heard: Heard) -> None:
+        def read(received: Received) -> None:
             try:
-                message = decode(cls, heard.payload, heard.encoding, part=size, robot=len(self.robot.motors))
+                message = decode(cls, received.payload, received.encoding, part=size, robot=len(self.robot.motors))
             except Refused as refused:
-                self.refused.append(f"{heard.key}: {refused}")
+                self.refused.append(f"{received.key}: {refused}")
             else:
-                note(heard, message)
+                note(received, message)
 
         listen(self.service.bus.session, cls.stream.keys(part) if part else cls.stream.key(), read)
 

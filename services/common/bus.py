@@ -56,7 +56,7 @@ class Publisher(Generic[_M]):
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
-        self._is_heard: bool | None = None  # None: not requested yet
+        self._has_subscribers: bool | None = None  # None: not requested yet
         how = _SETTINGS[bus.control if delivery == "CONTROL" else delivery]
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
@@ -87,16 +87,16 @@ class Publisher(Generic[_M]):
         self._publisher.put(encode(message))
 
     @property
-    def heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """Whether there is a subscriber; without one, an expensive message need not be made."""
-        if self._is_heard is None:
+        if self._has_subscribers is None:
             self._publisher.declare_matching_listener(Callback(self._note_matching, indirect=False))
-            self._is_heard = bool(self._publisher.matching_status.matching)
-        return self._is_heard
+            self._has_subscribers = bool(self._publisher.matching_status.matching)
+        return self._has_subscribers
 
     def _note_matching(self, status: zenoh.MatchingStatus) -> None:
         """Store whether there is a subscriber; Zenoh's thread calls it, which takes much less time than a query in every tick."""
-        self._is_heard = bool(status.matching)
+        self._has_subscribers = bool(status.matching)
 
 
 class Latest(Generic[_M]):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop beyond one process: its record on disk, and the session on which robot_sim hears it."""
+"""The emergency stop beyond one process: its record on disk, and the session on which robot_sim receives it."""
 
 from __future__ import annotations
 
@@ -114,18 +114,18 @@ _SETS = b"set\xc3"  # the field `set` = true in msgpack
 
 
 class StopLine:
-    """Hears emergency stops.
+    """Receives emergency stops.
 
     Zenoh keeps the newest messages without running any Python: a flood of them takes no time from the process, except a microsecond each
     for those that set no stop.
     """
 
     def __init__(self, session: zenoh.Session) -> None:
-        """Begin to listen; a process that must hear a stop through every flood gives a session of its own."""
+        """Subscribe; a process that must receive a stop through every flood gives a session of its own."""
         self._subscriber = session.declare_subscriber(EStop.stream.key(), RingChannel(_WAITING))
 
-    def heard(self) -> list[EStop]:
-        """The stops that came since the last call; messages that set none, or cannot be decoded, are dropped."""
+    def take(self) -> list[EStop]:
+        """Return the stops that came since the last call; messages that set none, or cannot be decoded, are dropped."""
         stops = []
         for _ in range(_WAITING):
             sample = self._subscriber.try_recv()

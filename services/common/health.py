@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The health of a process: rate, age and gaps of the ticks that it hears, refused messages, memory, open files; and which is bad."""
+"""The health of a process: rate, age and gaps of the ticks that it gets, refused messages, memory, open files; and which is bad."""
 
 from __future__ import annotations
 
@@ -97,9 +97,9 @@ class Health:
     def _judged(self, expected: float | None, waiting: int, memory: float | None) -> dict[str, str]:
         bad, rate, gap, files = {}, self.beats.rate, self.beats.gap, _files()
         if expected is not None and rate is not None and rate < SLOW * expected:
-            bad["rate"] = f"hears {rate:.0f} ticks a second of {expected:.0f}"
+            bad["rate"] = f"gets {rate:.0f} ticks a second of {expected:.0f}"
         if expected is not None and gap is not None and gap > LONG_GAP + 1.0 / expected:
-            bad["gap"] = f"heard no tick for {1e3 * gap:.0f} ms"
+            bad["gap"] = f"got no tick for {1e3 * gap:.0f} ms"
         if self._refused_rate > MANY_REFUSED:
             bad["refused"] = f"refuses {self._refused_rate:.0f} messages a second"
         if waiting > CROWD:

@@ -34,7 +34,7 @@ class Listener:
         self.inject_test_delay: Callable[[], None] = lambda: None  # called before every tick, for tests of lockstep
         bus.control = "STEP" if locked else "LATEST"
         self.health = Health()
-        self.expected_rate: float | None = None  # of the ticks that it hears or makes, Hz of real time; None: they have no fixed rate
+        self.expected_rate: float | None = None  # of the ticks that it gets or makes, Hz of real time; None: they have no fixed rate
         self._beats_of: type[Message] | None = None  # the stream that gives the rate
         self._kept: list[Any] = []  # handles of tokens and subscriptions, which end with them
         self._on_run: list[Callable[[], None]] = []

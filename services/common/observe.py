@@ -17,7 +17,7 @@ from services.common import rpc
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Received:
     """A message of any type, not decoded."""
 
     key: str
@@ -38,14 +38,14 @@ class Heard:
             raise ValueError(f"not msgpack: {error}") from None
 
 
-def listen(session: zenoh.Session, key: str, handle: Callable[[Heard], None]) -> None:
+def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None]) -> None:
     """Handle every message on a key expression, on a thread of Zenoh, until the session is closed.
 
     Raises ValueError if the key expression is not valid.
     """
 
     def enqueue(sample: zenoh.Sample) -> None:
-        handle(Heard(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), time.monotonic()))
+        handle(Received(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), time.monotonic()))
 
     try:
         session.declare_subscriber(zenoh.KeyExpr(key), enqueue)

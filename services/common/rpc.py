@@ -190,7 +190,7 @@ class Answering:
         self._publish(query, key, cls, Failure, failure)
 
     def _publish(self, query: zenoh.Query, key: str, cls: type[Request], reply_type: type[Struct], reply: bytes) -> None:
-        if key.endswith(_NOT_PUBLISHED) or not self._served.heard:
+        if key.endswith(_NOT_PUBLISHED) or not self._served.has_subscribers:
             return
         request = b"" if query.payload is None else query.payload.to_bytes()
         if len(request) <= LARGEST_PUBLISHED:

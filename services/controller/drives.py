@@ -72,7 +72,7 @@ class Drives:
         A stop is repeated until robot_sim has latched it, and forgotten when robot_sim was reset.
         """
         now = time.monotonic()
-        for message in self._line.heard():
+        for message in self._line.take():
             if self._stop is None:  # it is left to robot_sim first: a repetition could come after its release
                 self._repeat_at = now + STOP_PERIOD
             self._stop = message

@@ -97,7 +97,7 @@ class RobotLaw:
         except InvalidValue as error:  # a restart would fail at the same term
             self._bus.event("error", "term", str(error))
             raise SystemExit(BAD_INPUT) from None
-        if self._own_terms.heard:
+        if self._own_terms.has_subscribers:
             own = {name: row.tolist() for name, row in self._law.last_forces.items() if name not in forces}
             self._own_terms.put(re_k=tick.k, terms=own, part_age={}, touched={})
         return command

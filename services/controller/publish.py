@@ -136,7 +136,7 @@ class CommandPublisher:
     def _is_ready(self, tick: Tick) -> bool:
         """Return whether tick 0 may be answered: every part that can be armed is armed, and the commands have a subscriber."""
         ready = (self._drives.is_armed(part, state) or not self._drives.can_arm(state) for part, state in tick.parts.items())
-        return all(ready) and self._commands.heard
+        return all(ready) and self._commands.has_subscribers
 
     def _answer(self) -> None:
         """In lockstep, send the answer to the tick, which is delayed while a part is being armed."""

@@ -40,7 +40,7 @@ class EmergencyStops:
 
     def _watch(self) -> None:
         was_waiting = self._waiting
-        for message in self._line.heard():
+        for message in self._line.take():
             self._note(message)
         if self._waiting is was_waiting:  # a new stop is left to robot_sim first: a repetition could come after its release
             self._repeat()

@@ -114,14 +114,14 @@ class ModelNode:
 
     def _publish_for_viewers(self, k: int, pose: ModelPose) -> None:
         """Publish pose and contacts if there are subscribers; in lockstep this is queued, so that the forces are sent first."""
-        if self._pose.heard or self._contacts.heard:
+        if self._pose.has_subscribers or self._contacts.has_subscribers:
             if self._service.locked:
                 self._service.inbox.put(partial(self._publish_pose, k, pose))
             else:
                 self._publish_pose(k, pose)
 
     def _publish_pose(self, k: int, pose: ModelPose) -> None:
-        if self._pose.heard:
+        if self._pose.has_subscribers:
             markers = [
                 MarkerPose(
                     name=name, position=pose.position(name).tolist(), quaternion=quaternion_from_matrix(pose.rotation(name)).tolist()
@@ -129,7 +129,7 @@ class ModelNode:
                 for name in self._robot.markers
             ]
             self._pose.put(re_k=k, q=self._q.tolist(), markers=markers)
-        if self._contacts.heard:
+        if self._contacts.has_subscribers:
             self._contacts.put(re_k=k, contacts=[_item(contact) for contact in pose.contacts])
 
     def _note_contacts(self, pose: ModelPose) -> None:

@@ -98,7 +98,7 @@ class FilterNode:
             self._last_k = tick.k
             self._check_pose(tick)
         self._streams.publish(tick)
-        if self._clock.heard:
+        if self._clock.has_subscribers:
             self._clock.put(dt=tick.dt, mode=tick.mode, rate=tick.rate)
         if tick.mode == "lock":
             self._answer(tick.k)

@@ -192,7 +192,7 @@ class Guard:
         self._service.inbox.at(time.monotonic() + CHECK_PERIOD, self._watch_line)
 
     def _check_stop(self) -> None:
-        for message in self._line.heard():
+        for message in self._line.take():
             if message.src != self._service.who or message.run != self._service.bus.run:  # not this process's own repetition
                 self._obey(Stop(message.source, message.reason, time.time()))
 

@@ -160,7 +160,7 @@ class Node:
 
     def _publish_tick(self, mode: Literal["free", "lock", "paused"]) -> None:
         self._sensors.publish(mode, self._dt_ns, self._config.speed)
-        if (mode != "free" or self._bus.k % self._clock_period == 0) and self._clock.heard:
+        if (mode != "free" or self._bus.k % self._clock_period == 0) and self._clock.has_subscribers:
             self._clock.put(dt=self._dt_ns, mode=mode, rate=self._config.speed)
 
     def _describe(self) -> tuple[str, Mapping[str, float]]:

@@ -45,7 +45,7 @@ class RendererNode:
     def _tick(self, clock: Clock) -> None:
         if clock.t < self._due:
             return
-        if not any(self._images[name].heard or self._cameras[name].heard for name in self._scene.cameras):
+        if not any(self._images[name].has_subscribers or self._cameras[name].has_subscribers for name in self._scene.cameras):
             self._due = clock.t + self._period
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.

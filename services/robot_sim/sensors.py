@@ -130,7 +130,7 @@ class Sensors:
     def _report(self, part: str, t: int, gate: Gate) -> None:
         self._statuses[part] = PartStatus(self._bus.k, t, gate.mode, gate.state, gate.faults, gate.epoch, gate.seq, gate.age)
         stream = self._streams[part]
-        if stream.heard:
+        if stream.has_subscribers:
             where = self._where[part]
             stream.put(
                 t=t,

@@ -257,7 +257,7 @@ class Watch:
             return
         gap = self._backend.gap()
         self.counters.count_gap(gap)
-        if not self._truth.heard:
+        if not self._truth.has_subscribers:
             return
         self._truth.put(
             q=self._backend.motors.q.tolist(),

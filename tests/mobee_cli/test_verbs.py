@@ -119,7 +119,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(running: Launched) -> None:
 def test_estop_without_a_robot_does_not_pretend(running: Launched) -> None:
     done = mobee("estop", "--endpoint", running.endpoint)
     assert done.returncode == 1
-    assert "no part of a robot is heard" in done.stderr
+    assert "no part of a robot publishes its state" in done.stderr
 
 
 def test_stop_ends_everything(tmp_path: Path, free_port: int) -> None:

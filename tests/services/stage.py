@@ -108,9 +108,9 @@ def matched(stage: Stage, key: str, cls: type[Message], seconds: float = 0.3) ->
     """Whether anybody subscribes to a key, as the bus itself says."""
     publisher = Publisher(stage.bus, key, cls, "LATEST")
     give_up = time.monotonic() + seconds
-    while not publisher.heard and time.monotonic() < give_up:
+    while not publisher.has_subscribers and time.monotonic() < give_up:
         time.sleep(0.02)
-    return publisher.heard
+    return publisher.has_subscribers
 
 
 def posture(robot: Robot, degrees: Mapping[str, float]) -> Array:

@@ -87,13 +87,13 @@ def launch(
 
 @contextmanager
 def running(folder: Path, scenario: str, *settings: str, headless: bool = True) -> Iterator[tuple[Launch, Watcher]]:
-    """A system that is ready, and one who watches it; stopped as by Ctrl-C afterwards."""
+    """A system that is ready, and a client that watches it; stopped as by Ctrl-C afterwards."""
     system = launch(folder, scenario, *settings, headless=headless)
     try:
         until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 120.0, "the system is ready")
         assert system.process.poll() is None, system.errors.read_text()[-3000:]
         with Watcher(system.endpoint) as watcher:
-            until(lambda: watcher.clock, 20.0, "the watcher hears the clock")
+            until(lambda: watcher.clock, 20.0, "the watcher gets the clock")
             yield system, watcher
     finally:
         if system.process.poll() is None:
@@ -118,7 +118,7 @@ def until(condition: Callable[[], Any], timeout: float, what: str) -> Any:
 
 @dataclass
 class Watcher:
-    """Listens to clock, states, motions and events, with the tick at which each came."""
+    """Subscribes to clock, states, motions and events, with the tick at which each came."""
 
     endpoint: str
     clock: Clock | None = None
@@ -139,7 +139,7 @@ class Watcher:
         self.session.close()
 
     def close_streams(self) -> None:
-        """Listen no more; calls can still be made."""
+        """End the subscriptions; calls can still be made."""
         for subscription in self._subscriptions:
             subscription.undeclare()
 
@@ -161,20 +161,20 @@ class Watcher:
         return "" if self.clock is None else self.clock.run
 
     def wait_until_it_keeps_up(self) -> None:
-        """Ticks come at their pace: after a stall of this process they come in a burst, and the newest heard is seconds old."""
+        """Ticks come at their pace: after a stall of this process they come in a burst, and the newest one is seconds old."""
 
         def keeps_up() -> bool:
             before = self.k
             time.sleep(0.1)
             return 5 <= self.k - before <= 20
 
-        until(keeps_up, 20.0, "the watcher hears ticks as they are made")
+        until(keeps_up, 20.0, "the watcher gets ticks as they are made")
 
     def stat(self, who: str) -> Stat:
         return rpc.call(self.session, "watcher", keys.service_rpc(who, "stat"), Empty, Stat, timeout=5.0)
 
     def pid(self, who: str) -> int:
-        """Of its process; asked more than once, as a stall of this machine may cut anybody off for a moment."""
+        """The process of a service; asked more than once, because a stall of this machine may end the session for a moment."""
 
         def answered() -> int | None:
             try:
@@ -194,7 +194,7 @@ class Watcher:
 
     def wait_until_moved(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 60.0) -> None:
         """Wait until each part has moved since the call, not necessarily at the same time."""
-        until(lambda: self.clock, timeout, "the watcher hears the clock")
+        until(lambda: self.clock, timeout, "the watcher gets the clock")
         run, k = self.run, self.k
 
         def moved(part: str) -> bool:

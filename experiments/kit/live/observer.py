@@ -16,7 +16,7 @@ from bus_schema.messages import Motion, State, Transition
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
-from services.common.observe import Heard, listen
+from services.common.observe import Received, listen
 
 MOVES = np.deg2rad(2.0)  # rad/s; a part that is slower is at rest
 FRESH = 0.5  # s; an older state says nothing about now
@@ -54,8 +54,8 @@ class Observer:
         listen(session, Motion.stream.keys(), self._note_motion)
         listen(session, Transition.stream.keys(), self._note_transition)
 
-    def _note_state(self, heard: Heard) -> None:
-        state = heard.content()
+    def _note_state(self, received: Received) -> None:
+        state = received.content()
         speed = max(map(abs, state["dq"]), default=0.0)
         moment = Moment(
             state["run"],
@@ -69,17 +69,17 @@ class Observer:
             speed,
         )
         with self.lock:
-            self.parts.setdefault(heard.key.partition("/")[0], []).append(moment)
+            self.parts.setdefault(received.key.partition("/")[0], []).append(moment)
 
-    def _note_motion(self, heard: Heard) -> None:
-        motion = heard.content()
+    def _note_motion(self, received: Received) -> None:
+        motion = received.content()
         with self.lock:
-            changes = self.motions.setdefault(heard.key.partition("/")[0], [])
+            changes = self.motions.setdefault(received.key.partition("/")[0], [])
             if not changes or changes[-1][1:] != (motion["status"], motion["action_id"]):
                 changes.append((1e-9 * motion["tw"], motion["status"], motion["action_id"]))
 
-    def _note_transition(self, heard: Heard) -> None:
-        made = heard.content()
+    def _note_transition(self, received: Received) -> None:
+        made = received.content()
         key, values = (made["agent"], made["n"]), tuple(made[name] for name in ("s", "a", "s_next", "settled", "duration"))
         with self.lock:
             if self.published.setdefault(key, values) != values:

@@ -57,14 +57,14 @@ def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) ->
     key, how = EStop.stream.key(), {"encoding": encoding_of(EStop)}
     with open_client(bus.endpoint) as session:
         line = StopLine(session)
-        wait_for(lambda: bus.session.put(key, message(True, "first"), **how) or line.heard(), "the first stop")
-        wait_for(lambda: not line.heard(), "silence")
+        wait_for(lambda: bus.session.put(key, message(True, "first"), **how) or line.take(), "the first stop")
+        wait_for(lambda: not line.take(), "silence")
         for number in range(3000):
             bus.session.put(key, message(False, f"no {number}"), **how)
             bus.session.put(key, b"\xc1 garbage set\xc3", **how)
         bus.session.put(key, message(True, "x" * 1_000_000), **how)  # longer than a reason may be
         bus.session.put(key, message(True, "second"), **how)
         heard: list[EStop] = []
-        wait_for(lambda: heard.extend(line.heard()) or heard, "the second stop")
+        wait_for(lambda: heard.extend(line.take()) or heard, "the second stop")
         assert [stop.reason for stop in heard] == ["second"]
-        assert line.heard() == []
+        assert line.take() == []

@@ -50,7 +50,7 @@ def test_a_slow_clock_is_reported_once_and_again_when_it_has_been_good_for_long_
     assert not said and not watched.bad
     for _ in range(3):
         window(50.0)
-    assert said == [("warning", "hears 50 ticks a second of 100")] and set(watched.bad) == {"rate"}
+    assert said == [("warning", "gets 50 ticks a second of 100")] and set(watched.bad) == {"rate"}
     for _ in range(round(RECOVERED / WINDOW)):
         window(100.0)
     assert len(said) == 1

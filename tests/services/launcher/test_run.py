@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from bus_schema.messages import EStop
-from services.common.observe import Heard, listen
+from services.common.observe import Received, listen
 from services.common.session import open_client
 from services.launcher.catalogue import entry_of
 from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
@@ -96,7 +96,7 @@ def test_a_service_that_crashes_is_restarted_after_a_doubling_pause(launch: Laun
 def test_a_service_that_keeps_failing_is_given_up_and_the_robot_stopped(launch: Launch, endpoint: str) -> None:
     launched = launch(toys(one="crash_at_start", two="healthy"))
     launched.wait_for("starts again in 0.2")
-    stops: list[Heard] = []
+    stops: list[Received] = []
     with open_client(endpoint) as session:
         listen(session, EStop.stream.key(), stops.append)
         code, summary = launched.end(120)
