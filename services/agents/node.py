@@ -21,7 +21,7 @@ from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore, store_of
 from services.agents.config import Config
-from services.agents.room import Room
+from services.agents.store_wait import StoreWait
 from services.agents.streams import LearnedStream, ReachStream, publish_decision, publish_transition
 from services.common.bus_plant import BusPlant
 from services.common.hands import hand_of
@@ -74,14 +74,14 @@ class AgentNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
-        self._room = room = Room(service)
-        store = room.when_there_is(lambda: TransitionStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
+        self._wait = wait = StoreWait(service)
+        store = wait.until_accepted(lambda: TransitionStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
         plant = BusPlant(service, robot, (config.part,))
         continued = store_of(Path(config.continues)) if config.continues else None
         space, settings = config.space(robot), config.curious()
-        self._agent = room.when_there_is(lambda: CuriousAgent(space, plant, settings=settings, store=store, continues=continued))
+        self._agent = wait.until_accepted(lambda: CuriousAgent(space, plant, settings=settings, store=store, continues=continued))
         if store is not None:
-            room.patient(store)
+            wait.let_append_wait(store)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
         self._decisions = service.bus.publisher(Decision, config.part)
         self._learned = LearnedStream(service.bus, self._agent.model)
@@ -145,7 +145,7 @@ class AgentNode:
             "interrupted": self._work.interrupted,
             "action_time_mean": self._seconds / self._made if self._made else NOT_MEASURED,
         }
-        return f"{self._room.prefix()}{self._agent.transitions} transitions, {self._made} now", numbers
+        return f"{self._wait.status_prefix()}{self._agent.transitions} transitions, {self._made} now", numbers
 
 
 class ReachNode:
@@ -156,9 +156,9 @@ class ReachNode:
         self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
         plant = BusPlant(service, robot, (config.part,))
         known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
-        self._room = room = Room(service)
-        store = room.when_there_is(lambda: ReachStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
-        self._agent = room.when_there_is(
+        self._wait = wait = StoreWait(service)
+        store = wait.until_accepted(lambda: ReachStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
+        self._agent = wait.until_accepted(
             lambda: ReachAgent(
                 config.space(robot) if known is None else known.space,
                 plant,
@@ -169,7 +169,7 @@ class ReachNode:
             )
         )
         if store is not None:
-            room.patient(store)
+            wait.let_append_wait(store)
         self._stream = ReachStream(service.bus, self._agent)
         self._work = Work(service, plant, config.part)
         self._mark()
@@ -215,4 +215,4 @@ class ReachNode:
             "reward_mean": self._rewards / self._made if self._made else NOT_MEASURED,
             "missing_mean": self._missing / self._reached if self._reached else NOT_MEASURED,
         }
-        return f"{self._room.prefix()}{self._agent.tries} problem-tries, {self._made} now", numbers
+        return f"{self._wait.status_prefix()}{self._agent.tries} problem-tries, {self._made} now", numbers

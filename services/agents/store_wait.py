@@ -15,19 +15,22 @@ PERIOD = 1.0  # s between two attempts
 PREDECESSOR = 15.0  # s for which another process may write this agent's data: an agent without a router ends after 10 s
 
 
-class Room:
-    """Repeats what the disk refuses, and answers calls meanwhile; the part stays where it is."""
+class StoreWait:
+    """Repeats what the store refuses for now, and answers calls meanwhile; the part stays where it is."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
         self.waits_for = ""  # why this agent waits; empty: it does not
 
-    def prefix(self) -> str:
+    def status_prefix(self) -> str:
         """The begin of the agent's line in `mobee status`."""
         return f"waits: {self.waits_for}; " if self.waits_for else ""
 
-    def when_there_is(self, act: Callable[[], _T]) -> _T:
-        """Return the result of `act` as soon as the disk takes it; raises what else `act` raises."""
+    def until_accepted(self, act: Callable[[], _T]) -> _T:
+        """Return the result of `act`, which is repeated while the disk is full, or while the predecessor writes; raises its other errors.
+
+        Raises InUse after PREDECESSOR s.
+        """
         begun = time.monotonic()
         while True:
             try:
@@ -45,10 +48,10 @@ class Room:
             self.waits_for = ""
         return result
 
-    def patient(self, store: Any) -> None:
-        """Let a store wait for room whenever something is appended to it by `append`."""
+    def let_append_wait(self, store: Any) -> None:
+        """Make the method `append` of a store wait too."""
         append = store.append
-        store.append = lambda *data: self.when_there_is(lambda: append(*data))
+        store.append = lambda *data: self.until_accepted(lambda: append(*data))
 
     def _wait(self, code: str, error: NoRoom | InUse) -> None:
         if not self.waits_for:

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from mobee.errors import InUse, MobeeError, NoRoom
-from services.agents import room
-from services.agents.room import PREDECESSOR, Room
+from services.agents import store_wait
+from services.agents.store_wait import PREDECESSOR, StoreWait
 
 
 class Quick:
@@ -17,7 +17,7 @@ class Quick:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.events, self.bus = 0.0, [], self
-        monkeypatch.setattr(room.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(store_wait.time, "monotonic", lambda: self.now)
 
     def event(self, level: str, code: str, text: str) -> None:
         self.events.append((level, code))
@@ -43,23 +43,23 @@ class Disk:
 
 def test_what_the_disk_refuses_is_written_once_when_there_is_room_however_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
     service, disk = Quick(monkeypatch), Disk([NoRoom("full")] * 3600)
-    waits = Room(service)  # type: ignore[arg-type]  # a service without a bus
-    waits.patient(disk)
+    waits = StoreWait(service)  # type: ignore[arg-type]  # a service without a bus
+    waits.let_append_wait(disk)
     disk.append(1, "a")
     disk.append(2, "b")
     assert disk.kept == [(1, "a"), (2, "b")] and service.now == 3600.0
-    assert service.events == [("error", "no_room"), ("info", "continues")] and waits.prefix() == ""
+    assert service.events == [("error", "no_room"), ("info", "continues")] and waits.status_prefix() == ""
 
 
 def test_a_predecessor_is_waited_for_but_not_for_ever_and_other_errors_are_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     service = Quick(monkeypatch)
-    waits = Room(service)  # type: ignore[arg-type]  # a service without a bus
-    assert waits.when_there_is(iter_of([InUse("old"), InUse("old"), "opened"])) == "opened" and service.now == 2.0
+    waits = StoreWait(service)  # type: ignore[arg-type]  # a service without a bus
+    assert waits.until_accepted(iter_of([InUse("old"), InUse("old"), "opened"])) == "opened" and service.now == 2.0
     with pytest.raises(InUse):
-        waits.when_there_is(iter_of([InUse("other")] * 100))
+        waits.until_accepted(iter_of([InUse("other")] * 100))
     assert 2.0 + PREDECESSOR < service.now <= 4.0 + PREDECESSOR
     with pytest.raises(MobeeError, match="damaged"):
-        waits.when_there_is(iter_of([MobeeError("damaged")]))
+        waits.until_accepted(iter_of([MobeeError("damaged")]))
 
 
 def iter_of(answers: list[Any]) -> Any:
