@@ -7,7 +7,6 @@ import logging
 import os
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -21,6 +20,7 @@ import zenoh
 from bus_schema import VERSION, decode, encode, encoding_of, keys
 from bus_schema.messages import Message
 from bus_schema.rpc import Empty, Failure, Reply, Request, Stat
+from experiments.kit.live.launch import free_endpoint
 from mobee.robot.robot import Robot
 from services.common import rpc
 from services.common.bus import Bus
@@ -39,12 +39,6 @@ def wait_for(condition: Callable[[], Any], what: str, timeout: float = 10.0) -> 
             raise AssertionError(f"waited {timeout:g} s in vain for {what}")
         time.sleep(0.001)
     return answer
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 class Program:

@@ -15,10 +15,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import psutil
+from numpy.typing import NDArray
 
 from experiments.live_picture import WITHOUT_GRAPHICS, find_chromium
 
+BRIGHT = 60  # of 255: brighter than the ground of a 3D view
 PATIENCE = 60.0  # s for what takes a second on a free machine
 CYCLE = 0.01  # s between two checks of a limited browser
 
@@ -32,6 +36,12 @@ def until(holds: Callable[[], bool], what: str, said: Callable[[], str] = str) -
     took = time.monotonic() - begin
     print(f"page: {what} after {took:.2f} s")
     return took
+
+
+def picture(shown: Any) -> NDArray[np.float64]:
+    """What a browser shows of an element, a `Locator` of Playwright: (rows, columns, 3), 0 to 255."""
+    shot = np.frombuffer(shown.screenshot(timeout=0), dtype=np.uint8)
+    return np.asarray(cv2.imdecode(shot, cv2.IMREAD_COLOR), dtype=np.float64)
 
 
 @contextmanager

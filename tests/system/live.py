@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -21,21 +20,12 @@ import zenoh
 from bus_schema import decode, keys
 from bus_schema.messages import Clock, Event, Message, Motion, State
 from bus_schema.rpc import Empty, Stat
+from experiments.kit.live.launch import free_endpoint
 from services.common import rpc
 from services.common.session import open_client
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
 AGENTS = ("torso", "left_arm", "right_arm")
-
-
-def free_port() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return str(probe.getsockname()[1])
-
-
-def free_endpoint() -> str:
-    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @dataclass

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from experiments.kit.live.launch import free_endpoint, free_port
 from tests.docker.compose_commands import as_processes
-from tests.system.live import AGENTS, Watcher, free_endpoint, free_port, transitions, until
+from tests.system.live import AGENTS, Watcher, transitions, until
 
 pytestmark = pytest.mark.system
 
@@ -29,7 +30,7 @@ def composed(folder: Path, port: int) -> Iterator[dict[str, subprocess.Popen[byt
     try:
         for name, argv in as_processes(port).items():
             if name == "monitor":  # another system may be up on this machine
-                argv += ["--web-port", free_port()]
+                argv += ["--web-port", str(free_port())]
             log = (folder / f"{name}.log").open("wb")
             processes[name] = subprocess.Popen(argv, cwd=folder, stdout=log, stderr=log, env=environment, start_new_session=True)
         yield processes

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from experiments.kit.live.launch import free_port
 from services.common.rpc import CallFailed
-from tests.system.live import AGENTS, PARTS, Launch, Watcher, free_port, running, transitions, until
+from tests.system.live import AGENTS, PARTS, Launch, Watcher, running, transitions, until
 
 pytestmark = pytest.mark.system
 

@@ -12,24 +12,22 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from bus_schema import keys
 from bus_schema.messages import Geometry
 from bus_schema.rpc import AddObject, Done, Empty, ObjectState, World
+from experiments.kit.live.launch import free_port
 from experiments.live_picture import find_chromium
 from mobee.robot.load import load_robot
 from services.common import rpc
-from tests.system.browsers import Firefox, Page, chromium, find_firefox, limited, said, until
-from tests.system.live import PARTS, Launch, Watcher, free_port, running
+from tests.system.browsers import BRIGHT, Firefox, Page, chromium, find_firefox, limited, picture, said, until
+from tests.system.live import PARTS, Launch, Watcher, running
 
 pytestmark = [pytest.mark.system, pytest.mark.skipif(find_chromium() is None, reason="page: no Chromium")]
 
 SCENARIO = str(Path(__file__).with_name("page.toml"))
-BRIGHT = 60  # of 255: brighter than the ground of the 3D view
 TENTH = 0.1  # of a core
 LATEST = 1.0  # s of robot time
 
@@ -66,16 +64,10 @@ def page(url: str, browser: Any) -> Page:
     return Page(browser, url)
 
 
-def picture(page: Page, place: str) -> NDArray[np.float64]:
-    """What a browser shows of an element, (rows, columns, 3)."""
-    shot = np.frombuffer(page.page.locator(place).screenshot(timeout=0), dtype=np.uint8)
-    return np.asarray(cv2.imdecode(shot, cv2.IMREAD_COLOR), dtype=np.float64)
-
-
 def changes(page: Page, place: str) -> bool:
-    before = picture(page, place)
+    before = picture(page.page.locator(place))
     time.sleep(0.3)
-    return bool((np.abs(picture(page, place) - before).max(axis=2) > BRIGHT).mean() > 0.001)
+    return bool((np.abs(picture(page.page.locator(place)) - before).max(axis=2) > BRIGHT).mean() > 0.001)
 
 
 def test_the_story_is_told_at_once_and_nothing_is_loaded_from_elsewhere(page: Page) -> None:
@@ -86,7 +78,7 @@ def test_the_story_is_told_at_once_and_nothing_is_loaded_from_elsewhere(page: Pa
 
 
 def test_the_robot_is_drawn_and_moves(page: Page) -> None:
-    assert (picture(page, "#scene").max(axis=2) > BRIGHT).mean() > 0.2  # robot and table
+    assert (picture(page.page.locator("#scene")).max(axis=2) > BRIGHT).mean() > 0.2  # robot and table
     until(lambda: changes(page, "#scene"), "the robot that moves in the picture")
 
 

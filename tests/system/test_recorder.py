@@ -14,9 +14,10 @@ from typing import Any
 
 import pytest
 
+from experiments.kit.live.launch import free_port
 from mobee_cli.__main__ import main
 from services.recorder.reader import Recording
-from tests.system.live import free_port, launch, until
+from tests.system.live import launch, until
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]
 TICKS = 600  # 12 s of the robot: all parts move
@@ -72,7 +73,7 @@ def test_its_kill_changes_nothing(tmp_path: Path, run: tuple[Path, dict[str, Any
 
 
 def test_its_page_is_played_from_the_messages(run: tuple[Path, dict[str, Any]]) -> None:
-    port = free_port()
+    port = str(free_port())
     command = [sys.executable, "-m", "mobee_cli", "replay", str(run[0] / "messages-0000.mcap"), "--port", port, "--speed", "4"]
 
     def news() -> dict[str, Any]:

@@ -8,13 +8,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from experiments.live_picture import find_chromium
 from mobee.robot.load import load_robot
+from tests.system.browsers import BRIGHT, picture
 
 pytest.importorskip("rerun")
 from services.monitor.viewer.blueprint import TIMELINE, blueprint, shown_of  # noqa: E402  # only where Rerun is
@@ -30,7 +29,6 @@ pytestmark = [pytest.mark.system, pytest.mark.skipif(find_chromium() is None, re
 PATIENCE = 150.0  # s for what takes some seconds on a free machine
 DRAW_IN_SOFTWARE = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
 SIZE = {"width": 800, "height": 500}  # pixels
-BRIGHT = 60  # of 255: brighter than the ground
 
 
 @pytest.fixture
@@ -71,21 +69,18 @@ def test_rerun_s_view_shows_a_robot_that_moves(served: PageServer) -> None:
         page.goto(f"http://127.0.0.1:{served.port}/")
         page.keyboard.press("v")
 
-        def picture() -> NDArray[np.float64]:
-            shot = np.frombuffer(page.locator("#viewer").screenshot(timeout=0), dtype=np.uint8)
-            return np.asarray(cv2.imdecode(shot, cv2.IMREAD_COLOR), dtype=np.float64)
-
-        first = picture()
+        viewer = page.locator("#viewer")
+        first = picture(viewer)
         while not page.evaluate("document.querySelector('#scene').hidden") or (first.max(axis=2) > BRIGHT).mean() < 0.02:
             assert time.monotonic() - begin < PATIENCE, "there is no robot in Rerun's view"
-            first = picture()
+            first = picture(viewer)
         print(f"Rerun's view: the robot after {time.monotonic() - begin:.1f} s")
-        while (np.abs(picture() - first).max(axis=2) > BRIGHT).mean() < 0.002:
+        while (np.abs(picture(viewer) - first).max(axis=2) > BRIGHT).mean() < 0.002:
             assert time.monotonic() - begin < PATIENCE, "the robot in Rerun's view does not move"
         numbers = [int(address.partition("after=")[2]) for address in asked if "/frame?" in address]
         assert numbers[0] == 0 and numbers == sorted(numbers)
-        page.locator("#viewer").click()  # Rerun has the keys now, and passes them on
+        viewer.click()  # Rerun has the keys now, and passes them on
         page.keyboard.press("v")
         while not page.evaluate("!document.querySelector('#viewer').src && !document.querySelector('#scene').hidden"):
-            assert time.monotonic() - begin < PATIENCE, "Rerun's view is not left by a key that it hears"
+            assert time.monotonic() - begin < PATIENCE, "Rerun's view is not left by a key that it passes on"
         browser.close()

@@ -47,23 +47,9 @@ def summary_of(
     is temporary.  `watch` is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
-        argv = [
-            sys.executable,
-            "-m",
-            "mobee_system",
-            "launch",
-            scenario,
-            "--headless",
-            "--no-record",
-            "--json",
-            "--endpoint",
-            free_endpoint(),
-        ]
-        argv += ["--runs", str(runs or scratch)]
+        argv = [*launch_command(scenario, free_endpoint(), runs or Path(scratch), settings), "--no-record"]
         argv += [] if duration is None else ["--duration", str(duration)]
         argv += [] if ticks is None else ["--ticks", str(ticks)]
-        for setting in settings:
-            argv += ["--set", setting]
         # In a process group of its own, so that a terminal's Ctrl-C reaches only this process, which then stops it in order.
         process = subprocess.Popen(
             argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0, env={**os.environ, **(environment or {})}
@@ -77,6 +63,12 @@ def summary_of(
     if process.returncode != 0:
         raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(errors.strip().splitlines() or ['no message'])[-1]}")
     return dict(json.loads(output))
+
+
+def launch_command(scenario: str, endpoint: str, runs: Path, settings: Sequence[str]) -> list[str]:
+    """Return the command that launches a scenario without monitor; `runs`: parent of the folders of runs."""
+    argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", endpoint, "--runs", str(runs)]
+    return [*argv, *(f"--set={setting}" for setting in settings)]
 
 
 def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], seconds: float) -> tuple[str, str]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 from bus_schema import keys
 from bus_schema.rpc import Empty, Stat
-from experiments.kit.live.launch import LaunchFailed, free_endpoint, stop
+from experiments.kit.live.launch import LaunchFailed, free_endpoint, launch_command, stop
 from services.common import rpc
 
 _START_TIMEOUT = 120.0  # s
@@ -40,34 +39,22 @@ class System:
         return (self.folder / "launcher.err").read_text()
 
 
-def start(folder: Path, scenario: str, settings: Sequence[str] = (), endpoint: str = "") -> System:
-    """Start a system without monitor and wait until all its services are ready; raises LaunchFailed."""
-    folder.mkdir(parents=True, exist_ok=True)
-    endpoint = endpoint or free_endpoint()
-    argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", endpoint]
-    argv += ["--runs", str(folder / "runs"), *(f"--set={setting}" for setting in settings)]
+@contextmanager
+def running(folder: Path, scenario: str) -> Iterator[System]:
+    """A system without monitor all of whose services are ready; it is stopped afterwards.  `folder`: an empty one.  Raises LaunchFailed."""
+    endpoint = free_endpoint()
     environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
     with (folder / "launcher.err").open("w") as errors:
+        argv = launch_command(scenario, endpoint, folder / "runs", ())
         process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=errors, text=True, process_group=0, env=environment)
     system = System(process, endpoint, folder)
     try:
         wait_for(lambda: "all ready" in system.says or process.poll() is not None, _START_TIMEOUT, "the system is ready")
         if process.poll() is not None:
             raise LaunchFailed(f"{scenario}: ended with code {process.returncode}: {(system.says.splitlines() or ['no message'])[-1]}")
-    except BaseException:
-        stop(process)
-        raise
-    return system
-
-
-@contextmanager
-def running(folder: Path, scenario: str, settings: Sequence[str] = ()) -> Iterator[System]:
-    """A system that is ready; it is stopped afterwards."""
-    system = start(folder, scenario, settings)
-    try:
         yield system
     finally:
-        stop(system.process)
+        stop(process)
 
 
 def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: float = 0.01) -> Any:

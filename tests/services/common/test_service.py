@@ -20,6 +20,7 @@ import zenoh
 from bus_schema import VERSION, decode, encode, encoding_of, keys
 from bus_schema.messages import Clock, Decision, Event, Forces, Geometry, WorldObject
 from bus_schema.rpc import Config, Done, Empty, Failure, Stat, Take, Taken
+from experiments.kit.live.launch import free_endpoint
 from services.common import rpc
 from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
@@ -27,7 +28,7 @@ from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.launcher.child import Child
 from services.launcher.child import Program as ChildProgram
-from tests.services.harness import QUICK_END, Program, Rig, free_endpoint, rig, wait_for
+from tests.services.harness import QUICK_END, Program, Rig, rig, wait_for
 
 PROBE = ("-m", "tests.services.common.probe")
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from experiments.kit.live.launch import free_endpoint
 from services.common.session import local_endpoint, open_client, open_router
-from tests.services.harness import free_endpoint, wait_for
+from tests.services.harness import wait_for
 
 
 def test_a_router_is_found_by_its_local_endpoint_and_by_its_endpoint() -> None:

@@ -34,7 +34,7 @@ def tick_at(q: Array) -> Tick:
 
 
 def copies(message: Raw) -> list[Copy]:
-    return list(Views(ROBOT, 10.0, 2.0).of(message, message.encoding.split("/")[2]))
+    return list(Views(ROBOT, 10.0, 2.0).of(message, message.type))
 
 
 def test_ros_messages_hold_the_motors_and_the_links(tmp_path: Path) -> None:

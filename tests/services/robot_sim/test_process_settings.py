@@ -12,8 +12,9 @@ import pytest
 from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
+from experiments.kit.live.launch import free_endpoint
 from services.common.emergency_stop import StopRecord
-from tests.services.harness import free_endpoint, rig, wait_for
+from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
 
