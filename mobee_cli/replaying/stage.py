@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bus of its own on which one recorded service runs again, and everybody else is played from the recording."""
+"""A bus of its own on which one service of a recording runs again, while the messages of all others are played from the recording."""
 
 from __future__ import annotations
 

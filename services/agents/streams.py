@@ -24,8 +24,6 @@ from services.common.bus import Bus, Publisher
 
 PERIOD = 0.5  # s of wall-clock time between two `Learned` messages: in lockstep, transitions come faster than a viewer needs them
 MAX_SURPRISES = 2000  # in one message
-
-
 LONGEST_PLAN = 12  # states of a plan that are published
 
 

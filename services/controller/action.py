@@ -54,8 +54,8 @@ class Action:
     def may_continue(self, t: float, gate: GateState) -> bool:
         """Return whether the action of a part that is in hold at time t [s] may continue when the part is under control again.
 
-        A short hold leaves the part at rest on the path to its goal.  After an emergency stop or a fault, and after a long hold, nobody
-        should find it moving to an old one.
+        A short hold leaves the part at rest on the path to its goal.  After an emergency stop or a fault, and after a long hold, it must
+        not move to an old goal.
         """
         if self.target is None or gate in ("estop", "fault"):
             return False

@@ -10,7 +10,7 @@ from bus_schema.messages import EStop
 from services.common.emergency_stop import BY_LAUNCHER, Stop, StopLine, StopRecord, replaces
 from services.common.service import Service
 
-PERIOD = 0.05  # s between two looks for a stop, and between two repetitions
+PERIOD = 0.05  # s between two checks for a stop, and between two repetitions
 
 
 class EmergencyStops:

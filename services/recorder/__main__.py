@@ -27,7 +27,7 @@ def record(who: str, config: Config) -> None:
     with Service(who, config, robot) as service:
         node = RecorderNode(service, config, robot)
         service.ready()
-        node.be_nice()
+        node.lower_priority()
         try:
             service.run()
         finally:

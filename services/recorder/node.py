@@ -23,7 +23,7 @@ from services.recorder.config import Config
 from services.recorder.files import Channel, Files
 from services.recorder.views import Views
 
-PERIOD = 0.25  # s between two looks at what has arrived: a message is received when it is seen
+PERIOD = 0.25  # s between two checks of what has arrived: the time of a check counts as that of receipt
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
@@ -71,7 +71,7 @@ class RecorderNode:
         service.on_alive(self._note_token)
         self._repeat()
 
-    def be_nice(self) -> None:
+    def lower_priority(self) -> None:
         """Let the main thread yield the processor to all services; called when the start, on which they wait, is over.
 
         Not in lockstep, where no tick can be late, but the recording of a run can be played again only if nothing is lost.
@@ -91,10 +91,10 @@ class RecorderNode:
             self._service.log.error("the end of the recording is not written: %s", error.strerror)
 
     def _repeat(self) -> None:
-        self._look()
+        self._record_arrived()
         self._service.inbox.at(time.monotonic() + PERIOD, self._repeat)
 
-    def _look(self) -> None:
+    def _record_arrived(self) -> None:
         arrived, now = self._tap.drain(), time.monotonic()
         if self._trouble and now < self._failed_at + RETRY_PERIOD:
             self._lost += len(arrived)

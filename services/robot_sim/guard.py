@@ -18,7 +18,7 @@ from services.robot_sim.kinematic import Backend
 
 INDISPENSABLE = ("model", "router", "launcher")  # without any of them the whole robot holds
 ESTOP_PERIOD = 0.1  # s between two repetitions of an emergency stop
-CHECK_PERIOD = 0.01  # s between two looks for an emergency stop; every tick looks too
+CHECK_PERIOD = 0.01  # s between two checks for an emergency stop; there is one in every tick too
 
 
 class Guard:
@@ -187,7 +187,7 @@ class Guard:
             self.hold_all(f"{who} is gone")
 
     def _watch_line(self) -> None:
-        """Look for emergency stops also while no tick begins: in a pause, and while lockstep waits."""
+        """Check for emergency stops also while no tick begins: in a pause, and while lockstep waits."""
         self._check_stop()
         self._service.inbox.at(time.monotonic() + CHECK_PERIOD, self._watch_line)
 

@@ -30,8 +30,6 @@ from services.robot_sim.watch import Watch
 
 MIN_SPREAD_PERIOD = 0.0025  # s; in shorter ticks all parts are read at once, without waiting for their sampling times
 IDLE_PERIOD = 1.0  # s between two checks of a run that is paused or over, in lockstep
-
-
 MAX_PAUSE = 600.0  # s after which a pause ends by itself
 
 
