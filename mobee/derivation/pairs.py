@@ -11,6 +11,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.derivation.chains import corners_of
+from mobee.model.kinematics import tables
 from mobee.model.levers import lever
 from mobee.model.model import Model
 from mobee.model.pose import Pose
@@ -137,19 +138,12 @@ def _touching(model: Model, q: Array) -> set[LinkPair]:
 def motors_between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
     """Return the motors that move links of a pair against each other, the indices in ascending order."""
     moving: set[int] = set()
+    ancestry = tables(robot).ancestry
     for pair in pairs:
-        ways = [_above(robot, link) for link in pair]
-        moving |= ways[0] ^ ways[1]
+        first, second = (set(ancestry[link].tolist()) for link in pair)
+        moving |= first ^ second
     motors = np.flatnonzero(robot.coupling[0][sorted(moving)].any(axis=0))
     return motors
-
-
-def _above(robot: Robot, link: int) -> set[int]:
-    joints = set()
-    while link:
-        joints.add(link - 1)
-        link = robot.joints[link - 1].parent
-    return joints
 
 
 def field_width(reach: float) -> float:
