@@ -19,7 +19,6 @@ from mobee.control.terms import Term
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.model.contact import links_moved, touched_in
 from mobee.model.model import engine_of
-from mobee.model.snapshot import Snapshot
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachTarget
 from mobee.settings import Settings, accepts
@@ -320,19 +319,18 @@ class OfflinePlant:
 
     @property
     def address(self) -> int:
-        """The address of the structure that the core runs, see `stand_by`."""
+        """The address of the plant in the core, which `PlantBatch` passes to it."""
         return self._runner.address
 
-    def stand_by(self, snapshot: Snapshot, deepest: Array) -> bool:
-        """Prepare runs of the core alone in this world; returns False if Python must take part in the ticks.
+    def prepare_batch(self, deepest: Array) -> bool:
+        """Prepare a run of the core as a plant of a batch; returns False if Python must take part in the ticks.
 
-        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m].  After each run call `conclude`.
+        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m]; the caller keeps it alive.  After each
+        run call `conclude`.
         """
-        runner = self._runner
-        if self._digest is not None or self._callback is not None or self._reaches.exempt or runner.needs_python:
+        if self._digest is not None or self._callback is not None or self._reaches.exempt or self._runner.needs_python:
             return False
-        if runner.standing_by is not snapshot:
-            runner.stand_by(deepest)
+        self._runner.prepare_batch(deepest)
         return True
 
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:

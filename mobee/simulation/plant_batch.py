@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mobee._core import address
@@ -12,6 +14,7 @@ from mobee.errors import ActionInterrupted, BatchInterrupted
 from mobee.model.model import Model
 from mobee.simulation.batch import run_together
 from mobee.simulation.plant import OfflinePlant, PlantSettings
+from mobee.simulation.runner import Trace
 
 
 class PlantBatch:
@@ -48,10 +51,9 @@ class PlantBatch:
 
         Raises BatchInterrupted as `run_together` does; its results are then the rows of this array.
         """
-        snapshot, chosen = self._model.world.snapshot, [self.plants[number] for number in which.tolist()]
-        if not all([plant.stand_by(snapshot, self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):
-            traces = run_together(chosen, ticks, self._threads)
-            return np.array([(trace.solid.max(), trace.field.max()) for trace in traces])
+        chosen = [self.plants[number] for number in which.tolist()]
+        if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):
+            return _run_traced(chosen, ticks, self._threads)
         self._deepest[which] = 0.0
         self._core.run_for(self._addresses[which].tobytes(), len(which), ticks, self._threads)
         deepest, lost = self._deepest[which], dict[int, ActionInterrupted]()
@@ -63,3 +65,16 @@ class PlantBatch:
         if lost:
             raise BatchInterrupted([lost.get(row, depths) for row, depths in enumerate(deepest)]) from lost[min(lost)]
         return deepest
+
+
+def _run_traced(plants: Sequence[OfflinePlant], ticks: int, threads: int) -> Array:
+    """Do what `PlantBatch.run` does, for plants some of which need Python in their ticks."""
+    try:
+        return np.array([_deepest(trace) for trace in run_together(plants, ticks, threads)])
+    except BatchInterrupted as error:
+        results = [_deepest(one) if isinstance(one, Trace) else one for one in error.results]
+        raise BatchInterrupted(results) from error.__cause__
+
+
+def _deepest(trace: Trace) -> Array:
+    return np.array([trace.solid.max(), trace.field.max()])

@@ -89,8 +89,8 @@ class Runner:
             noise=address(self._noise) if self._noise.any() else None, parts=view(parts), q=address(self.q),
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
-        self.standing_by: Snapshot | None = None
-        """The world for which `stand_by` has prepared it, if nothing else was prepared since."""
+        self.batch_world: Snapshot | None = None
+        """The world for which `prepare_batch` has prepared the ticks, None if `prepare` was called since."""
         self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
         self.address = ctypes.addressof(self._struct)
@@ -118,8 +118,8 @@ class Runner:
         `reaching`: the markers whose hands ignore the targets.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
-        if self.standing_by is not None:
-            self.standing_by, struct.deepest = None, None
+        if self.batch_world is not None:
+            self.batch_world, struct.deepest = None, None
         motors.begin_substeps(self._substep)
         if controller.modality == "torque" or controller.pushed or controller.terms:  # forces that Python computes for each pose
             most, self._clients_act = 1, True
@@ -141,14 +141,19 @@ class Runner:
 
     @property
     def needs_python(self) -> bool:
-        """Whether Python computes forces for each pose, or clients or reaches exert some: then only `prepare` prepares ticks."""
+        """Whether Python computes forces for each pose, or clients or reaches exert some: then `prepare` must precede each run."""
         controller = self._controller
         return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
 
-    def stand_by(self, deepest: Array) -> None:
-        """Prepare runs of the core alone, in the present world; their deepest contacts of solids and fields go to `deepest` (2,)."""
-        self.prepare(0, False, True)
-        self._struct.deepest, self.standing_by = address(deepest), self._controller.model.world.snapshot
+    def prepare_batch(self, deepest: Array) -> None:
+        """Prepare the runs of a batch in the present world, one after another, without Python between them.
+
+        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m]; the caller keeps it alive.
+        """
+        world = self._controller.model.world.snapshot
+        if self.batch_world is not world:
+            self.prepare(0, False, True)
+            self._struct.deepest, self.batch_world = address(deepest), world
 
     def results(self) -> tuple[Array, int, bool]:
         """Return the record (ticks, 3 n + 2), the number of ticks run, and whether the motors' state is no longer finite."""

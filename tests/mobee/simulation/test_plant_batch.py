@@ -73,9 +73,12 @@ def test_each_plant_moves_as_if_it_were_alone(threads: int) -> None:
     assert depths[:, 1].max() > 0.0
 
 
-def test_a_plant_that_is_lost_takes_nothing_from_the_others() -> None:
+@pytest.mark.parametrize("forced", [False, True])  # a force of a client: Python takes part in the ticks
+def test_a_plant_that_is_lost_takes_nothing_from_the_others(forced: bool) -> None:
     batch = PlantBatch(Model(ICUB), 3, SETTINGS)
     batch.run(np.arange(3), 2)
+    if forced:
+        batch.plants[0].controller.force(np.full(len(ICUB.motors), 0.1))
     batch.plants[1].motors.state["q"][:] = np.nan
     with pytest.raises(BatchInterrupted, match=r"1 of 3 plants were interrupted, the first plants\[1\]") as caught:
         batch.run(np.arange(3), 5)
