@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
@@ -34,7 +35,7 @@ class OutcomeModel(Protocol):
         """Probabilities of the outcomes, shape (S, A, B); all 0 for an action that a state does not have."""
 
 
-class Tabled:
+class Tabled(ABC):
     """An `OutcomeModel` that caches its tables in the form that the core reads, and builds them again after its arrays are replaced.
 
     The cache belongs to one object: a copy makes its own.
@@ -49,9 +50,9 @@ class Tabled:
             self._table = self._tabled()
         return self._table
 
+    @abstractmethod
     def _tabled(self) -> TransitionTable:
         """Make the table; each subclass does so from its own arrays."""
-        raise NotImplementedError
 
 
 def value_iteration(
