@@ -7,6 +7,7 @@ import json
 import sqlite3
 import time
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -37,13 +38,14 @@ class AgentFile:
     def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
         self.path, self.agent = Path(path), agent
         self._db: sqlite3.Connection = opened(self.path, read_only, durable)
+        self._release: Callable[[], object] | None = None
         if not read_only:
             try:
                 lock(self.path, agent)
             except BaseException:
                 self._db.close()
                 raise
-            self._release = weakref.finalize(self, unlock, self.path, agent)
+            self._release = weakref.finalize(self, unlock, self.path, agent)  # a store that nobody closes releases its lock too
 
     def bind(self, settings: dict[str, Any]) -> None:
         """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
@@ -84,7 +86,7 @@ class AgentFile:
     def close(self) -> None:
         """Close the file."""
         self._db.close()
-        if hasattr(self, "_release"):
+        if self._release is not None:
             self._release()
 
     def __enter__(self) -> Self:

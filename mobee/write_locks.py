@@ -7,6 +7,7 @@ on a file end when it closes any descriptor of that file.  Therefore a process o
 
 from __future__ import annotations
 
+import errno
 import os
 import zlib
 from collections import Counter
@@ -18,7 +19,9 @@ from mobee.errors import InUse, MobeeError, NoRoom
 try:
     import fcntl
 except ImportError:  # no such locks on this system: nothing is excluded
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None  # type: ignore[assignment]  # mypy expects a module here
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class _LockFile:
@@ -33,23 +36,27 @@ _open: dict[Path, _LockFile] = {}
 
 
 def lock(path: Path, name: str) -> None:
-    """Lock what `name` has in a file against other processes; raises InUse while another process holds the lock."""
+    """Lock what `name` has in a file against other processes.
+
+    Raises InUse while another process holds the lock, NoRoom if the disk is full, MobeeError if the system gives no lock for another reason.
+    """
     if fcntl is None:
         return
     where = path.with_name(path.name + "-lock").absolute()
     try:
         file = _open.get(where) or _open.setdefault(where, _LockFile(where))
         fcntl.lockf(file.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte(name))
-    except (BlockingIOError, PermissionError) as error:
-        if where in _open:
+    except OSError as error:
+        is_open = where in _open
+        if is_open:
             _close_if_unused(where)
+        if is_open and isinstance(error, BlockingIOError | PermissionError):
             raise InUse(
                 f"{path}: another process writes the data of {name}: end it first (`mobee status` shows the systems that run), "
                 "or use another file or run folder."
             ) from None
-        raise MobeeError(f"{path}: {where.name} beside it cannot be made ({error.strerror}).") from None
-    except OSError as error:
-        raise NoRoom(f"{path}: {where.name} beside it cannot be made ({error.strerror}).") from None
+        kind = NoRoom if error.errno in FULL else MobeeError
+        raise kind(f"{path}: {where.name} beside it cannot be {'locked' if is_open else 'made'} ({error.strerror}).") from None
     file.held[name] += 1
 
 
@@ -61,7 +68,7 @@ def unlock(path: Path, name: str) -> None:
         return
     file.held[name] -= 1
     if not file.held[name]:
-        with suppress(OSError):
+        with suppress(OSError):  # a lock that cannot be released ends when this process closes the file
             fcntl.lockf(file.descriptor, fcntl.LOCK_UN, 1, _byte(name))
     _close_if_unused(where)
 

@@ -8,7 +8,7 @@ import sqlite3
 import numpy as np
 import pytest
 
-from mobee.errors import MobeeError
+from mobee.errors import MobeeError, NoRoom
 from mobee.store import TransitionStore
 from tests.mobee.test_store import appender, one_line, transition
 
@@ -212,5 +212,13 @@ def test_only_one_process_at_a_time_writes_the_data_of_an_agent(tmp_path):
         assert other.wait(60) == 0
         with TransitionStore(path, "torso", read_only=True) as reader:
             assert len(reader.load()) == 1
-        TransitionStore(path, "torso").close()  # this process has the claim still
+        TransitionStore(path, "torso").close()  # this process still has the lock
     assert appender(path, "torso", until=3).wait(60) == 0
+
+
+def test_a_lock_that_cannot_be_made_is_no_full_disk(tmp_path):
+    (tmp_path / "run.sqlite-lock").mkdir()
+    with pytest.raises(MobeeError) as error:
+        TransitionStore(tmp_path / "run.sqlite", "torso")
+    assert "run.sqlite-lock beside it cannot be made (Is a directory)" in one_line(error)
+    assert not isinstance(error.value, NoRoom)
