@@ -14,10 +14,11 @@ from mobee._core import ADDRESS, INTEGER, REAL, address, function
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
+_PLACE = [("center", np.float64, 3), ("rotation", np.float64, (3, 3))]
+
 CONVEX = np.dtype(
     [
-        ("center", np.float64, 3),
-        ("rotation", np.float64, (3, 3)),
+        *_PLACE,
         ("half", np.float64, 3),
         ("bound", np.float64),
         ("kind", np.int64),
@@ -30,8 +31,7 @@ CONVEX = np.dtype(
 
 SURFACE = np.dtype(
     [
-        ("center", np.float64, 3),
-        ("rotation", np.float64, (3, 3)),
+        *_PLACE,
         ("middle", np.float64, 3),
         ("bound", np.float64),
         ("corners", np.uint64),
@@ -88,10 +88,9 @@ def cast(volumes: NDArray[np.void], surfaces: NDArray[np.void], rays: Rays) -> t
     Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of volumes, or numbers of surfaces, (H, W), -1 where
     there is nothing; and outward normals (H, W, 3), root frame.
     """
-    if volumes.dtype != CONVEX or CONVEX.itemsize != _convex_size():
-        raise RuntimeError("the library's volumes have another layout than these")
-    if surfaces.dtype != SURFACE or SURFACE.itemsize != _surface_size():
-        raise RuntimeError("the library's surfaces have another layout than these")
+    for table, row, size in ((volumes, CONVEX, _convex_size()), (surfaces, SURFACE, _surface_size())):
+        if table.dtype != row or row.itemsize != size:
+            raise RuntimeError(f"the library's rows have {size} bytes and another layout than {table.dtype}")
     shape = rays.height, rays.width
     depth, which, normal = np.empty(shape, np.float32), np.empty(shape, np.int32), np.empty((*shape, 3), np.float32)
     arrays = (address(array) for array in (volumes, surfaces, depth, which, normal))
