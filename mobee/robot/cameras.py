@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cameras of a robot: those of its file, the eyes that markers make, and those that a person puts on a link."""
+"""The cameras of a robot: those of its file, the eyes that markers make, and those that a user adds to a link."""
 
 from __future__ import annotations
 
@@ -38,10 +38,11 @@ def _named(cameras: Iterable[Camera]) -> dict[str, Camera]:
     """Return cameras by the names that they have on the bus, each once."""
     found: dict[str, Camera] = {}
     for camera in cameras:
-        name, count = key_of(camera.name), 2
-        while name in found:
-            name, count = f"{key_of(camera.name)}_{count}", count + 1
-        found[name] = camera
+        key = name = key_of(camera.name, "camera")
+        count = 2
+        while key in found:
+            key, count = f"{name}_{count}", count + 1
+        found[key] = camera
     return found
 
 
@@ -93,9 +94,9 @@ def _numbers(text: str, given: str) -> list[float]:
     return numbers
 
 
-def key_of(name: str) -> str:
-    """Return a name as it stands in a key of the bus."""
-    return re.sub(r"[^a-z0-9_]+", "_", name.lower()).strip("_") or "camera"
+def key_of(name: str, otherwise: str) -> str:
+    """Return a name in the letters of keys of the bus and of files, a-z, 0-9 and _; `otherwise` if none is left."""
+    return re.sub(r"[^a-z0-9_]+", "_", name.lower()).strip("_") or otherwise
 
 
 def upright(ahead: Array) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from mobee.control.gains import Gains
 from mobee.derivation import Arm, Derived, derive
 from mobee.errors import InvalidValue
-from mobee.robot.cameras import cameras_of
+from mobee.robot.cameras import cameras_of, key_of
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.robot_options import urdf_options
@@ -76,7 +76,7 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     }
     gains = "default" if derived.gains == Gains.default() else "derived"
     remarks = [str(one.message).rpartition(":1: ")[2] for one in caught]
-    name = re.sub(r"[^a-z0-9_]+", "_", loaded.name.lower()).strip("_") or "robot"
+    name = key_of(loaded.name, "robot")
     cameras = cameras_of(derived.robot, asked)
     eyes, lines = _eyes(cameras, world, name), tuple(_described(derived, remarks, list(cameras)))
     return Setup(name, "", derived.robot, world, gains, agents, lines, asked, eyes)

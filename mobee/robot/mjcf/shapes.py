@@ -12,11 +12,12 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.mjcf.compiled import Compiled
-from mobee.robot.robot import Shape
+from mobee.robot.robot import Shape, ShapeKind
 from mobee.robot.urdf.hull import Corners, convex_hull
 from mobee.robot.urdf.shapes import Meshes, hulled
 from mobee.robot.xml.body import MOST_SHAPES
 
+PRIMITIVES: dict[str, ShapeKind] = {name: name for name in ("sphere", "capsule", "cylinder", "box")}
 WITHOUT_BODY = ("plane", "hfield")  # ground, which belongs into a world
 
 
@@ -47,19 +48,23 @@ def colliding(compiled: Compiled) -> list[int]:
 
 
 def _shaped(compiled: Compiled, geom: int, shape: Shape, size: Array, known: dict[int, Array], meshes: Meshes, corners: Corners) -> Shape:
-    x, y, z = map(float, size)
-    match compiled.geom_kinds[geom]:
-        case "sphere":
-            return replace(shape, size=(x,))
-        case "capsule":
-            return replace(shape, kind="capsule", size=(x, 2.0 * y))
-        case "cylinder":
-            return replace(shape, kind="cylinder", size=(x, 2.0 * y))
-        case "box":
-            return replace(shape, kind="box", size=(2.0 * x, 2.0 * y, 2.0 * z))
-        case "ellipsoid":
-            return hulled(shape, around_ball() * size, meshes)
+    kind = compiled.geom_kinds[geom]
+    if kind in PRIMITIVES:
+        return replace(shape, kind=PRIMITIVES[kind], size=primitive_size(kind, size))
+    if kind == "ellipsoid":
+        return hulled(shape, around_ball() * size, meshes)
     return hulled(shape, _mesh(compiled, geom, known, corners), meshes)
+
+
+def primitive_size(kind: str, size: Array) -> tuple[float, ...]:
+    """Return the size of a Shape of a kind in PRIMITIVES from that of a geom (3,) m: MuJoCo gives half lengths."""
+    x, y, z = map(float, size)
+    match kind:
+        case "sphere":
+            return (x,)
+        case "box":
+            return 2.0 * x, 2.0 * y, 2.0 * z
+    return x, 2.0 * y
 
 
 def _mesh(compiled: Compiled, geom: int, known: dict[int, Array], corners: Corners) -> Array:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.robot.mjcf.compiled import Compiled
-from mobee.robot.mjcf.shapes import WITHOUT_BODY, colliding
+from mobee.robot.mjcf.shapes import colliding, primitive_size
 from mobee.robot.visual import Camera, Channels, MeshSource, Visual, VisualKind
 
 SHOWN_GROUPS = 3  # MuJoCo's viewers show the groups 0, 1 and 2
@@ -17,13 +17,13 @@ KINDS: dict[str, VisualKind] = {name: name for name in ("sphere", "capsule", "cy
 def read_visuals(compiled: Compiled, link_of: list[int]) -> tuple[Visual, ...]:
     """Return what is drawn: of each body the geoms that cannot collide, or all if it has none of these, in the groups that are shown.
 
-    Geoms without a name of a mesh, or fully transparent, are left out, and so is the ground.  `link_of`: the link of each body.
+    The ground (planes and height fields) and geoms that are fully transparent are left out.  `link_of`: the link of each body.
     """
     model, solid = compiled.model, set(colliding(compiled))
     shown = [
         geom
         for geom, kind in enumerate(compiled.geom_kinds)
-        if kind in KINDS and kind not in WITHOUT_BODY and model.geom_group[geom] < SHOWN_GROUPS and _color(compiled, geom)[3] > 0.0
+        if kind in KINDS and model.geom_group[geom] < SHOWN_GROUPS and _color(compiled, geom)[3] > 0.0
     ]
     decorated = {int(model.geom_bodyid[geom]) for geom in shown if geom not in solid}
     return tuple(_visual(compiled, geom, link_of) for geom in shown if geom not in solid or int(model.geom_bodyid[geom]) not in decorated)
@@ -32,20 +32,16 @@ def read_visuals(compiled: Compiled, link_of: list[int]) -> tuple[Visual, ...]:
 def _visual(compiled: Compiled, geom: int, link_of: list[int]) -> Visual:
     model, kind = compiled.model, KINDS[compiled.geom_kinds[geom]]
     frame, link, color = compiled.geoms[geom], link_of[int(model.geom_bodyid[geom])], _color(compiled, geom)
-    x, y, z = map(float, model.geom_size[geom])
-    sizes: dict[VisualKind, tuple[float, ...]] = {
-        "sphere": (x,),
-        "capsule": (x, 2.0 * y),
-        "cylinder": (x, 2.0 * y),
-        "box": (2.0 * x, 2.0 * y, 2.0 * z),
-        "ellipsoid": (x, y, z),
-        "mesh": (),
-    }
+    size: tuple[float, ...] = ()
     mesh = None
-    if kind == "mesh":
+    if kind == "ellipsoid":
+        size = tuple(map(float, model.geom_size[geom]))
+    elif kind != "mesh":
+        size = primitive_size(kind, model.geom_size[geom])
+    else:
         name = compiled.names["mesh"][int(model.geom_dataid[geom])]
         mesh = MeshSource(compiled.path.name, compiled.path, max(compiled.lines["geom"][geom], 1), name)
-    return Visual(link, kind, sizes[kind], frame.position, frame.rotation, color, mesh)
+    return Visual(link, kind, size, frame.position, frame.rotation, color, mesh)
 
 
 def _color(compiled: Compiled, geom: int) -> Channels:
@@ -64,12 +60,12 @@ def _color(compiled: Compiled, geom: int) -> Channels:
 
 
 def read_cameras(compiled: Compiled, link_of: list[int]) -> dict[str, Camera]:
-    """Return the cameras that are fixed to a body; those that follow one are for spectators."""
+    """Return the cameras that are fixed to a body, by name; those that follow a body from a distance are left out."""
     model, found = compiled.model, {}
     for index, name in enumerate(compiled.names["camera"]):
         if compiled.camera_modes[index] == "fixed":
             frame = compiled.cameras[index]
-            rotation = frame.rotation * np.array([1.0, -1.0, -1.0])  # MuJoCo's look along -z, and y is up
+            rotation = frame.rotation * np.array([1.0, -1.0, -1.0])  # MuJoCo's cameras view along -z, and y is up
             link = link_of[int(model.cam_bodyid[index])]
             found[name] = Camera(name, link, frame.position, rotation, float(model.cam_fovy[index]))
     return found

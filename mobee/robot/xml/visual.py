@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.robot.cameras import upright
+from mobee.robot.cameras import VIEW, upright
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.mesh import mesh_name
 from mobee.robot.visual import Camera, Channels, MeshSource, Visual, VisualKind
@@ -25,7 +25,6 @@ VISUAL_ATTRIBUTES = frozenset({"file", "mesh", "scale", "shape", "size", "color"
 CAMERA_ATTRIBUTES = frozenset({"name", "view", "hides", "rotation", "turns", *NORMAL, *PLACE})
 SIZES: dict[VisualKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 NARROWEST, WIDEST = 1.0, 170.0  # degrees
-VIEW = 50.0  # degrees
 
 
 def read_visual(node: Node, draft: Draft, place: Place) -> None:
