@@ -15,7 +15,7 @@ from mobee.model.pose import Pose
 from mobee.model.world import World
 from mobee.model.world_file import load_world
 from mobee.rendering.camera import Camera, camera_axes, framing
-from mobee.rendering.looks import robot_solids
+from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.picture import Picture, draw
 from mobee.rendering.sheet import View
 from mobee.rendering.solid import Solid, focus, lowest, object_solids

@@ -22,7 +22,7 @@ from mobee.errors import InvalidValue, NotInstalled
 from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.rendering.camera import camera_axes, framing
-from mobee.rendering.looks import robot_solids
+from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.motion import Motion
 from mobee.rendering.picture import Picture, draw
 from mobee.rendering.solid import Color, Solid, ball, focus, lowest, object_solids, trail_solids

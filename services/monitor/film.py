@@ -17,7 +17,7 @@ from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.model.world_object import Geometry
 from mobee.rendering.camera import Camera, camera_axes, framing
-from mobee.rendering.looks import robot_solids
+from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.palette import Color
 from mobee.rendering.picture import draw
 from mobee.rendering.solid import focus, lowest, object_solids

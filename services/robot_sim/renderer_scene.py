@@ -14,7 +14,7 @@ from mobee.model.kinematics import link_transforms, matrix_from_quaternion
 from mobee.model.world import World, WorldObject
 from mobee.rendering.camera import Camera as View
 from mobee.rendering.camera import Raster, eye_camera
-from mobee.rendering.looks import looks_of
+from mobee.rendering.link_solids import link_solids
 from mobee.rendering.solid import Color, Solid
 from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.robot import Robot
@@ -37,7 +37,7 @@ class Scene:
         """`cameras`: by name; None: those of the robot."""
         self._robot, self._size = robot, (width, height)
         self.cameras = dict(cameras_of(robot) if cameras is None else cameras)
-        self._looks = looks_of(robot)
+        self._link_solids = link_solids(robot)
         self._objects = {item.name: _object_solid(item) for item in world.objects.values()}
         self._transforms = link_transforms(robot, robot.home)
 
@@ -59,7 +59,7 @@ class Scene:
     def draw(self, name: str) -> Picture:
         """Return the picture of a camera: (height, width, 3) bytes, red, green, blue."""
         hidden = self.cameras[name].hidden
-        robot = [look.at(self._transforms) for look in self._looks if look.link not in hidden]
+        robot = [one.at(self._transforms) for one in self._link_solids if one.link not in hidden]
         seen = Raster(self._view(name), [*robot, *self._objects.values()])
         brightness = AMBIENT + DIFFUSE * np.maximum(seen.normal @ LIGHT, 0.0)
         picture: Picture = np.minimum(255.0 * seen.color * brightness[..., None], 255.0).astype(np.uint8)

@@ -41,7 +41,7 @@ from mobee.arrays import Array, Ints
 from mobee.learning.reaching.evaluation import NO_STATE
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.reaches import hands_of
-from mobee.rendering.looks import robot_solids
+from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.picture import Picture
 from mobee.rendering.sheet import pictures_of
 from mobee.rendering.solid import Solid, ball

@@ -30,7 +30,7 @@ from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.model.world import World
 from mobee.model.world_file import load_world
-from mobee.rendering.looks import robot_solids
+from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.sheet import Panel, pictures_of, write_sheet
 from mobee.rendering.solid import Solid, object_solids
 from mobee.robot.load import load_robot

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws a robot: its looks and shapes are logged once, then one transform a link."""
+"""Draws a robot: its visuals and shapes are logged once, then one transform a link."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mobee.model.kinematics import link_transforms, quaternion_from_matrix
 from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.rendering import palette
-from mobee.rendering.looks import Look, looks_of
+from mobee.rendering.link_solids import LinkSolid, link_solids
 from mobee.rendering.palette import Rgba
 from mobee.rendering.solid import Solid
 from mobee.robot.robot import Robot, Shape, ShapeKind
@@ -65,13 +65,13 @@ def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
     )
 
 
-def drawn_looks(looks: Sequence[Look]) -> Iterator[tuple[str, rr.AsComponents]]:
-    """Yield the name of an entity and what it is, for looks of one link at zero pose; all its opaque meshes are one."""
-    opaque = [look.solid for look in looks if look.solid.mesh is not None and look.solid.opacity >= 1.0]
+def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
+    """Yield the name of an entity and what it is, for solids of one link at zero pose; all its opaque meshes are one."""
+    opaque = [one.solid for one in solids if one.solid.mesh is not None and one.solid.opacity >= 1.0]
     if opaque:
         yield "mesh", _joined(opaque)
-    for number, look in enumerate(looks):
-        solid = look.solid
+    for number, one in enumerate(solids):
+        solid = one.solid
         red, green, blue, opacity = (round(255.0 * channel) for channel in (*solid.color, solid.opacity))
         color = (red, green, blue, opacity)
         if solid.kind == "mesh":
@@ -118,11 +118,11 @@ class Figure:
         self._parts = {part: palette.SOLIDS[k % len(palette.SOLIDS)] for k, part in enumerate(robot.parts)}
         self._touched: frozenset[str] = frozenset()
         self._pairs: frozenset[tuple[str, str]] = frozenset()
-        looks = [] if solids else [look for look in looks_of(robot) if not look.is_solid]
-        self._dressed = frozenset(look.link for look in looks)  # links whose solids are not shown while nothing touches them
+        visuals = [] if solids else [one for one in link_solids(robot) if not one.collides]
+        self._dressed = frozenset(one.link for one in visuals)  # links whose solids are not shown while nothing touches them
         for link in self._dressed:
-            for name, body in drawn_looks([look for look in looks if look.link == link]):
-                self._log(["robot", robot.links[link], "looks", name], body)
+            for name, body in drawn_link([one for one in visuals if one.link == link]):
+                self._log(["robot", robot.links[link], "visuals", name], body)
         for shape in robot.shapes:
             if not self._is_under(shape):
                 self._log(self._path(shape), self._drawn(shape))
@@ -178,7 +178,7 @@ class Figure:
         self._touched, self._pairs = touched, pairs
 
     def _show_touch(self, shape: Shape, touched: bool) -> None:
-        """Recolour a shape, or show a solid under a mesh while it touches."""
+        """Give a shape the colour of contact or its own; a solid whose link is drawn as meshes is shown only while it touches."""
         if not self._is_under(shape):
             self._stream.log(self._path(shape), recolored(shape.kind, self._color(shape, touched)))
         elif touched:

@@ -13,10 +13,10 @@ from bus_schema.rpc import ObjectState
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quaternion_from_matrix
 from mobee.rendering import palette
-from mobee.rendering.looks import looks_of
+from mobee.rendering.link_solids import link_solids
 from mobee.robot.robot import Robot, Shape
 from services.monitor.viewer.blueprint import ROOT
-from services.monitor.viewer.figure import drawn, drawn_looks
+from services.monitor.viewer.figure import drawn, drawn_link
 from services.monitor.viewer.frames import Frames
 
 
@@ -25,10 +25,10 @@ class Links:
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
-        looks = looks_of(robot)
-        self._frames = {look.link: f"link_{look.link}" for look in looks}
+        solids = link_solids(robot)
+        self._frames = {one.link: f"link_{one.link}" for one in solids}
         for link, frame in self._frames.items():
-            for name, body in drawn_looks([look for look in looks if look.link == link]):
+            for name, body in drawn_link([one for one in solids if one.link == link]):
                 path = rr.new_entity_path(["robot", "links", robot.links[link], name])
                 stream.log(path, rr.CoordinateFrame(frame), body, static=True)
 

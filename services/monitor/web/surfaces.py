@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.rendering.looks import Look, coarser, looks_of
+from mobee.rendering.link_solids import LinkSolid, coarser, link_solids
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot, Shape
 from mobee.robot.urdf.hull import facets
@@ -46,22 +46,22 @@ def surfaces_of(robot: Robot) -> Callable[[], bytes]:
 
 def _surfaces(robot: Robot) -> list[Surface]:
     """Return its solids, unless its file draws it: then that, with meshes as fine as JavaScript draws in some milliseconds."""
-    parts, drawn = list(robot.parts), looks_of(robot)
-    dressed = {look.link for look in drawn if not look.is_solid}
+    parts, drawn = list(robot.parts), link_solids(robot)
+    dressed = {one.link for one in drawn if not one.collides}
     solids = [_surface(shape, parts) for shape in robot.shapes if shape.role == "solid" and shape.link not in dressed]
-    return solids + [_of_look(look, parts) for look in coarser([one for one in drawn if not one.is_solid], BUDGET)]
+    return solids + [_of_link_solid(one, parts) for one in coarser([one for one in drawn if not one.collides], BUDGET)]
 
 
-def _of_look(look: Look, parts: Sequence[str]) -> Surface:
-    solid = look.solid
+def _of_link_solid(one: LinkSolid, parts: Sequence[str]) -> Surface:
+    solid = one.solid
     if solid.mesh is not None:
         made: Made = solid.mesh.corners.astype(np.float64), solid.mesh.normals.astype(np.float64), solid.mesh.triangles.astype(np.intp)
     else:
         assert solid.kind != "mesh"
-        made = MAKERS[solid.kind](Shape("", look.link, solid.kind, solid.size, np.zeros(3), np.eye(3), "solid", look.part))
+        made = MAKERS[solid.kind](Shape("", one.link, solid.kind, solid.size, np.zeros(3), np.eye(3), "solid", one.part))
     vertices, normals = made[0] @ solid.rotation.T + solid.position, made[1] @ solid.rotation.T
     red, green, blue = (round(255.0 * channel) for channel in solid.color)
-    return Surface(look.link, parts.index(look.part) if look.part in parts else -1, (red, green, blue), vertices, normals, made[2])
+    return Surface(one.link, parts.index(one.part) if one.part in parts else -1, (red, green, blue), vertices, normals, made[2])
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:

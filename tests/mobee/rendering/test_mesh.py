@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import RobotFileError, Simplified
 from mobee.rendering.camera import NEAREST, Raster, eye_camera, pixel_middles
-from mobee.rendering.looks import coarser, looks_of
+from mobee.rendering.link_solids import coarser, link_solids
 from mobee.rendering.mesh import Piece, ellipsoid_piece, fair_most, mesh_of, read_pieces, smaller
 from mobee.rendering.solid import Solid
 from mobee.robot.load import load_robot
@@ -119,12 +119,12 @@ VISUAL = f'<link name="hand"><visual><geometry><mesh filename="{{}}"/></geometry
 WRIST = '<joint name="wrist" type="fixed"><parent link="lower"/><child link="hand"/></joint>'
 
 
-def test_a_mirror_image_keeps_its_outside_and_a_coarser_look_its_shape(tmp_path: Path) -> None:
+def test_a_mirror_image_keeps_its_outside_and_a_coarser_mesh_its_shape(tmp_path: Path) -> None:
     fine = ellipsoid_piece((0.5, 0.4, 0.3))
     write_stl(tmp_path / "ball.stl", fine.points[fine.triangles])
     robot = load_robot(urdf_file(tmp_path, *ARM, VISUAL.format('ball.stl" scale="-1 1 1'), WRIST))
-    (look,) = coarser(looks_of(robot), 200)
-    mesh = look.solid.mesh
+    (one,) = coarser(link_solids(robot), 200)
+    mesh = one.solid.mesh
     assert mesh is not None and 100 < len(mesh.triangles) <= 200
     assert ((mesh.corners * mesh.normals).sum(axis=1) > 0.0).all()
     np.testing.assert_allclose(np.ptp(mesh.corners, axis=0), [1.0, 0.8, 0.6], rtol=0.1)
@@ -133,8 +133,8 @@ def test_a_mirror_image_keeps_its_outside_and_a_coarser_look_its_shape(tmp_path:
 def test_a_missing_mesh_is_one_line_and_the_solid_instead(tmp_path: Path) -> None:
     robot = load_robot(urdf_file(tmp_path, *ARM, VISUAL.format("absent.stl"), WRIST))
     with pytest.warns(Simplified) as caught:
-        (look,) = looks_of(robot)
-    assert (look.solid.kind, look.is_solid) == ("sphere", True)
+        (one,) = link_solids(robot)
+    assert (one.solid.kind, one.collides) == ("sphere", True)
     (line,) = [str(one.message) for one in caught]
     assert line.startswith(f"{tmp_path / 'toy.urdf'}:7: cannot draw absent.stl: no mesh 'absent.stl' (looked at") and line.endswith(
         "nothing else is"
@@ -142,5 +142,5 @@ def test_a_missing_mesh_is_one_line_and_the_solid_instead(tmp_path: Path) -> Non
     write_stl(tmp_path / "absent.stl", CUBE[TRIANGLES])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        (look,) = looks_of(replace(robot, name="again"))
-    assert look.solid.mesh is not None and not look.is_solid
+        (one,) = link_solids(replace(robot, name="again"))
+    assert one.solid.mesh is not None and not one.collides

@@ -72,13 +72,13 @@ def test_a_solid_under_what_the_file_draws_is_shown_while_it_touches(robot: Robo
     drawn = replace(robot, visuals=(Visual(link, "sphere", (0.04,), np.zeros(3), np.eye(3), (0.0, 0.0, 1.0, 1.0)),))
     notebook = Notebook()
     Figure(notebook.stream, drawn, world).move(0.0, 1.0, np.array([robot.home, [np.pi / 2, robot.home[1]], robot.home]))
-    ((when, look),) = notebook.logged["robot/bend/looks/volume_0"]
+    ((when, look),) = notebook.logged["robot/bend/visuals/volume_0"]
     assert (when, color(look)) == (0.0, packed(0, 0, 255, 255))
     (begin, solid), (end, gone) = notebook.logged["robot/bend/solids/fore"]
     assert (begin, color(solid), end, type(gone)) == (1.0, packed(*palette.TOUCHED), 2.0, rr.Clear)
     solids = Notebook()
     Figure(solids.stream, drawn, world, solids=True)
-    assert "robot/bend/solids/fore" in solids.logged and "robot/bend/looks/volume_0" not in solids.logged
+    assert "robot/bend/solids/fore" in solids.logged and "robot/bend/visuals/volume_0" not in solids.logged
 
 
 def test_arrows_stand_where_it_touches_and_go(robot: Robot) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a robot is drawn: the meshes and volumes that its file draws, and the solids of links for which it draws nothing."""
+"""The coloured volumes and meshes of a robot's links: those that its file draws, and the solids of links for which it draws nothing."""
 
 from __future__ import annotations
 
@@ -16,19 +16,22 @@ from mobee.rendering.solid import Color, Solid
 from mobee.robot.robot import Robot, per_robot
 from mobee.robot.visual import Channels, MeshSource, Visual
 
-BUDGET = 60_000  # triangles of a robot; larger meshes are made smaller until it is kept
+BUDGET = 60_000  # triangles of a robot; large meshes are simplified until all have no more
 MOST_NAMED = 3  # meshes that a warning lists
 PALENESS = 0.72  # share of white in the colour of parts that do not matter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """A coloured volume or mesh on a link of a part, in the root frame at zero pose; `is_solid`: it is one of the robot's solids."""
+class LinkSolid:
+    """A coloured volume or mesh on a link of a part, in the root frame at zero pose.
+
+    `collides`: it is one of the robot's solids; others are drawn only.
+    """
 
     link: int
     part: str
     solid: Solid
-    is_solid: bool
+    collides: bool
 
     def at(self, transforms: Array, white: float = 0.0) -> Solid:
         """Return it where its link is, with a share of white in its colour; `transforms`: (L, 4, 4), from link_transforms."""
@@ -39,44 +42,38 @@ class Look:
 
 
 @per_robot
-def looks_of(robot: Robot) -> tuple[Look, ...]:
-    """Return what is drawn of a robot, its large meshes made smaller; warns in one line of meshes that cannot be read.
+def link_solids(robot: Robot) -> tuple[LinkSolid, ...]:
+    """Return what is drawn of a robot, its large meshes simplified; warns in one line of meshes that cannot be read.
 
     A link is drawn as its visuals; one that has none, or whose meshes cannot be read, as its solids.
     """
     meshes = _meshes(robot)
     parts = _parts_of_links(robot)
-    looks = []
-    for visual in robot.visuals:
-        looks += _looks(visual, parts[visual.link], robot, meshes)
-    return (*looks, *solid_looks(robot, frozenset(look.link for look in looks)))
-
-
-def solid_looks(robot: Robot, without: Iterable[int] = ()) -> tuple[Look, ...]:
-    """Return the solids of all links but those in `without`, in the colours of their parts."""
-    skipped = frozenset(without)
     found = []
+    for visual in robot.visuals:
+        found += _drawn(visual, parts[visual.link], robot, meshes)
+    drawn = {one.link for one in found}
     for shape in robot.shapes:
-        if shape.role == "solid" and shape.link not in skipped:
+        if shape.role == "solid" and shape.link not in drawn:
             color = _color_of_part(robot, shape.part)
             solid = Solid(shape.kind, shape.size, shape.position, shape.rotation, color, group=shape.link, vertices=shape.vertices)
-            found.append(Look(shape.link, shape.part, solid, True))
+            found.append(LinkSolid(shape.link, shape.part, solid, True))
     return tuple(found)
 
 
-def coarser(looks: Sequence[Look], budget: int) -> list[Look]:
-    """Return looks whose meshes have at most about `budget` triangles in all; for viewers without a graphics card."""
-    meshes = {id(look.solid.mesh): look.solid.mesh for look in looks if look.solid.mesh is not None}
-    counts = [len(look.solid.mesh.triangles) for look in looks if look.solid.mesh is not None]
+def coarser(solids: Sequence[LinkSolid], budget: int) -> list[LinkSolid]:
+    """Return solids whose meshes have at most about `budget` triangles in all; for viewers without a graphics card."""
+    meshes = {id(one.solid.mesh): one.solid.mesh for one in solids if one.solid.mesh is not None}
+    counts = [len(one.solid.mesh.triangles) for one in solids if one.solid.mesh is not None]
     most = fair_most(counts, budget)
     made = {key: simplified(mesh, most) for key, mesh in meshes.items()}
-    return [replace(look, solid=replace(look.solid, mesh=made.get(id(look.solid.mesh)))) for look in looks]
+    return [replace(one, solid=replace(one.solid, mesh=made.get(id(one.solid.mesh)))) for one in solids]
 
 
 def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
     """Return what is drawn of a robot in one pose, one group per link; parts that are not in `bright` are pale, none if it is None."""
     vivid = set(pose.robot.parts if bright is None else bright)
-    return [look.at(pose.transforms, 0.0 if look.part in vivid else PALENESS) for look in looks_of(pose.robot)]
+    return [one.at(pose.transforms, 0.0 if one.part in vivid else PALENESS) for one in link_solids(pose.robot)]
 
 
 def _meshes(robot: Robot) -> dict[MeshSource, tuple[Mesh, ...]]:
@@ -98,7 +95,7 @@ def _meshes(robot: Robot) -> dict[MeshSource, tuple[Mesh, ...]]:
     return {source: tuple(mesh_of(smaller(piece, most)) for piece in some) for source, some in pieces.items()}
 
 
-def _looks(visual: Visual, part: str, robot: Robot, meshes: Mapping[MeshSource, tuple[Mesh, ...]]) -> list[Look]:
+def _drawn(visual: Visual, part: str, robot: Robot, meshes: Mapping[MeshSource, tuple[Mesh, ...]]) -> list[LinkSolid]:
     """Return what a visual draws: a mesh of several colours in these, else in the colour of the robot's file, the mesh's, or the part's."""
     otherwise = _color_of_part(robot, part)
     if visual.mesh is not None:
@@ -106,13 +103,13 @@ def _looks(visual: Visual, part: str, robot: Robot, meshes: Mapping[MeshSource, 
         several = len({mesh.color for mesh in shown}) > 1
         colors = [mesh.color if several else visual.color or mesh.color for mesh in shown]
         solids = [_mesh_solid(visual, mesh, color, otherwise) for mesh, color in zip(shown, colors, strict=True)]
-        return [Look(visual.link, part, solid, False) for solid in solids]
+        return [LinkSolid(visual.link, part, solid, False) for solid in solids]
     if visual.kind == "ellipsoid":
-        return [Look(visual.link, part, _mesh_solid(visual, mesh_of(ellipsoid_piece(visual.size)), visual.color, otherwise), False)]
+        return [LinkSolid(visual.link, part, _mesh_solid(visual, mesh_of(ellipsoid_piece(visual.size)), visual.color, otherwise), False)]
     assert visual.kind != "mesh"
     color, opacity = _channels(visual.color, otherwise)
     solid = Solid(visual.kind, visual.size, visual.position, visual.rotation, color, opacity, group=visual.link)
-    return [Look(visual.link, part, solid, False)]
+    return [LinkSolid(visual.link, part, solid, False)]
 
 
 def _mesh_solid(visual: Visual, mesh: Mesh, given: Channels | None, otherwise: Color) -> Solid:
