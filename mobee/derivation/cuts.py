@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps solids apart that fields cannot, since they are near each other in every pose: by narrower limits of motors, and by clauses.
+"""Narrower limits of motors, and clauses, that keep apart solids too near each other in every pose to have fields.
 
 Whether two links a few joints apart touch depends only on the motors between them.  Over random positions of these, half-spaces
 are cut off until no touching position is left: one along a single motor becomes its limit, another a clause (thesis eqs. 5.14 to 5.17).
@@ -20,16 +20,16 @@ from mobee.model.model import Model
 from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Clause, LinkPair, Robot
 
-POSES = 3000  # positions of these
+POSES = 3000  # random positions of the motors between two links
 SHALLOW = 0.002  # m: an overlap of hulls that does not count
-MOST_CUTS = 6  # for two links
-DIRECTIONS = 48  # that are tried for each
-QUANTILES = (0.25, 0.5, 1.0)  # of the touching positions that a cut leaves out
+MOST_CUTS = 6  # half-spaces for two links
+DIRECTIONS = 48  # of touching positions from home, across which a cut is tried
+QUANTILES = (0.25, 0.5, 1.0)  # of the touching positions in a direction that a cut leaves out
 LIMIT_GAP = np.deg2rad(2.0)  # rad between home and a limit
 CLAUSE_GAP = 1.02 * Gains.default().constraint_width  # rad between home and a clause, which does not push at home
-MOST_LEFT = 0.2  # of the touching positions: with more, fields are needed too
-LEAST_FREE = 0.05  # of the free positions that must stay
-ALONE = 0.7  # of its cost: a cut along one motor, which leaves the range of the motor its middle
+MOST_LEFT = 0.2  # share of the touching positions within all cuts: with more, fields are needed too
+LEAST_FREE = 0.05  # share of the free positions that must remain within all cuts
+ALONE = 0.7  # factor of the cost of a cut along one motor: it is a limit, and levels of a lattice stay within limits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +54,10 @@ def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, .
     units = motor_units(robot)
     for group in _groups(robot, pairs, seed):
         cuts = list(_cuts(group))
-        if (
-            np.all([np.ones(len(group.touching)), *(group.touching @ normal > offset for normal, offset in cuts)], axis=0).mean()
-            > MOST_LEFT
-        ):
+        within = np.ones(len(group.touching), dtype=bool)
+        for normal, offset in cuts:
+            within &= group.touching @ normal > offset
+        if within.mean() > MOST_LEFT:
             failed.append(group.pairs)
         for normal, offset in cuts:
             used = np.flatnonzero(normal)
