@@ -134,7 +134,7 @@ class Controller:
         return known if isinstance(known, Forces) else Forces(**dict(zip(self.force_names, known.copy(), strict=True)))
 
     def note_forces(self, forces: Array) -> None:
-        """Take `last_forces` from rows (forces, n) in the order of `force_names`, as they are when it is read."""
+        """Make `last_forces` of rows (forces, n) in the order of `force_names`: not copied, it has their values at the time of reading."""
         self._last_forces = forces
 
     @property

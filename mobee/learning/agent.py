@@ -89,7 +89,8 @@ class CuriousAgent(CuriousLearner):
     def explore_by(self, explorer: str | Explorer) -> None:
         """Choose the next actions by another explorer; see `CuriousSettings`.
 
-        Its store keeps from which transition on, so that an agent that is restarted goes on with it. An action just decided is not changed.
+        The store records the change and the transition after which it was made, so that a restarted agent continues with it. An action
+        that is already decided is not changed.
 
         Raises:
             UnknownName: no such explorer.

@@ -12,7 +12,7 @@ from mobee.plant import Outcome
 
 
 class InstantPlant(ABC):
-    """A plant of one part on which an action takes no computation in between: `advance` does what `begin` was given, by `act`."""
+    """A plant of one part whose actions end at once: `advance` calls `act` with the target that `begin` was given."""
 
     def __init__(self, space: Space) -> None:
         self.space: Space = space

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot's file says about its looks and its cameras; meshes are named here, and read when they are drawn."""
+"""The visuals and cameras of a robot's file; a visual names its mesh, which is read when it is drawn."""
 
 from __future__ import annotations
 
