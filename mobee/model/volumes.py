@@ -33,13 +33,20 @@ class Volume(Protocol):
     """The members that a robot's Shape and a WorldObject have in common."""
 
     @property
-    def kind(self) -> ShapeKind: ...  # noqa: D102
+    def kind(self) -> ShapeKind:
+        """The form."""
+
     @property
-    def size(self) -> tuple[float, ...]: ...  # noqa: D102
+    def size(self) -> tuple[float, ...]:
+        """Its lengths [m], see `Shape`."""
+
     @property
-    def position(self) -> Array: ...  # noqa: D102
+    def position(self) -> Array:
+        """Its position (3,) m."""
+
     @property
-    def rotation(self) -> Array: ...  # noqa: D102
+    def rotation(self) -> Array:
+        """Its rotation (3, 3)."""
 
 
 def bound(volume: Volume, vertices: Array | None = None) -> float:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -19,15 +21,15 @@ def test_numbers_are_copied_as_floats() -> None:
 
 
 @pytest.mark.parametrize("given", ["home", [[1.0], [1.0, 2.0]], object(), [1.0, "a"], ["1", "2"], np.full((9, 1), "1")])
-def test_what_is_no_array_of_numbers_is_refused(given: object) -> None:
+def test_what_is_no_array_of_numbers_is_refused(given: Any) -> None:
     with pytest.raises(mobee.InvalidValue, match=r"^q is .*; it must be an array of numbers\.$"):
-        real_array("q", given)  # type: ignore[arg-type]
+        real_array("q", given)
 
 
 @pytest.mark.parametrize("given", [1j, [0.0, 1j], np.zeros(2, dtype=np.complex64), [np.complex128(1.0)]])
-def test_complex_numbers_are_refused_even_without_an_imaginary_part(given: object) -> None:
+def test_complex_numbers_are_refused_even_without_an_imaginary_part(given: Any) -> None:
     with pytest.raises(mobee.InvalidValue, match="q is complex, .* first; it must be real numbers"):
-        real_array("q", given)  # type: ignore[arg-type]
+        real_array("q", given)
 
 
 def test_a_complex_q_is_refused_wherever_a_pose_is_taken() -> None:

@@ -81,17 +81,21 @@ class Builder(Protocol):
     problem: Problem
 
     @property
-    def vertices(self) -> int: ...  # noqa: D102
+    def vertices(self) -> int:
+        """Number of vertices."""
 
     @property
-    def open(self) -> int: ...  # noqa: D102
+    def open(self) -> int:
+        """Number of vertices or points from which the builder may still continue."""
 
-    def step(self) -> bool: ...  # noqa: D102
+    def step(self) -> bool:
+        """Search for further vertices; return False if there is nothing left to try."""
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return the state, with the vertices' "q" (V, n) rad and "y" (V, m)."""
 
-    def restore(self, state: Mapping[str, NDArray[Any]]) -> None: ...  # noqa: D102
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Continue from the `state` of a builder with the same settings."""
 
 
 class Checkpoint:

@@ -147,12 +147,12 @@ def test_names_are_ones_own() -> None:
     with pytest.raises(InvalidValue, match="'pull'"):
         Controller(touching(), terms=[TERMS[0], TERMS[0]])
     with pytest.raises(InvalidValue, match="each must be a Term"):
-        Controller(touching(), terms=[steady])  # type: ignore[list-item]
+        Controller(touching(), terms=[steady])  # type: ignore[list-item]  # a wrong type
     for wrong in ("", "Push", "a b", "_own", "x" * 65, 3):
         with pytest.raises(InvalidValue, match="name of a term"):
-            Term(wrong, steady)  # type: ignore[arg-type]
+            Term(wrong, steady)  # type: ignore[arg-type]  # 3 is of a wrong type
     with pytest.raises(InvalidValue, match="must be a function"):
-        Term("push", 3.0)  # type: ignore[arg-type]
+        Term("push", 3.0)  # type: ignore[arg-type]  # a wrong type
 
 
 def test_forces_are_a_mapping_and_their_names_are_attributes() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,8 +27,8 @@ SQUARES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
 TRIANGLES = np.array([[one[0], one[k], one[k + 1]] for one in SQUARES for k in (1, 2)])
 
 
-def source(path: Path, **about: object) -> MeshSource:
-    return MeshSource(path.name, path.parent / "robot.urdf", **about)  # type: ignore[arg-type]
+def source(path: Path, **about: Any) -> MeshSource:
+    return MeshSource(path.name, path.parent / "robot.urdf", **about)
 
 
 @pytest.mark.parametrize("flipped", [False, True])

@@ -29,8 +29,11 @@ BLUE = '<material name="blue"><color rgba="0 0 1 1"/></material>'
 
 
 def key(robot: Robot, visual: Visual) -> tuple[object, ...]:
-    mesh = visual.mesh
-    found = mesh and (first_file(mesh_places(mesh.file, mesh.robot_file)).resolve(), mesh.name, mesh.scale)  # type: ignore[union-attr]
+    mesh, found = visual.mesh, None
+    if mesh is not None:
+        file = first_file(mesh_places(mesh.file, mesh.robot_file))
+        assert file is not None
+        found = file.resolve(), mesh.name, mesh.scale
     return robot.links[visual.link], visual.kind, tuple(np.round(visual.size, 12)), visual.color, found
 
 

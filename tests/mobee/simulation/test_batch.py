@@ -231,7 +231,7 @@ def test_a_plant_without_an_action_and_invalid_numbers_of_ticks_are_refused() ->
         advance_together([*good, *katanas(1, acting=False)])
     for ticks in (-1, 1.5, True):
         with pytest.raises(InvalidValue, match="ticks="):
-            run_together(good, ticks)  # type: ignore[arg-type]
+            run_together(good, ticks)  # type: ignore[arg-type]  # 1.5 is of a wrong type
     assert good[0].time == 0.0
 
 

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,11 +26,11 @@ def model(icub: mobee.Robot) -> mobee.Model:
     return mobee.Model(icub, mobee.load_world("table"))
 
 
-def _build(model: mobee.Model, **others: object) -> mobee.Roadmap:
+def _build(model: mobee.Model, **others: Any) -> mobee.Roadmap:
     names = [one.name for one in dataclasses.fields(mobee.RoadmapSettings)]
     settings = {"method": "nes", "search": QUICK} | {name: others.pop(name) for name in names if name in others}
     arguments = {"costs": COSTS, "task": TASK, "spacing": 0.05, "motors": MOTORS} | others
-    return mobee.build_roadmap(model, **arguments, settings=mobee.RoadmapSettings(**settings))  # type: ignore[arg-type]
+    return mobee.build_roadmap(model, **arguments, settings=mobee.RoadmapSettings(**settings))
 
 
 @pytest.fixture(scope="module")
@@ -227,6 +228,6 @@ def test_a_task_out_of_reach_is_an_error(model: mobee.Model, monkeypatch: pytest
 @pytest.mark.parametrize(
     "wrong", [{"delta": 0.0}, {"delta": 1.5}, {"std": 0.0}, {"wide_std": 2.0}, {"population": 3}, {"patience": 0}, {"tries": 0}]
 )
-def test_search_settings_out_of_range_are_refused(wrong: dict[str, float]) -> None:
+def test_search_settings_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(mobee.InvalidValue, match=next(iter(wrong))):
-        mobee.SearchSettings(**wrong)  # type: ignore[arg-type]
+        mobee.SearchSettings(**wrong)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -13,8 +15,8 @@ from mobee.roadmap.building.settings import SearchSettings
 from tests.mobee.roadmap.toy import Level
 
 
-def _grown(spacing: float = 0.06, seed: int = 0, **how: object) -> FrontierBuilder:
-    builder = FrontierBuilder(Level(spacing), SearchSettings(**{"std": 0.02} | how), np.random.default_rng(seed))  # type: ignore[arg-type]
+def _grown(spacing: float = 0.06, seed: int = 0, **how: Any) -> FrontierBuilder:
+    builder = FrontierBuilder(Level(spacing), SearchSettings(**{"std": 0.02} | how), np.random.default_rng(seed))
     while builder.step():
         assert builder.evaluator.problem.evaluations < 400_000, "it does not end"
     return builder
@@ -22,7 +24,7 @@ def _grown(spacing: float = 0.06, seed: int = 0, **how: object) -> FrontierBuild
 
 def _uncovered(builder: FrontierBuilder) -> np.ndarray:
     """How far all that can be reached is from the nearest vertex, in spacings."""
-    found: np.ndarray = KDTree(builder.frontier.points).query(builder.evaluator.reachable())[0]  # type: ignore[attr-defined]
+    found: np.ndarray = KDTree(builder.frontier.points).query(builder.evaluator.reachable())[0]  # type: ignore[attr-defined]  # of Level
     return found
 
 

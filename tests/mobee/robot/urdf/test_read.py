@@ -4,6 +4,7 @@ from __future__ import annotations
 import warnings
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio
@@ -165,9 +166,9 @@ def test_a_field_without_reach_is_refused(options: UrdfOptions) -> None:
 
 
 @pytest.mark.parametrize("corners", [7, 0, -1, 64.0, True, "64", "exact", None])
-def test_a_number_of_corners_that_is_none_is_refused(corners: object) -> None:
+def test_a_number_of_corners_that_is_none_is_refused(corners: Any) -> None:
     with pytest.raises(InvalidValue, match="is no number of corners. Give a whole number from 8 on, or "):
-        read_urdf(foreign("r2d2.urdf"), UrdfOptions(corners=corners))  # type: ignore[arg-type]
+        read_urdf(foreign("r2d2.urdf"), UrdfOptions(corners=corners))
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
