@@ -30,7 +30,7 @@ class Placed:
     rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3)
 
     def name(self, own: str) -> str:
-        """Return the name of a part, motor, joint, link, marker or shape of this robot in the joined one."""
+        """Return the name of a part, motor, joint, link, marker, shape or camera of this robot in the joined one."""
         return f"{self.prefix}{SEPARATOR}{own}" if self.prefix else own
 
 
@@ -39,9 +39,10 @@ def join_robots(
 ) -> Robot:
     """Join several robots into one, each at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
 
-    Names of parts, motors, joints, links, markers and shapes get the key and "_" as a prefix; the key "" leaves them unchanged.
+    Names of parts, motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged.
     Parts and motors are in the order given. The bases become one link, with the name of the first. Every solid is tested against all
-    solids of the other robots, every field against all fields; within a robot its own pairs are kept.
+    solids of the other robots, every field against all fields; within a robot its own pairs are kept. The least lever, one number of a
+    robot, is the largest of all: give the robots the same one if contacts shall push each as before.
     Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place without a robot.
     """
     for key in places or {}:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -30,6 +32,7 @@ def test_parts_motors_and_names_follow_each_other() -> None:
     assert robot.links == (*ICUB.links, *(f"katana_{name}" for name in KATANA.links[1:]))
     assert {motor.part for motor in robot.motor_table} == set(robot.parts)
     np.testing.assert_array_equal(robot.home, [*ICUB.home, *KATANA.home])
+    assert join_robots({"": ICUB, "katana": replace(KATANA, least_lever=0.05)}).least_lever == 0.05
 
 
 @given(st.integers(0, 2**32 - 1))
