@@ -104,7 +104,7 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
         robot, bare = with_fields(robot, robot.solid_pairs, width, seed)
         robot, narrowed, bare = with_cuts(robot, bare, seed)
         robot, _ = with_fields(robot, bare, width, seed, short=0.0)
-        gains = Gains.derived() if width else gains
+        gains = Gains.derived()
     names = tuple(sorted((robot.links[min(pair)], robot.links[max(pair)]) for pair in left_out))
     return Derived(robot, arms, tuple(limited), moved, narrowed, names, width, gains)
 
