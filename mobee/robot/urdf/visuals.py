@@ -24,11 +24,15 @@ def read_visuals(robot: Node, tree: Tree, skeleton: Skeleton) -> tuple[Visual, .
     found: list[Visual] = []
     for link, index in skeleton.index.items():
         for node in tree.links[link]:
-            if node.tag == "visual" and len(found) < MOST_VISUALS:
-                try:
-                    found += _read(node, index, skeleton.frames[link], materials)
-                except RobotFileError as error:
-                    node.warn(f"is not drawn: {str(error).partition('> ')[2] or error}", Simplified)
+            if node.tag != "visual":
+                continue
+            if len(found) >= MOST_VISUALS:
+                node.warn(f"is not drawn, nor are the others after it: a robot has at most {MOST_VISUALS} visuals", Simplified)
+                return tuple(found)
+            try:
+                found += _read(node, index, skeleton.frames[link], materials)
+            except RobotFileError as error:
+                node.warn(f"is not drawn: {str(error).partition('> ')[2] or error}", Simplified)
     return tuple(found)
 
 

@@ -15,6 +15,7 @@ from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.mesh import first_file, mesh_places
+from mobee.robot.urdf.visuals import MOST_VISUALS
 from mobee.robot.visual import Visual
 from mobee.robot.xml.write import write_xml
 from tests.mobee.robot.mjcf_files import mjcf_file
@@ -56,6 +57,16 @@ def test_a_urdf_draws_its_visuals_in_their_colours_and_a_faulty_one_is_a_warning
     assert mesh.mesh is not None and (mesh.mesh.file, mesh.mesh.scale) == ("m.stl", (1.0, 2.0, -3.0))
     assert (mesh.color, box.color) == ((0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 0.5))
     assert (box.kind, box.size) == ("box", (1.0, 2.0, 3.0))
+
+
+def test_visuals_beyond_the_most_that_a_robot_may_have_are_a_warning(tmp_path: Path) -> None:
+    ball = '<visual><geometry><sphere radius="1"/></geometry></visual>'
+    joint = '<joint name="wrist" type="fixed"><parent link="lower"/><child link="hand"/></joint>'
+    path = urdf_file(tmp_path, *ARM, f'<link name="hand">{(MOST_VISUALS + 2) * ball}</link>', joint)
+    with pytest.warns(Simplified, match="is not drawn, nor are the others after it: a robot has at most 2000 visuals") as caught:
+        robot = load_robot(path)
+    assert len(robot.visuals) == MOST_VISUALS
+    assert len(caught) == 1
 
 
 MJCF = """
