@@ -178,9 +178,8 @@ MOBEE_CALL void mobee_plants_run(Plant* const* plants, std::int64_t count, std::
     share(count, 1, std::min(threads, count), [&](std::int64_t, std::int64_t which, std::int64_t) { run(*plants[which]); });
 }
 
-// Run distinct plants for `ticks` ticks each, also if actions end before, in `threads` threads.  Return the number of plants whose state is
-// lost.
-MOBEE_CALL std::int64_t mobee_plants_run_for(Plant* const* plants, std::int64_t count, std::int64_t ticks, std::int64_t threads) {
+// Run distinct plants for `ticks` ticks each, also if actions end before, in `threads` threads; a plant whose state is lost ends there.
+MOBEE_CALL void mobee_plants_run_for(Plant* const* plants, std::int64_t count, std::int64_t ticks, std::int64_t threads) {
     share(count, 1, std::min(threads, count), [&](std::int64_t, std::int64_t which, std::int64_t) {
         Plant& plant = *plants[which];
         plant.max_ticks = ticks;
@@ -189,7 +188,6 @@ MOBEE_CALL std::int64_t mobee_plants_run_for(Plant* const* plants, std::int64_t 
             plant.max_ticks -= plant.ticks_run;
         } while (plant.end == action_ended && plant.max_ticks > 0);
     });
-    return std::count_if(plants, plants + count, [](const Plant* plant) { return plant->end == state_lost; });
 }
 
 // Fill the encoders, attractors and velocities of all motors of several plants, (plants, 3, motors).

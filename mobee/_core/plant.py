@@ -86,7 +86,7 @@ class Calls:
         self.runs_out = function("braking_runs_out", ADDRESS, ADDRESS, ADDRESS, result=ctypes.c_bool)
         self.run = function("plant_run", ADDRESS)
         self.run_many = function("plants_run", BYTES, INTEGER, INTEGER)
-        self.run_for = function("plants_run_for", BYTES, INTEGER, INTEGER, INTEGER, result=INTEGER)
+        self.run_for = function("plants_run_for", BYTES, INTEGER, INTEGER, INTEGER)
         self.read_many = function("plants_read", BYTES, INTEGER, ADDRESS)
         self.aim_many = function("plants_aim", BYTES, INTEGER, BYTES)
         self.sizes = function("plant_sizes", ADDRESS)
