@@ -86,17 +86,17 @@ def _read(path: Path) -> Sequence[Piece]:
         import trimesh
     except ImportError:
         raise NotInstalled(f"meshes need trimesh: {REMEDY}") from None
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # what fails is said by whoever draws
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # the caller reports what fails
     try:
         scene: Any = trimesh.load_scene(path, process=False)
         unit = re.match(r"([\d.eE+-]+) \* meters", str(scene.units or ""))
-        objects = [one for one in scene.dump() if isinstance(one, trimesh.Trimesh)]
+        objects = [(one, _color(one.visual)) for one in scene.dump() if isinstance(one, trimesh.Trimesh)]
     except ImportError as error:
         raise NotInstalled(f"{path.suffix} meshes need {error.name}: {REMEDY}") from None
-    except Exception as error:  # noqa: BLE001  # trimesh's readers raise whatever a broken file makes them raise
+    except Exception as error:  # trimesh and Pillow have no base class for the errors that a broken file causes
         raise RobotFileError(f"{path}: cannot be read ({type(error).__name__}: {error})") from None
     meter = float(unit[1]) if unit else 1.0
-    return [Piece(meter * np.asarray(one.vertices), np.asarray(one.faces, dtype=np.intp), _color(one.visual)) for one in objects]
+    return [Piece(meter * np.asarray(one.vertices), np.asarray(one.faces, dtype=np.intp), color) for one, color in objects]
 
 
 def _color(visual: Any) -> Channels | None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from mobee.errors import RobotFileError, Simplified
 from mobee.rendering.camera import NEAREST, Raster, eye_camera, pixel_middles
@@ -102,17 +103,22 @@ def test_a_budget_is_dealt_to_the_large_ones() -> None:
     assert smaller(fine, 10_000) is fine
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "why"), [("m.stl", b"solid\n", "no mesh|cannot"), ("m.dae", b"<x", "cannot"), ("m.xyz", b"", "type '.xyz'")]
-)
+@pytest.mark.parametrize(("name", "content", "why"), [("m.dae", b"<x", "cannot be read"), ("m.xyz", b"", "meshes of type '.xyz'")])
 def test_a_mesh_that_cannot_be_read_is_an_error_with_its_reason(tmp_path: Path, name: str, content: bytes, why: str) -> None:
     (tmp_path / name).write_bytes(content)
-    try:
-        assert read_pieces(source(tmp_path / name)) == ()
-    except RobotFileError as error:
-        assert name in str(error)
+    with pytest.raises(RobotFileError, match=f"{name}: {why}"):
+        read_pieces(source(tmp_path / name))
     with pytest.raises(RobotFileError, match="no mesh 'absent.stl'"):
         read_pieces(source(tmp_path / "absent.stl"))
+
+
+def test_a_mesh_whose_texture_is_cut_off_is_an_error_with_its_reason(tmp_path: Path) -> None:
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)).save(tmp_path / "t.png")
+    (tmp_path / "t.png").write_bytes((tmp_path / "t.png").read_bytes()[:5000])
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd t.png\n")
+    (tmp_path / "m.obj").write_text("mtllib m.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    with pytest.raises(RobotFileError, match="m.obj: cannot be read"):
+        read_pieces(source(tmp_path / "m.obj"))
 
 
 SOLID = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
