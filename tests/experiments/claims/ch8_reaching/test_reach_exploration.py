@@ -8,7 +8,6 @@ from experiments.claims.ch8_reaching import reach_exploration
 from experiments.claims.ch8_reaching.reach_exploration import (
     CHECKPOINTS,
     CLAIMS,
-    Runs,
     agree,
     best,
     decreases,
@@ -23,6 +22,7 @@ from experiments.claims.ch8_reaching.reach_exploration import (
     trial,
     weak_early,
 )
+from experiments.claims.ch8_reaching.reach_measures import Runs
 from experiments.kit.experiment import judged
 from experiments.kit.reaching import arm
 from tests.experiments.finished_cells import Cell, finished
