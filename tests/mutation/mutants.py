@@ -65,11 +65,12 @@ def mutants(source: str) -> list[Mutant]:
     Texts, type annotations, decorators, imports and what is raised (the texts of errors) stay as they are.
     """
     tree = ast.parse(source)
-    found = []
-    for node, position in _nodes(tree):
-        for change, replacement in _changes(node):
-            line, column = node.lineno, node.col_offset  # type: ignore[attr-defined]  # all nodes that are changed have a place
-            found.append(Mutant(line, column, change, tree, position, replacement))
+    found = [
+        Mutant(node.lineno, node.col_offset, change, tree, position, replacement)
+        for node, position in _nodes(tree)
+        if isinstance(node, (ast.expr, ast.stmt))
+        for change, replacement in _changes(node)
+    ]
     return sorted(found, key=lambda mutant: (mutant.line, mutant.column))
 
 
