@@ -93,9 +93,9 @@ class LearningCurves:
 
 @contextmanager
 def tracked(folder: Path) -> Iterator[None]:
-    """Write the curves of all agents that learn in this process meanwhile, each into a folder of its own with the name of its part.
+    """Write the curves of all agents that learn in this process within the context, each into a folder with the name of its part.
 
-    Within it, another `tracked` takes over.
+    A second `tracked` within the first replaces it until it ends.
     """
     curves: dict[CuriousLearner, LearningCurves] = {}
     parts = Counter[str]()
