@@ -130,9 +130,9 @@ def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
     return found
 
 
-def found_in(folders: Sequence[Path]) -> Recorded:
-    """Return the entries of `runs_in`."""
-    return {name: one.entry for name, one in runs_in(folders).items()}
+def entries_of(found: Mapping[str, Finished]) -> Recorded:
+    """Return the entries of finished runs."""
+    return {name: one.entry for name, one in found.items()}
 
 
 def _entry(name: str, run: Path, versions: Path) -> Entry:

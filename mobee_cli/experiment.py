@@ -17,6 +17,7 @@ from experiments.claims_table import (
     all_differences,
     better,
     claims_text,
+    entries_of,
     finished_runs,
     keep_records,
     recorded,
@@ -202,9 +203,8 @@ def _claims(arguments: argparse.Namespace) -> int:
         raise InvalidValue("--confirm needs --write: it writes the numbers of new seeds into the table.")
     chosen = arguments.folders or (finished_runs(arguments.runs, arguments.confirm) if arguments.write else [])
     found = runs_in(chosen)
-    entries = {name: one.entry for name, one in found.items()}
     merge = with_confirmed if arguments.confirm else better if arguments.write and not arguments.folders else replaced
-    record = merge(recorded(), entries)
+    record = merge(recorded(), entries_of(found))
     failed = keep_records(found, record, arguments.confirm) if arguments.write else []
     if arguments.write:
         write_page(record)

@@ -16,12 +16,13 @@ from experiments.claims_table import (
     chapters_text,
     claims_text,
     finished_runs,
-    found_in,
+    entries_of,
     largest_rate,
     page,
     recorded,
     rows,
     stated,
+    runs_in,
 )
 from experiments.frozen_rules import CONFIRMING_SEED
 from experiments.kit import raw_records
@@ -64,6 +65,10 @@ def test_an_experiment_states_distinct_claims_without_numbers_and_one_of_chapter
 
 
 def finished(runs, name, claims, **options):
+def found_in(folders):
+    return entries_of(runs_in(folders))
+
+
     folder = new_run(runs, name, {"seeds": 10, **options})
     write(folder / "results.json", {"claims": [claim.record() for claim in claims]})
     return folder

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.claims_table import found_in, page, rows
+from experiments.claims_table import entries_of, page, rows, runs_in
 from experiments.kit.cells import load_cells
 from experiments.kit.experiment import Experiment
 from experiments.kit.run_folder import RESULTS, new_run, write
@@ -79,7 +79,7 @@ def test_every_claim_has_a_number_and_a_row_in_the_record(run: Run) -> None:
     assert run.results.get("passed") is True or run.name not in PASS
     assert run.name not in ROWS or run.results["default"].keys() == ROWS[run.name]
     write(run.folder / RESULTS, run.results)
-    record = found_in([run.folder])
+    record = entries_of(runs_in([run.folder]))
     table = {claim.text: claim for name, claim in rows(record) if name == run.name}
     assert all(table[claim["text"]].ours.startswith(claim["ours"]) for claim in claims)
     assert all(claim["text"].replace("|", "\\|") in page(record) for claim in claims)
