@@ -88,7 +88,10 @@ def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | Non
 
 
 def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
-    """Return whether the mean of the first group is above that of the second; None if the interval of the difference contains 0."""
+    """Return whether the mean of the first group is above that of the second, and False if the difference is 0 in all resamples.
+
+    None if only a part of the interval of the difference is above 0.
+    """
     return _sign(difference_interval(first, second))
 
 
@@ -127,13 +130,13 @@ def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
 
 
 def rises(change: ArrayLike) -> bool | None:
-    """Return whether the change of the runs is above 0; None if its interval contains 0."""
+    """Return whether the change of the runs is above 0; False if it is 0 in all runs, None if only a part of its interval is above 0."""
     return _sign(interval(change))
 
 
 def _sign(span: tuple[float, float]) -> bool | None:
-    """Return whether an interval (low, high) lies above 0; None if it contains 0."""
-    return True if span[0] > 0.0 else False if span[1] < 0.0 else None
+    """Return whether an interval (low, high) lies above 0; False if no part of it does, None if a part does."""
+    return True if span[0] > 0.0 else False if span[1] <= 0.0 else None
 
 
 def changes(before: Array, after: Array) -> str:

@@ -57,6 +57,11 @@ def decision_level() -> float:
     return made.level
 
 
+def level_of_each(looks: int) -> float:
+    """Return the level of each interval for a claim that holds as soon as one of `looks` comparisons does (Bonferroni)."""
+    return 1.0 - (1.0 - decision_level()) / looks
+
+
 def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lambda found: found) -> tuple[Found, float | None]:
     """Return what `decide` finds with 95 % intervals, and the smallest of RATES for its intervals at which its `key` is the same.
 

@@ -27,7 +27,7 @@ from experiments.bench.peers import load_cma
 from experiments.kit.experiment import OUR_AIM, Claim, Envelope, Experiment, Measured, judged
 from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
 from experiments.kit.rules import within
-from experiments.kit.statistics import decision_level, estimate, ratio, ratio_estimate, ratio_interval
+from experiments.kit.statistics import estimate, level_of_each, ratio, ratio_estimate, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee.arrays import Array
 
@@ -96,8 +96,7 @@ def tasks(runs: Runs) -> list[Task]:
 def _fewer(name: str, runs: Runs) -> tuple[str, bool | None]:
     """Judge whether a strategy needs fewer evaluations than CMA-ES on one task or more; each of the tasks is a look (Bonferroni)."""
     pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
-    level = 1.0 - (1.0 - decision_level()) / len(pairs)
-    spans = {task: ratio_interval(*pair, level) for task, pair in pairs.items()}
+    spans = {task: ratio_interval(*pair, level_of_each(len(pairs))) for task, pair in pairs.items()}
     found = [task for task, span in spans.items() if span[1] < 1.0]
     best = min(pairs, key=lambda task: ratio(*pairs[task]))
     text = (

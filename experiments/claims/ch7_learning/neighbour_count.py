@@ -27,7 +27,7 @@ from experiments.kit.learning.arm import arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
 from experiments.kit.plots import draw_points, finish, new_figure
 from experiments.kit.rules import all_hold, decides, is_above, of_each, texts
-from experiments.kit.statistics import difference_interval, estimate, interquartile_mean, mean_over
+from experiments.kit.statistics import difference_interval, estimate, interquartile_mean, level_of_each, mean_over
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
 from mobee import CuriousAgent, OfflinePlant, Space, TransitionModel, value_iteration
 from mobee.errors import InvalidValue
@@ -191,10 +191,12 @@ def sooner(grouped: Groups) -> Measured:
     "an impression",
 )
 def denser(grouped: Groups) -> Measured:
+    """Judge whether one of the sparser graphs is as good; each of them is a look."""
     fewer = _fewer(grouped)
     shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))
+    level = level_of_each(len(fewer) - 1)
     sparser = [
-        all_hold(decides(difference_interval(values[graph], values[PUBLISHED]), least=-MARGIN) for values in (shares, straight))
+        all_hold(decides(difference_interval(values[graph], values[PUBLISHED], level), least=-MARGIN) for values in (shares, straight))
         for graph in fewer
         if graph < PUBLISHED
     ]

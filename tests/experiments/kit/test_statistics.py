@@ -15,6 +15,7 @@ from experiments.kit.rules import (
     better,
     decides,
     equivalent,
+    is_above,
     ratio_within,
     rises,
     row,
@@ -165,6 +166,12 @@ def test_all_hold_if_none_is_open_or_fails(given, wanted):
 @pytest.mark.parametrize(("change", "expected"), [(0.5, True), (-0.5, False), (0.0, None)])
 def test_a_change_rises_where_its_interval_is_above_zero(change, expected):
     assert rises(change + np.array([-0.1, 0.1, -0.08, 0.09, 0.0, 0.01])) is expected
+
+
+@given(st.lists(st.sampled_from([0.0, 1.0]), min_size=5, max_size=12))
+def test_a_count_does_not_rise_if_all_of_its_interval_is_zero_and_equal_groups_are_not_above_each_other(counts):
+    assert (rises(counts) is False) == (interval(counts)[1] == 0.0)
+    assert rises(np.zeros(len(counts))) is False and is_above(counts, counts) is not True
 
 
 def test_a_group_stands_out_where_its_difference_from_all_others_is_decided():

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from experiments.claims.ch7_learning.neighbour_count import attempt, fewest_actions, findings, trial
+import numpy as np
+
+from experiments.claims.ch7_learning.neighbour_count import attempt, denser, fewest_actions, findings, trial
 from experiments.kit.learning.arm import HYPERCUBE, arm_plant, arm_space
 from mobee import TransitionModel
 from tests.experiments.finished_cells import Cell, finished
@@ -36,3 +38,14 @@ def test_an_attempt_that_takes_too_long_is_a_failure():
     space = arm_space(HYPERCUBE)
     found = attempt(TransitionModel(space), arm_plant(0), 0, 15, most=2)
     assert not found.reached and found.actions == 2
+
+
+def test_each_sparser_graph_is_a_look_that_makes_the_intervals_wider():
+    def runs(failures):
+        reached = [np.arange(10) >= failed for failed in (failures, *[0] * 9)]
+        return [{"budgets": [1000], "reached": [one], "actions": [np.ones(10)], "fewest": np.ones(10)} for one in reached]
+
+    published, sparser = runs(0), runs(1)
+    assert denser.rule({12: sparser, 16: published})[1] is True
+    assert denser.rule({4: sparser, 6: sparser, 8: sparser, 12: sparser, 16: published})[1] is None
+    assert denser.rule({4: runs(0), 6: sparser, 8: sparser, 12: sparser, 16: published})[1] is True
