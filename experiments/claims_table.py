@@ -60,10 +60,12 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 - That two things are equal is confirmed by an equivalence test: the whole interval of their difference lies within a stated margin.
 - A claim is one row. Where the publications leave a setting open, the row has the verdict of each setting, and its text the numbers.
 - A verdict needs {MIN_SEEDS} repetitions or more.
-- Of all verdicts by intervals, at most {100 * FALSE_DISCOVERIES:.0f} % are expected to be wrong: the rate at which a row's intervals still
-  decide is its p value, and Benjamini and Hochberg's procedure over all rows makes those open that are not distinguished from chance.
-- The thresholds are in [frozen.json](frozen.json). After they were frozen, experiments were run once more with seeds from {CONFIRMING_SEED}
-  on (`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`); the column "new seeds" has these verdicts.
+- The p value of a row is the smallest error rate of its intervals at which it has the same verdict. By Benjamini and Hochberg's procedure
+  over all rows, a row whose p value is too large is open, so that at most {100 * FALSE_DISCOVERIES:.0f} % of the verdicts by intervals are
+  expected to be wrong.
+- [frozen.json](frozen.json) has the constants of the rules, among them the thresholds. After they were frozen, some experiments were run
+  once more with seeds from {CONFIRMING_SEED} on (`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`); the column "new seeds"
+  has these verdicts.
 
 ## Terms
 
@@ -281,7 +283,7 @@ def page(record: Recorded) -> str:
         lines += ["| source | claim | published | ours | verdict | new seeds | experiment |", "| --- | --- | --- | --- | --- | --- | --- |"]
         for name, claim in chosen:
             seeds = record.get(name, {}).get("seeds")
-            runs = f"{name}, {seeds} {load_experiment(name).repeats}" if seeds and claim.ours else name
+            runs = f"{name}, {load_experiment(name).repetitions(seeds)}" if seeds and claim.ours else name
             again = confirming.get((name, claim.text))
             new = f"{again.verdict}: {again.ours}" if again is not None and again.ours else ""
             verdict = f"**{claim.verdict}**" + (f" ({claim.settings})" if claim.settings else "")

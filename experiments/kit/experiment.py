@@ -22,7 +22,7 @@ VERDICTS: Mapping[Verdict, str] = {
     "confirmed": "our numbers agree with the publication",
     "stronger": "the effect has the published direction, and is larger than published",
     "depends": "the claim holds in some of the settings that the publications leave open, and fails in others",
-    "not reproduced": "the claim fails here, but something that the publications leave open was not varied, and could explain it",
+    "not reproduced": "the claim fails here, but in one setting only, or something that the publications leave open was not varied",
     "refuted": "the claim fails in every setting that the publications leave open, and at least two were measured",
     "open": "not measured, not decided by the intervals, not distinguished from chance among all rows, or too few repetitions",
     "met": "an aim of our own that is reached",
@@ -48,6 +48,8 @@ Measured = tuple[str, Holds | Envelope]
 Rule = Callable[[Any], Measured | None]
 """Computes `Measured` from the runs of an experiment, in the form in which the experiment groups them; None: they are too few."""
 MIN_SEEDS = 5  # repetitions for a verdict: a bootstrap interval of fewer values is too narrow
+_WORDS: Mapping[Holds, str] = {True: "holds", "stronger": "stronger than published", None: "open", False: "fails"}
+_PAIR = " / "  # between the names of two settings that vary together
 
 
 def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = True) -> Verdict:
@@ -88,12 +90,6 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
         return text, first
     both = {f"{outer}{_PAIR}{name}": found for outer, envelope in inner.items() for name, found in envelope.holds.items()}
     return text, Envelope(f"{what}{_PAIR}{next(iter(inner.values())).what}", both)
-
-
-_WORDS: Mapping[Holds, str] = {True: "holds", "stronger": "stronger than published", None: "open", False: "fails"}
-
-
-_PAIR = " / "  # between the names of two settings that vary together
 
 
 def _by_setting(envelope: Envelope) -> str:
@@ -259,10 +255,14 @@ class Experiment:
     name: str = ""
     notes: str = ""
 
+    def repetitions(self, made: int | None) -> str:
+        """Return how often a run repeated its measurement, as text: "10 seeds", "1 seed", "no seeds"."""
+        return f"{made or 'no'} {self.repeats.removesuffix('s') if made == 1 else self.repeats}"
+
     def decided(self, results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
         """Return results in which all claims are open if the run repeated its measurement too rarely; the numbers are kept."""
         made = options.get(self.repeats)
         if "claims" not in results or (made is not None and made >= MIN_SEEDS):
             return dict(results)
-        why = f"{made or 'no'} {self.repeats if made != 1 else self.repeats.removesuffix('s')}, too few for a verdict"
+        why = f"{self.repetitions(made)}, too few for a verdict"
         return {**results, "claims": [Claim(**claim).undecided(why).record() for claim in results["claims"]]}

@@ -62,13 +62,14 @@ def test_there_is_no_other_verdict():
 
 
 def test_a_verdict_needs_enough_repetitions():
-    experiment = Experiment("", "", Steps(lambda parser: None, lambda arguments, folder: {}, lambda folder: folder), repeats="launches")
+    experiment = Experiment("", "", Steps(lambda parser: None, lambda arguments, folder: {}, lambda folder: folder), repeats="starts")
     results = {"claims": [CLAIM.measured("3.1", True).record()], "runs": 7}
-    few = experiment.decided(results, {"launches": MIN_SEEDS - 1})
-    assert few["claims"][0]["verdict"] == "open" and few["claims"][0]["ours"] == "3.1 (4 launches, too few for a verdict)"
-    assert experiment.decided(few, {"launches": MIN_SEEDS - 1}) == few
-    assert experiment.decided(results, {"launches": MIN_SEEDS}) == results
-    assert experiment.decided(results, {})["claims"][0]["ours"] == "3.1 (no launches, too few for a verdict)"
+    few = experiment.decided(results, {"starts": MIN_SEEDS - 1})
+    assert few["claims"][0]["verdict"] == "open" and few["claims"][0]["ours"] == "3.1 (4 starts, too few for a verdict)"
+    assert experiment.decided(few, {"starts": MIN_SEEDS - 1}) == few
+    assert experiment.decided(results, {"starts": MIN_SEEDS}) == results
+    assert [experiment.repetitions(made) for made in (1, 5, None)] == ["1 start", "5 starts", "no starts"]
+    assert experiment.decided(results, {})["claims"][0]["ours"] == "3.1 (no starts, too few for a verdict)"
 
 
 @pytest.mark.parametrize("name", [name for name in EXPERIMENTS if load_experiment(name).claims])
