@@ -200,6 +200,14 @@ def _confirms(run: Path) -> bool:
     return int(read(run / CONFIG)["options"].get("seed", 0)) >= CONFIRMING_SEED
 
 
+def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
+    """Raise InvalidValue for a run that has new seeds, or with `confirms` for one that has not."""
+    for folder in folders:
+        if _confirms(folder) != confirms:
+            said = f"seeds below {CONFIRMING_SEED}, which confirm nothing: leave --confirm out" if confirms else "new seeds: add --confirm"
+            raise InvalidValue(f"{folder} has {said}.")
+
+
 def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> list[str]:
     """Write the raw records of the runs whose numbers are in the record; `confirms`: of those with new seeds.
 

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The frozen rules: the claims of each experiment and the constants of its module, among them all thresholds, in `frozen.json`.
+"""The frozen rules: the claims of each experiment and the constants of its module, among them the thresholds, in `frozen.json`.
 
-They were chosen while the first seeds were looked at.  After they are frozen, each experiment is run once with new seeds, and judged by the
-same rules.
+They were chosen with the results of the first seeds in view.  After they are frozen, an experiment can be run once with new seeds, and is
+judged by the same rules.  From then on its rules cannot be changed by freezing them again.
 """
 
 from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from experiments.kit import rules, statistics
 from experiments.kit.experiment import MIN_SEEDS
+from experiments.kit.raw_records import record_path
+from experiments.kit.run_folder import read
 from experiments.registry import EXPERIMENTS, load_experiment
 from mobee.errors import InvalidValue
 
@@ -22,38 +25,76 @@ FROZEN = Path(__file__).with_name("frozen.json")
 CONFIRMING_SEED = 1000  # the first of the new seeds
 _ALL = "all"  # name of the constants that all experiments share
 
+Rules = dict[str, dict[str, Any]]  # "claims": published values by text; "constants": by name
 
-def rules_of(name: str) -> dict[str, Any]:
-    """Return the claims of an experiment, and the plain constants of its module, as JSON has them."""
+
+def rules_of(name: str) -> Rules:
+    """Return the claims of an experiment, and the plain constants of its module and of modules that it imports whole, as JSON has them."""
     module = importlib.import_module(EXPERIMENTS[name])
-    claims = [{"text": claim.text, "published": claim.published} for claim in load_experiment(name).claims]
-    return {"claims": claims, "constants": _plain(_constants(module))}
+    imported = [one for one in vars(module).values() if isinstance(one, ModuleType) and one.__name__.startswith("experiments.claims.")]
+    constants = {key: value for one in (*imported, module) for key, value in _constants(one).items()}
+    return {"claims": {claim.text: claim.published for claim in load_experiment(name).claims}, "constants": _plain(constants)}
 
 
-def shared_rules() -> dict[str, Any]:
+def shared_rules() -> Rules:
     """Return the constants that the rules of all experiments use."""
     return {"constants": _plain({"MIN_SEEDS": MIN_SEEDS} | _constants(statistics) | _constants(rules))}
 
 
-def freeze(names: Sequence[str]) -> None:
-    """Write the rules of those of these experiments that have claims into `frozen.json`; the others stay as they are frozen."""
-    kept = frozen() | {_ALL: shared_rules()} | {name: rules_of(name) for name in names if load_experiment(name).claims}
-    FROZEN.write_text(json.dumps(dict(sorted(kept.items())), indent=1) + "\n")
+def freeze(names: Sequence[str]) -> list[str]:
+    """Write the rules of those of these experiments that have claims into `frozen.json`; the others stay as they are frozen.
+
+    Returns the names of the experiments that have claims.  Raises InvalidValue if an experiment that has been run with new seeds would get
+    other rules.
+    """
+    before = frozen()
+    written = {name: rules_of(name) for name in names if load_experiment(name).claims}
+    kept = before | {_ALL: shared_rules()} | written
+    for name in (name for name in EXPERIMENTS if record_path(name, confirms=True).exists()):
+        if changed := [*_changed(before, _ALL, kept[_ALL]), *(_changed(before, name, kept[name]) if name in kept else [])]:
+            raise InvalidValue(
+                f"{name!r} has been run with new seeds, so its rules stay as they are frozen; changed: {', '.join(changed)}."
+            )
+    FROZEN.write_text(_text(kept))
+    return list(written)
 
 
-def frozen() -> dict[str, Any]:
-    """Return the frozen rules by experiment; empty if none are frozen."""
-    return dict(json.loads(FROZEN.read_text())) if FROZEN.exists() else {}
+def frozen() -> dict[str, Rules]:
+    """Return the frozen rules by experiment; empty if none are frozen; raises InvalidValue if the file is damaged."""
+    return read(FROZEN) if FROZEN.exists() else {}
 
 
 def require_frozen(name: str) -> None:
     """Raise InvalidValue unless the rules of an experiment are the frozen ones."""
     kept = frozen()
-    for key, found in ((_ALL, shared_rules()), (name, rules_of(name))):
-        if kept.get(key) != found:
-            raise InvalidValue(
-                f"the rules of {name!r} are not those of {FROZEN.name}: new seeds confirm only rules that were frozen before."
-            )
+    if changed := [*_changed(kept, _ALL, shared_rules()), *_changed(kept, name, rules_of(name))]:
+        raise InvalidValue(
+            f"the rules of {name!r} are not those of {FROZEN.name} (changed: {', '.join(changed)}): new seeds confirm only rules that were "
+            "frozen before."
+        )
+
+
+def _changed(kept: Mapping[str, Rules], name: str, found: Rules) -> list[str]:
+    """Return the texts of claims and the names of constants that differ from the frozen ones."""
+    if name not in kept:
+        return ["the constants of all experiments are not frozen" if name == _ALL else f"{name} is not frozen"]
+    before, after = (
+        {(key, json.dumps(value, sort_keys=True)) for its in one.values() for key, value in its.items()} for one in (kept[name], found)
+    )
+    return sorted({key for key, _ in before ^ after})
+
+
+def _text(kept: Mapping[str, Rules]) -> str:
+    """Return the rules as JSON with a line for each claim and constant, so that a difference between two versions names them."""
+
+    def block(indent: str, its: Mapping[str, str]) -> str:
+        inside = ",\n".join(f"{indent} {json.dumps(key)}: {text}" for key, text in its.items())
+        return f"{{\n{inside}\n{indent}}}"
+
+    def each(one: Rules) -> str:
+        return block(" ", {kind: block("  ", {key: json.dumps(value) for key, value in its.items()}) for kind, its in one.items()})
+
+    return block("", {name: each(kept[name]) for name in sorted(kept)}) + "\n"
 
 
 def _constants(module: Any) -> dict[str, Any]:

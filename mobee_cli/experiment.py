@@ -22,12 +22,13 @@ from experiments.claims_table import (
     keep_records,
     recorded,
     replaced,
+    require_seeds,
     rows,
     runs_in,
     with_confirmed,
     write_page,
 )
-from experiments.frozen_rules import freeze
+from experiments.frozen_rules import CONFIRMING_SEED, FROZEN, freeze
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.raw_records import opened_record
@@ -77,13 +78,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "Print the table of claims: published and measured numbers. Without RUN and --write it is the table of experiments/README.md."
     claiming = actions.add_parser("claims", help="print the table of claims", description=text)
     claiming.add_argument("folders", nargs="*", type=Path, metavar="RUN", help="folders of finished runs, to use their numbers")
-    claiming.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the runs with the most seeds")
+    doing = claiming.add_mutually_exclusive_group()
+    doing.add_argument("--write", action="store_true", help="write experiments/README.md; without RUN from the runs with the most seeds")
     text = "with --write: from runs with new seeds, which confirm those of the table; once for each experiment"
     claiming.add_argument("--confirm", action="store_true", help=text)
     text = "write the rules of experiments, by name, or of all, into experiments/frozen.json, before they are run with new seeds"
-    claiming.add_argument("--freeze", nargs="*", metavar="NAME", help=text)
+    doing.add_argument("--freeze", nargs="*", metavar="NAME", help=text)
     text = "compute all verdicts and intervals from the raw records of the repository, and compare them with the table"
-    claiming.add_argument("--check", action="store_true", help=text)
+    doing.add_argument("--check", action="store_true", help=text)
     claiming.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of these runs' folders (default: runs)")
     claiming.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -194,14 +196,13 @@ def _results(experiment: Experiment, options: argparse.Namespace, folder: Path) 
 
 
 def _claims(arguments: argparse.Namespace) -> int:
+    if arguments.confirm and not arguments.write:
+        raise InvalidValue("--confirm needs --write: it writes the numbers of new seeds into the table.")
     if arguments.check:
         return _check(arguments)
     if arguments.freeze is not None:
-        freeze([load_experiment(name).name for name in arguments.freeze or EXPERIMENTS])
-        return 0
-    if arguments.confirm and not arguments.write:
-        raise InvalidValue("--confirm needs --write: it writes the numbers of new seeds into the table.")
-    chosen = arguments.folders or (finished_runs(arguments.runs, arguments.confirm) if arguments.write else [])
+        return _freeze(arguments)
+    chosen = _runs_to_write(arguments) if arguments.write else arguments.folders
     found = runs_in(chosen)
     merge = with_confirmed if arguments.confirm else better if arguments.write and not arguments.folders else replaced
     record = merge(recorded(), entries_of(found))
@@ -218,10 +219,34 @@ def _claims(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _runs_to_write(arguments: argparse.Namespace) -> list[Path]:
+    """Return the runs that the table is written from; raises InvalidValue for --confirm without a run that has new seeds."""
+    if arguments.folders:
+        require_seeds(arguments.folders, arguments.confirm)
+        return list(arguments.folders)
+    found = finished_runs(arguments.runs, arguments.confirm)
+    if arguments.confirm and not found:
+        started = f"`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`"
+        raise InvalidValue(f"{arguments.runs} has no finished run with new seeds: start one with {started}, or name its folder.")
+    return found
+
+
+def _freeze(arguments: argparse.Namespace) -> int:
+    """Freeze the rules of the named experiments, or of all."""
+    if arguments.folders:
+        raise InvalidValue("--freeze takes names of experiments, and no RUN: rules are frozen before the experiment is run with new seeds.")
+    names = freeze([load_experiment(name).name for name in arguments.freeze or EXPERIMENTS])
+    if arguments.json:
+        print(json.dumps({"file": str(FROZEN), "frozen": names}, indent=2))
+    else:
+        print(f"{FROZEN}: the rules of {', '.join(names) or 'no experiment, because the named ones have no claims'}")
+    return 0
+
+
 def _check(arguments: argparse.Namespace) -> int:
     """Compute the table from the raw records; the command fails if a number or a verdict differs."""
-    if arguments.folders or arguments.write:
-        raise InvalidValue("--check takes no RUN and no --write: it compares the raw records of the repository with the table.")
+    if arguments.folders:
+        raise InvalidValue("--check takes no RUN: it compares the raw records of the repository with the table.")
     start, record = time.monotonic(), recorded()
     lines = all_differences(record)
     if arguments.json:

@@ -10,19 +10,20 @@ from hypothesis import strategies as st
 from scipy.stats import false_discovery_control
 
 from experiments import chapters, claims_table, frozen_rules
+from experiments.claims.ch7_learning import hypercube_exploration
 from experiments.claims_table import (
     FALSE_DISCOVERIES,
     better,
     chapters_text,
     claims_text,
-    finished_runs,
     entries_of,
+    finished_runs,
     largest_rate,
     page,
     recorded,
     rows,
-    stated,
     runs_in,
+    stated,
 )
 from experiments.frozen_rules import CONFIRMING_SEED
 from experiments.kit import raw_records
@@ -64,11 +65,11 @@ def test_an_experiment_states_distinct_claims_without_numbers_and_one_of_chapter
     assert all(claim.text and claim.source and claim.published and not claim.ours for claim in claims)
 
 
-def finished(runs, name, claims, **options):
 def found_in(folders):
     return entries_of(runs_in(folders))
 
 
+def finished(runs, name, claims, **options):
     folder = new_run(runs, name, {"seeds": 10, **options})
     write(folder / "results.json", {"claims": [claim.record() for claim in claims]})
     return folder
@@ -216,6 +217,36 @@ def test_new_seeds_confirm_frozen_rules_once_and_stand_beside_the_first(toy, tmp
     assert command("--write", *runs) == 0 and recorded()["hypercube-exploration"] == entry
     entry["confirmed"]["claims"][1] |= {"ours": "320"}
     assert any("new seeds" in line for line in claims_table.all_differences({"hypercube-exploration": entry}))
+
+
+def test_rules_that_new_seeds_have_judged_are_not_frozen_anew(toy, tmp_path, monkeypatch, capsys):
+    toy(0), toy(CONFIRMING_SEED)
+    runs = ("--runs", tmp_path / "runs")
+    assert command("--freeze", "hypercube-exploration") == 0 and capsys.readouterr().out.endswith("the rules of hypercube-exploration\n")
+    with monkeypatch.context() as changed:
+        changed.setattr(hypercube_exploration, "PUBLISHED", 330)
+        with pytest.raises(UserError, match=r"\(changed: PUBLISHED\): new seeds confirm only rules that were frozen before"):
+            command("--write", "--confirm", *runs)
+        assert command("--freeze", "hypercube-exploration") == 0
+    assert command("--freeze", "hypercube-exploration") == command("--write", *runs) == command("--write", "--confirm", *runs) == 0
+    before = frozen_rules.frozen()
+    monkeypatch.setattr(hypercube_exploration, "PUBLISHED", 330)
+    with pytest.raises(UserError, match="has been run with new seeds, so its rules stay as they are frozen; changed: PUBLISHED"):
+        command("--freeze")
+    assert frozen_rules.frozen() == before
+
+
+def test_first_and_new_seeds_are_not_mixed_up(toy, tmp_path):
+    first = toy(0)
+    with pytest.raises(UserError, match="no finished run with new seeds: start one with `mobee experiment run NAME --seed 1000"):
+        command("--write", "--confirm", "--runs", tmp_path / "runs")
+    with pytest.raises(UserError, match="leave --confirm out"):
+        command("--write", "--confirm", first)
+    with pytest.raises(UserError, match="new seeds: add --confirm"):
+        command("--write", toy(CONFIRMING_SEED))
+    with pytest.raises(UserError, match="--freeze takes names of experiments, and no RUN"):
+        command(first, "--freeze", "hypercube-exploration")
+    assert recorded() == frozen_rules.frozen() == {}
 
 
 def test_a_record_that_is_too_large_leaves_its_claims_open_and_is_named(toy, tmp_path, monkeypatch):
