@@ -5,10 +5,11 @@ import { title } from "./body.js";
 const SEND_PERIOD = 150; // ms between two goals while a slider moves
 
 export class MovePanel {
-  constructor(panel, { send, state }) {
+  constructor(panel, { send, state, press }) {
     this.panel = panel;
     this.send = send;
     this.state = state;
+    this.press = press; // (key): does what the key does
     this.part = null;
     this.sliders = [];
     this.sent = 0;
@@ -34,8 +35,8 @@ export class MovePanel {
     this.takes = button("Take over (T)", () => this.take());
     this.gives = button("Give back (G)", () => this.give());
     const reaches = button("Reach for the picked place (H)", () => (this.state.place ? this.send("reach", this.state.place) : this.send("reach", {})));
-    const fields = button("Fields (F)", () => document.dispatchEvent(new KeyboardEvent("keydown", { key: "f", bubbles: true })));
-    const resets = button("Reset (0, twice)", () => document.dispatchEvent(new KeyboardEvent("keydown", { key: "0", bubbles: true })));
+    const fields = button("Fields (F)", () => this.press("f"));
+    const resets = button("Reset (0, twice)", () => this.press("0"));
     const release = button("Release the stop (R)", () => this.send("release"));
     const explorers = this.explorers();
     this.sliders = found.motors.map((motor) => this.slider(motor));

@@ -3,7 +3,9 @@
 import { BodyPicture, title } from "./body.js";
 import { card, node, waiting } from "./cards.js";
 import { drawCurves, drawSurprise } from "./curves.js";
+import { placesLegend, viewLegend } from "./legend.js";
 import { MovePanel } from "./move.js";
+import { bannerOf, withoutAgents, wordOf } from "./status.js";
 import { View } from "./view.js";
 
 const $ = (id) => document.getElementById(id);
@@ -25,7 +27,7 @@ const picture = new BodyPicture($("body"), $("tip"), {
   },
 });
 const view = new View({ frame: $("viewer"), canvas: $("scene"), legend: $("view-legend"), note: $("loading"), button: $("other-view"), pressed: (key) => press(key) });
-const move = new MovePanel($("move"), { send, state });
+const move = new MovePanel($("move"), { send, state, press: (key) => press(key) });
 
 // ---- calls
 
@@ -172,22 +174,10 @@ function show(news) {
   for (const name of Object.keys(news)) if (name in shows && name !== "robot") shows[name](news[name]);
 }
 
-// ---- the state in words
-
-function banner() {
-  if (!state.connected) {
-    return state.robot
-      ? { level: "lost", title: "The connection is lost", text: "The system has ended, or its monitor starts again. The picture below is the last one.", todo: "Start it again: mobee launch. See the run again: mobee replay RUN." }
-      : { level: "waiting", title: "Waiting for the monitor", text: "It does not answer yet.", todo: "" };
-  }
-  if (state.past) return null;
-  return state.status.banner || null;
-}
-
-const PILLS = { waiting: ["waits", "rest"], stop: ["emergency stop", "bad"], fault: ["fault", "bad"], hold: ["hold", "rest"], paused: ["paused", "rest"], ended: ["ended", "bad"], lost: ["not connected", "bad"] };
+// ---- the state of the system
 
 function showState() {
-  const said = banner();
+  const said = bannerOf(state);
   $("banner").hidden = !said;
   if (said) {
     $("banner").className = said.level;
@@ -195,7 +185,7 @@ function showState() {
     $("banner").children[1].textContent = said.text;
     $("banner").children[2].textContent = said.todo;
   }
-  const [word, kind] = said ? PILLS[said.level] || ["", "rest"] : [state.past ? "recording" : "running", state.past ? "rest" : "running"];
+  const [word, kind] = wordOf(said, state.past);
   $("state").textContent = word;
   $("state").className = `pill ${kind}`;
   if (state.status.time !== undefined) $("clock").textContent = `${state.status.time.toFixed(0)} s`;
@@ -212,7 +202,7 @@ function showCards() {
   const silent = (state.status.agents || []).filter((name) => !known.has(name));
   const cards = state.cards.map(keptCard);
   for (const name of silent) cards.push(waiting(name, "Its agent is up. Waiting for its first decision."));
-  if (!cards.length) cards.push(waiting("No agent moves this robot", noAgent()));
+  if (!cards.length) cards.push(waiting("No agent moves this robot", withoutAgents(state)));
   $("cards").replaceChildren(...cards);
   for (const one of state.cards) {
     const { made, text, plotted } = kept.get(one.part);
@@ -234,20 +224,12 @@ function keptCard(one) {
   return kept.get(one.part).made;
 }
 
-function noAgent() {
-  if (!state.robot) return "Waiting for the robot.";
-  if (state.past) return "Nobody explored in this run.";
-  if (!state.status.services?.includes("controller")) return "Nor a controller: your own program drives it, and is seen here.";
-  if (state.status.moving?.length) return `A program moves its ${state.status.moving.join(" and ")}.`;
-  return "Click a place in the picture below, then H: a hand reaches for it. M: move a part by sliders.";
-}
-
 // Without agents there is nothing to know: the page begins with what a person can do.
 let isArranged = false;
 function arrange() {
   const agents = state.status.agents?.length || Object.keys(state.curves).length;
   $("wonders-title").textContent = agents ? "What it wonders about" : "The robot";
-  const runs = (who) => state.status.services?.includes(who);
+  const runs = (service) => state.status.services?.includes(service);
   if (isArranged || !state.robot || !(runs("controller") || runs("port_filter"))) return;
   isArranged = true;
   if (!agents && !state.past) tab(runs("controller") ? "move" : "events");
@@ -267,28 +249,8 @@ function chooseNext() {
 }
 
 function showLegend() {
-  const marks = Object.keys(picture.places).length ? [["transparent; box-shadow: 0 0 0 1.5px #fff", "where an action leads"]] : [];
-  if (state.robot?.shapes.some((one) => one.field)) marks.push(["#ff463c88", "field of the skin that is touched: it pushes the robot away"]);
-  marks.push(["#ff785a", "contact"]);
-  $("view-legend").replaceChildren(
-    ...marks.map(([color, text]) => {
-      const spot = node("i", "");
-      spot.style.cssText = `background: ${color}`;
-      return node("span", "", spot, text);
-    }),
-  );
-  const entries = Object.entries(picture.places).map(([part, where]) => {
-    const ramp = node("i", "ramp");
-    ramp.style.background = `linear-gradient(90deg, rgb(26,34,44), rgb(${colorOf(part)}))`;
-    return node("span", "", ramp, `${where.marker} in the poses of the ${title(part)}: bright = much left to learn, dark = learned`);
-  });
-  if (entries.length > 1) entries.splice(0, entries.length, ...Object.entries(picture.places).map(([part, where]) => {
-    const ramp = node("i", "ramp");
-    ramp.style.background = `linear-gradient(90deg, rgb(26,34,44), rgb(${colorOf(part)}))`;
-    return node("span", "", ramp, `${title(part)} (${where.marker})`);
-  }), node("span", "", "dark: learned, bright: much left to learn"));
-  if (entries.length) entries.push(node("span", "", "white arrow: the action, dashed: its plan"));
-  $("legend").replaceChildren(...entries);
+  $("view-legend").replaceChildren(...viewLegend(state.robot, Object.keys(picture.places).length > 0));
+  $("legend").replaceChildren(...placesLegend(picture.places, colorOf));
 }
 
 function showCurves() {

@@ -28,7 +28,7 @@ export class View {
     this.isAsked = false; // a person wants Rerun, however late
     this.late = 0; // frames
     addEventListener("message", (event) => {
-      if (frame.src && event.source === frame.contentWindow && event.origin === viewerAddress().origin) this.heard(event.data);
+      if (frame.src && event.source === frame.contentWindow && event.origin === viewerAddress().origin) this.receive(event.data);
     });
   }
 
@@ -84,7 +84,8 @@ export class View {
     this.say(why);
   }
 
-  heard({ kind, share, time, delay, text, key }) {
+  // A message of Rerun's view, which viewer.js sends.
+  receive({ kind, share, time, delay, text, key }) {
     if (kind === "key") this.pressed(key);
     if (kind === "loading") this.say(`Rerun's view loads: ${Math.round(100 * share)} %`);
     if (kind === "ready") this.say("Rerun's view draws its first picture.");

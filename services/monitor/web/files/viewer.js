@@ -23,7 +23,7 @@ function tell(message) {
   window.parent.postMessage(message, page);
 }
 
-// Rerun takes the keys when it starts or is clicked; the page must hear them, above all that of the emergency stop.
+// Rerun takes the keys when it starts or is clicked; the page must receive them, above all that of the emergency stop.
 addEventListener(
   "keydown",
   (event) => {
