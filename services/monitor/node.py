@@ -46,12 +46,12 @@ from services.monitor.viewer.learning import Learning
 from services.monitor.viewer.output import Output
 from services.monitor.viewer.plots import Plots
 from services.monitor.viewer.scene import Poses, Scene
-from services.monitor.web.body import contacts_of, look, shapes_of, thing
+from services.monitor.web.body import body_at, contacts_of, shapes_of, thing
 from services.monitor.web.record import SHOWN_EVENTS
 
 WORLD_PERIOD = 1.0  # s between two requests for the model's world
 BODY_PERIOD = 0.1  # s between two poses of the page's own picture of the body
-STORY_PERIOD = 0.25  # s between two looks at the story and the state
+STORY_PERIOD = 0.25  # s between two updates of the story and the state
 RECORD_PERIOD = 0.2  # s between two poses in the record of the page
 STOP_REPEATED = 2.0  # s after the last message of an emergency stop, which robot_sim repeats, for which it counts as set
 JPEG_QUALITY = 85
@@ -142,9 +142,9 @@ class MonitorNode:
             "monitor": self._service.instance,
         }
 
-    def _repeat(self, rate: Rate, look_: Callable[[], None]) -> None:
+    def _repeat(self, rate: Rate, show: Callable[[], None]) -> None:
         def turn() -> None:
-            look_()
+            show()
             self._service.inbox.at(rate.next(), turn)
 
         self._service.inbox.at(rate.next(), turn)
@@ -157,13 +157,13 @@ class MonitorNode:
         self._set_time()
         self._take_states()
         moved = self._body.update()
-        if self._stream.begin_look():
-            self._log_look(moved)
-        self._stream.end_look()
-        self._looks += 1
+        if self._stream.begin_update():
+            self._log_update(moved)
+        self._stream.end_update()
+        self._updates += 1
         self._time.add(1e3 * (time.perf_counter() - begin))
 
-    def _log_look(self, moved: bool) -> None:
+    def _log_update(self, moved: bool) -> None:
         if moved:
             self._scene.log_robot(self._body.q(), self._touching)
         for part, motion in self._known.motions.items():
@@ -192,8 +192,8 @@ class MonitorNode:
         server = self._output.server
         if server is not None and server.site.pages.open() and len(self._body.states) == len(self._robot.parts):
             q = self._body.q()
-            seen = look(self._robot, q, self._touching)
-            self._board.put("body", {"t": round(self._last, 3), "q": np.round(q, 4).tolist(), **seen})
+            shown = body_at(self._robot, q, self._touching)
+            self._board.put("body", {"t": round(self._last, 3), "q": np.round(q, 4).tolist(), **shown})
 
     def _record_pose(self) -> None:
         if self._output.record is not None and len(self._body.states) == len(self._robot.parts):
@@ -319,16 +319,16 @@ class MonitorNode:
         self._stream.set_time(TIMELINE, self._last)
 
     def _mark(self) -> None:
-        self._looks = self._transitions = 0
+        self._updates = self._transitions = 0
         self._time.clear()
 
     def _describe(self) -> tuple[str, dict[str, float]]:
         numbers = {
-            "looks": self._looks,
+            "updates": self._updates,
             "missed": self._rate.missed,
             "transitions": self._transitions,
-            "look_ms_p50": self._time.at(50),
-            "look_ms_p99": self._time.at(99),
+            "update_ms_p50": self._time.at(50),
+            "update_ms_p99": self._time.at(99),
         }
         server = self._output.server
         if server is not None:

@@ -20,7 +20,7 @@ from services.monitor.viewer.frames import Frames
 from services.monitor.viewer.output import HOST, NoControls, serve
 from services.monitor.viewer.scene import Scene
 from services.monitor.web.board import Board
-from services.monitor.web.body import look
+from services.monitor.web.body import body_at
 from services.monitor.web.server import Site
 from services.monitor.web.surfaces import surfaces_of
 
@@ -93,12 +93,12 @@ def _show(story: Story, player: Player, board: Board, frames: Frames, scene: Sce
     for name, value in values.items():
         if name not in NOT_SHOWN:
             board.put(name, value | camera if name == "robot" else value)
-    board.put("body", {"t": round(at, 2), "q": values["q"], **look(story.robot, q, contacts)})
+    board.put("body", {"t": round(at, 2), "q": values["q"], **body_at(story.robot, q, contacts)})
     frames.set_time(TIMELINE, clock)  # not the time of the story: a viewer shows the newest time, also after a step back
     scene.set_objects([object_of(one) for one in values.get("objects", [])])
-    frames.begin_look()
+    frames.begin_update()
     scene.log_robot(q, contacts)
-    frames.end_look()
+    frames.end_update()
 
 
 def _contact(one: Mapping[str, Any]) -> ContactItem:

@@ -45,9 +45,9 @@ def served(tmp_path: Path) -> Iterator[PageServer]:
             q = robot.home.copy()
             q[0] += np.sin(time.monotonic() - begin)
             frames.set_time(TIMELINE, time.monotonic() - begin)
-            frames.begin_look()
+            frames.begin_update()
             scene.log_robot(q, [])
-            frames.end_look()
+            frames.end_update()
 
     moving = threading.Thread(target=swing)
     moving.start()

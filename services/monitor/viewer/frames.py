@@ -13,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 LARGEST_HISTORY = 4_000_000  # bytes of changes that a new viewer gets
-RECORDED = 4  # of so many looks one is recorded, five a second: to log one takes 4 ms of a core
+RECORDED = 4  # of so many updates of the robot one is recorded, five a second: to log one takes 4 ms of a core
 WANTED_FOR = 15.0  # s after its last request for which a viewer counts as open, and changes are kept for it
 
 
@@ -44,7 +44,7 @@ class _Part:
         return self._bytes.read(flush=True) or b""
 
     def close(self) -> None:
-        """End the stream; Rerun warns of bytes that nobody has read."""
+        """End the stream; Rerun warns of bytes that were not read."""
         self.stream.disconnect()
         self._bytes.read(flush=True)
 
@@ -52,64 +52,64 @@ class _Part:
 class Frames:
     """A stream that logs to a file, if there is one, and for open viewers keeps what they need.
 
-    What is static is kept for all; changes are kept up to a size; of the looks at the robot only the newest is kept, and it is made only
-    if a viewer waits for one. The file gets every fourth look.
+    What is static is kept for all; changes are kept up to a size; of the updates of the robot's pose only the newest is kept, and it is made
+    only if a viewer waits for one. The file gets every fourth update.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
         self._file = file
-        self._static, self._changes, self._look = (_Part(recording_id) for _ in range(3))
+        self._static, self._changes, self._update = (_Part(recording_id) for _ in range(3))
         self._static.stream.send_blueprint(layout)
         self._static.is_dirty = True
         self._kept: list[tuple[int, bytes]] = []  # static pieces, by the number of the frame in which they came
         self._history: deque[tuple[int, bytes]] = deque()
         self._size = 0  # bytes of the history
-        self._newest = (0, 0.0, b"")  # number, s of robot time, the look
+        self._newest = (0, 0.0, b"")  # number, s of robot time, the update
         self._published = Condition()
         self._asked, self._waiting = -WANTED_FOR, 0
-        self._is_looking = self._is_wanted = self._is_recorded = False
-        self._looks = 0
+        self._is_in_update = self._is_wanted = self._is_recorded = False
+        self._updates = 0
         self._time = 0.0
 
     def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
         """Log to the file, and for viewers."""
-        if self._file is not None and (self._is_recorded or not self._is_looking):
+        if self._file is not None and (self._is_recorded or not self._is_in_update):
             self._file.log(path, *what, static=static)
         if static:
             self._static.log(path, *what, static=True)
-        elif not self._is_looking:
+        elif not self._is_in_update:
             if time.monotonic() - self._asked < WANTED_FOR:
                 self._changes.log(path, *what, static=False)
         elif self._is_wanted:
-            self._look.log(path, *what, static=False)
+            self._update.log(path, *what, static=False)
 
     def set_time(self, timeline: str, seconds: float) -> None:
         """Set the time of what is logged next."""
         self._time = seconds
-        for stream in (self._file, self._changes.stream, self._look.stream):
+        for stream in (self._file, self._changes.stream, self._update.stream):
             if stream is not None:
                 stream.set_time(timeline, duration=seconds)
 
     def close(self) -> None:
         """Discard what no viewer has asked for; nothing can be logged afterwards."""
-        for part in (self._static, self._changes, self._look):
+        for part in (self._static, self._changes, self._update):
             part.close()
 
-    def begin_look(self) -> bool:
-        """What is logged until `end_look` is one look at the robot, all of it; returns whether anybody needs it: a viewer, or the file."""
-        self._is_looking = True
-        self._is_recorded = self._file is not None and self._looks % RECORDED == 0
-        self._looks += 1
+    def begin_update(self) -> bool:
+        """Begin an update: what is logged until `end_update` shows the whole robot; returns whether a viewer or the file needs it."""
+        self._is_in_update = True
+        self._is_recorded = self._file is not None and self._updates % RECORDED == 0
+        self._updates += 1
         with self._published:
             self._is_wanted = self._waiting > 0
         return self._is_wanted or self._is_recorded
 
-    def end_look(self) -> None:
-        """Give the look, and all changes since the one before, to the viewers that wait."""
-        self._is_looking = False
+    def end_update(self) -> None:
+        """Give the update, and all changes since the one before, to the viewers that wait."""
+        self._is_in_update = False
         if not self._is_wanted:
             return
-        static, changes, look = self._static.take(), self._changes.take(), self._look.take()
+        static, changes, update = self._static.take(), self._changes.take(), self._update.take()
         with self._published:
             number = self._newest[0] + 1
             if static:
@@ -119,7 +119,7 @@ class Frames:
                 self._size += len(changes)
             while self._size > LARGEST_HISTORY:
                 self._size -= len(self._history.popleft()[1])
-            self._newest = (number, self._time, look)
+            self._newest = (number, self._time, update)
             self._published.notify_all()
 
     def newest(self, after: int, patience: float) -> bytes:
@@ -137,10 +137,10 @@ class Frames:
                     self._published.wait(left)
             finally:
                 self._waiting -= 1
-            number, when, look = self._newest
+            number, when, update = self._newest
             if after > number:
                 after = 0
             pieces = [piece for count, piece in (*self._kept, *self._history) if count > after]
             if number > after:
-                pieces.append(look)
+                pieces.append(update)
         return b"".join([struct.pack("<Qd", number, when), *(struct.pack("<I", len(piece)) + piece for piece in pieces)])

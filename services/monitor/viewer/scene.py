@@ -43,7 +43,7 @@ class Links:
 
 
 TRAIL = 60  # points a hand
-TRAIL_STEP = 2  # looks a point
+TRAIL_STEP = 2  # updates for each point
 TRAIL_PIECES = 8  # of fading brightness
 HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["right_arm"]}
 
@@ -56,7 +56,7 @@ class Scene:
         self._fields = [shape for shape in robot.shapes if shape.role == "field"]
         self._trails: dict[str, deque[Array]] = {name: deque(maxlen=TRAIL) for name in HANDS if name in robot.markers}
         self._objects: dict[str, ObjectState | WorldObject] = {}
-        self._looks = 0
+        self._updates = 0
         for path in ("fields/capsules", "fields/spheres", "objects", "trails"):
             stream.log(f"scene/{path}", rr.CoordinateFrame(ROOT), static=True)
         self._links = Links(stream, robot)
@@ -75,9 +75,9 @@ class Scene:
         transforms = link_transforms(self._robot, q)
         self._links.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
-        if self._looks % TRAIL_STEP == 0:
+        if self._updates % TRAIL_STEP == 0:
             self._log_trails(transforms)
-        self._looks += 1
+        self._updates += 1
 
     def set_objects(self, objects: list[ObjectState]) -> None:
         """Show the objects of the model's world and remove those that are no longer in it."""

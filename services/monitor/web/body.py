@@ -52,7 +52,7 @@ def _fewer(vertices: Array) -> Array:
     return kept
 
 
-def look(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:
+def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:
     """Return the poses of the links at q (n,) rad, rows of [R | p], and the contacts."""
     transforms = link_transforms(robot, q)
     return {

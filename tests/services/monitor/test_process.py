@@ -217,7 +217,7 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
         assert stage.play(DOWN, busy)
         stat = stage.stat("monitor")
         assert stat.numbers["transitions"] > 0
-        assert stat.numbers["looks"] <= 20 * (time.monotonic() - begin)  # 20 Hz at most
+        assert stat.numbers["updates"] <= 20 * (time.monotonic() - begin)  # 20 Hz at most
     private = {**os.environ, "XDG_CONFIG_HOME": str(tmp_path), "XDG_DATA_HOME": str(tmp_path)}
     command = [program(), "rrd", "stats", str(tmp_path / "recording.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=private)
@@ -260,9 +260,9 @@ def test_browsers_that_do_not_read_do_not_stop_the_monitor(stage: Stage, web_por
             deaf[-1].sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
         try:
             assert stage.play(DOWN, lambda: stage.k > 150, 30.0)
-            before, memory = stage.stat("monitor").numbers["looks"], psutil.Process(monitor.pid).memory_info().rss
+            before, memory = stage.stat("monitor").numbers["updates"], psutil.Process(monitor.pid).memory_info().rss
             assert stage.play(DOWN, lambda: stage.k > 550, 30.0)
-            assert stage.stat("monitor").numbers["looks"] - before > 20
+            assert stage.stat("monitor").numbers["updates"] - before > 20
             assert psutil.Process(monitor.pid).memory_info().rss - memory < 50_000_000
         finally:
             for one in deaf:
