@@ -19,6 +19,7 @@ from mobee.rendering.palette import Rgba
 from mobee.rendering.solid import Solid
 from mobee.robot.robot import Robot, Shape, ShapeKind
 from mobee.robot.urdf.hull import facets
+from services.monitor.web.surfaces import flat
 
 
 def drawn(
@@ -53,16 +54,9 @@ def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
 
 
 def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
-    """The hull of points (v, 3) with flat faces: every triangle has corners of its own."""
-    corners = facets(points)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return rr.Mesh3D(
-        vertex_positions=corners.reshape(-1, 3),
-        triangle_indices=np.arange(3 * len(corners)).reshape(-1, 3),
-        vertex_normals=np.repeat(normals, 3, axis=0),
-        albedo_factor=color,
-    )
+    """The hull of points (v, 3) with flat faces."""
+    corners, normals, triangles = flat(facets(points))
+    return rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, vertex_normals=normals, albedo_factor=color)
 
 
 def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
@@ -214,7 +208,7 @@ class Figure:
         return ["robot", self._robot.links[shape.link], f"{shape.role}s", shape.name]
 
     def _log(self, path: list[object], what: rr.AsComponents) -> None:
-        """Once and indefinitely, but for colours: those are said again, at the beginning."""
+        """Log at time 0: it is shown from the beginning, until it is logged again with another colour."""
         self._stream.set_time(TIMELINE, duration=0.0)
         self._stream.log(path, what)
 

@@ -14,10 +14,11 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.rendering.link_solids import LinkSolid, coarser, link_solids
 from mobee.rendering.palette import Color
-from mobee.robot.robot import Robot, Shape
+from mobee.rendering.solid import Solid
+from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import facets
 
-COLOR: Color = (168, 174, 184)  # of a solid; the page adds that of the part's agent
+COLOR: Color = (168, 174, 184)  # of the robot's solids; the page adds that of the part's agent
 BUDGET = 9000  # triangles of meshes
 ROUND = 20  # corners of a circle
 BLOCK = 4  # bytes to which the header is padded: the arrays that follow are read in place
@@ -45,23 +46,21 @@ def surfaces_of(robot: Robot) -> Callable[[], bytes]:
 
 
 def _surfaces(robot: Robot) -> list[Surface]:
-    """Return its solids, unless its file draws it: then that, with meshes as fine as JavaScript draws in some milliseconds."""
-    parts, drawn = list(robot.parts), link_solids(robot)
-    dressed = {one.link for one in drawn if not one.collides}
-    solids = [_surface(shape, parts) for shape in robot.shapes if shape.role == "solid" and shape.link not in dressed]
-    return solids + [_of_link_solid(one, parts) for one in coarser([one for one in drawn if not one.collides], BUDGET)]
+    """Return what is drawn of a robot, with meshes as fine as JavaScript draws in some milliseconds."""
+    parts = list(robot.parts)
+    return [_surface(one, parts) for one in coarser(link_solids(robot), BUDGET)]
 
 
-def _of_link_solid(one: LinkSolid, parts: Sequence[str]) -> Surface:
+def _surface(one: LinkSolid, parts: Sequence[str]) -> Surface:
     solid = one.solid
     if solid.mesh is not None:
         made: Made = solid.mesh.corners.astype(np.float64), solid.mesh.normals.astype(np.float64), solid.mesh.triangles.astype(np.intp)
     else:
-        assert solid.kind != "mesh"
-        made = MAKERS[solid.kind](Shape("", one.link, solid.kind, solid.size, np.zeros(3), np.eye(3), "solid", one.part))
+        made = MAKERS[solid.kind](solid)
     vertices, normals = made[0] @ solid.rotation.T + solid.position, made[1] @ solid.rotation.T
     red, green, blue = (round(255.0 * channel) for channel in solid.color)
-    return Surface(one.link, parts.index(one.part) if one.part in parts else -1, (red, green, blue), vertices, normals, made[2])
+    color = COLOR if one.collides else (red, green, blue)
+    return Surface(one.link, parts.index(one.part) if one.part in parts else -1, color, vertices, normals, made[2])
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:
@@ -82,30 +81,23 @@ def encoded(surfaces: Sequence[Surface]) -> bytes:
     return b"".join(pieces)
 
 
-def _surface(shape: Shape, parts: Sequence[str]) -> Surface:
-    made = MAKERS[shape.kind](shape)
-    vertices, normals = (made[0] @ shape.rotation.T + shape.position, made[1] @ shape.rotation.T)
-    part = parts.index(shape.part) if shape.part in parts else -1
-    return Surface(shape.link, part, COLOR, vertices, normals, made[2])
+Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame of the solid
 
 
-Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame of the shape
-
-
-def _flat(corners: Array) -> Made:
-    """Triangles (t, 3, 3) with flat faces."""
+def flat(corners: Array) -> Made:
+    """Return triangles (t, 3, 3) with flat faces: every triangle has corners of its own."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
-def _box(shape: Shape) -> Made:
-    half = 0.5 * np.array(shape.size)
-    return _flat(facets(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half))
+def _box(solid: Solid) -> Made:
+    half = 0.5 * np.array(solid.size)
+    return flat(facets(np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half))
 
 
-def _convex(shape: Shape) -> Made:
-    return _flat(facets(np.empty((0, 3)) if shape.vertices is None else shape.vertices))
+def _convex(solid: Solid) -> Made:
+    return flat(facets(np.empty((0, 3)) if solid.vertices is None else solid.vertices))
 
 
 def _turned(profile: Array, normals: Array) -> Made:
@@ -124,8 +116,8 @@ def _turned(profile: Array, normals: Array) -> Made:
     return around(profile), around(normals), triangles
 
 
-def _capsule(shape: Shape) -> Made:
-    radius, half = shape.size[0], 0.5 * shape.size[1] if shape.kind == "capsule" else 0.0
+def _capsule(solid: Solid) -> Made:
+    radius, half = solid.size[0], 0.5 * solid.size[1] if solid.kind == "capsule" else 0.0
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, ROUND // 2 + 1)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     middle = len(angles) // 2
@@ -134,13 +126,13 @@ def _capsule(shape: Shape) -> Made:
     return _turned(radius * directions + np.column_stack([np.zeros(len(lift)), lift]), directions)
 
 
-def _cylinder(shape: Shape) -> Made:
-    radius, half = shape.size[0], 0.5 * shape.size[1]
+def _cylinder(solid: Solid) -> Made:
+    radius, half = solid.size[0], 0.5 * solid.size[1]
     profile = np.array([[0.0, -half], [radius, -half], [radius, -half], [radius, half], [radius, half], [0.0, half]])
     return _turned(profile, np.array([[0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]))
 
 
-MAKERS: dict[str, Callable[[Shape], Made]] = {
+MAKERS: dict[str, Callable[[Solid], Made]] = {
     "box": _box,
     "convex": _convex,
     "sphere": _capsule,

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from mobee.arrays import Array
+from mobee.rendering.solid import Solid
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Shape, ShapeKind
+from mobee.robot.robot import ShapeKind
 from services.monitor.web.surfaces import BUDGET, MAKERS, surfaces_of
 
 SIZES: dict[ShapeKind, tuple[float, ...]] = {"sphere": (0.1,), "capsule": (0.1, 0.4), "cylinder": (0.1, 0.4), "box": (0.1, 0.2, 0.3)}
@@ -26,8 +27,7 @@ def volume(vertices: Array, triangles: Array) -> float:
 
 @pytest.mark.parametrize("kind", SIZES)
 def test_a_volume_is_closed_and_its_triangles_face_outwards(kind: ShapeKind) -> None:
-    shape = Shape("one", 0, kind, SIZES[kind], np.zeros(3), np.eye(3), "solid", "")
-    vertices, normals, triangles = MAKERS[kind](shape)
+    vertices, normals, triangles = MAKERS[kind](Solid(kind, SIZES[kind], np.zeros(3), np.eye(3), (0.5, 0.5, 0.5)))
     assert volume(vertices, triangles) == pytest.approx(VOLUMES[kind], rel=0.05)  # of twenty corners around
     assert ((vertices * normals).sum(axis=1) >= -1e-12).all()
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
