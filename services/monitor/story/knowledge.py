@@ -53,11 +53,12 @@ class Knowledge:
 
 
 def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:
-    """Return what a message tells; None if its numbers do not fit the space."""
+    """Return the knowledge in a message; None if its numbers do not fit the space."""
     shape = space.goals.shape
-    tries, reward, value = (_numbers(data, kind, shape) for data, kind in zip(_data(learned), ("<u4", "<f4", "<f4"), strict=True))
-    if tries is None or reward is None or value is None or learned.s >= shape[0]:
+    found = numbers_of(learned, shape)
+    if found is None or learned.s >= shape[0]:
         return None
+    tries, reward, value = found
     exists = space.goals != NO_ACTION
     missed, most = np.zeros(shape), np.zeros(shape)
     for one in learned.surprises:
@@ -69,10 +70,10 @@ def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:
     return Knowledge(exists, tries.astype(np.int64), finite, np.where(exists, value, -np.inf), usual, learned.n, learned.s)
 
 
-def _data(learned: Learned) -> tuple[bytes, bytes, bytes]:
-    return learned.tries, learned.reward, learned.value
-
-
-def _numbers(data: bytes, kind: str, shape: tuple[int, ...]) -> Array | None:
-    found = np.frombuffer(data, kind) if len(data) == 4 * int(np.prod(shape)) else None
-    return None if found is None else found.reshape(shape).astype(np.float64)
+def numbers_of(learned: Learned, shape: tuple[int, ...]) -> tuple[Array, Array, Array] | None:
+    """Return tries, rewards and values of a message, each of a shape (S, A); None if it has other numbers of them."""
+    columns = ((learned.tries, "<u4"), (learned.reward, "<f4"), (learned.value, "<f4"))
+    if any(len(data) != 4 * int(np.prod(shape)) for data, _ in columns):
+        return None
+    tries, reward, value = (np.frombuffer(data, kind).reshape(shape).astype(np.float64) for data, kind in columns)
+    return tries, reward, value

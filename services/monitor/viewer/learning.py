@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,13 @@ import rerun as rr
 
 from bus_schema.messages import Learned, Transition
 from mobee.arrays import Array, Ints
-from mobee.errors import MobeeError
 from mobee.learning.lattice import plane_layout
-from mobee.learning.record import space_from
 from mobee.learning.space import Space
 from mobee.rendering import palette
 from mobee.rendering.palette import Rgba
 from mobee.robot.robot import Robot
+from services.monitor.story.knowledge import numbers_of
+from services.monitor.story.places import space_of
 from services.monitor.viewer.frames import Frames
 
 CERTAIN = (92, 98, 110, 110)  # colour of an action that has always reached its goal
@@ -58,14 +57,13 @@ class Learning:
         if drawn is None:
             return
         shape = drawn.space.goals.shape
-        tries, reward, value = (
-            _numbers(data, kind, shape) for data, kind in ((learned.tries, "<u4"), (learned.reward, "<f4"), (learned.value, "<f4"))
-        )
-        if tries is None or reward is None or value is None:
+        numbers = numbers_of(learned, shape)
+        if numbers is None:
             return
+        tries, reward, value = numbers
         path, color = f"learning/{part}", self._colors[part]
-        for name, numbers in zip(QUANTITIES, (tries, reward, value), strict=True):
-            self._stream.log(f"{path}/{name}", rr.BarChart(numbers[drawn.exists].astype(np.float32), color=color))
+        for name, bars in zip(QUANTITIES, numbers, strict=True):
+            self._stream.log(f"{path}/{name}", rr.BarChart(bars[drawn.exists].astype(np.float32), color=color))
         surprising = np.zeros(shape, dtype=bool)
         found = [one for one in learned.surprises if one.s < shape[0] and one.a < shape[1] and one.s_next < shape[0]]
         for one in found:
@@ -88,12 +86,8 @@ class Learning:
     def _space(self, part: str, settings: str) -> Drawn | None:
         if self._made_from.get(part) != settings:
             self._made_from[part] = settings
-            try:
-                space = space_from(json.loads(settings), self._robot)
-            except (MobeeError, ValueError, TypeError, RecursionError):  # of another robot or version: its numbers cannot be placed
-                self._drawn[part] = None
-            else:
-                self._drawn[part] = Drawn(space, plane_layout(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
+            space = space_of(settings, self._robot)
+            self._drawn[part] = None if space is None else Drawn(space, plane_layout(space) * (1.0, -1.0), np.asarray(space.goals >= 0))
         return self._drawn[part]
 
     def _leave_out(self, part: str, learned: Learned) -> None:
@@ -128,9 +122,3 @@ class Learning:
                 origins=start + ARROW_GAP * unit, vectors=np.maximum(length - 2.0 * ARROW_GAP, 0.05) * unit, radii=radii, colors=colors
             ),
         )
-
-
-def _numbers(data: bytes, kind: str, shape: tuple[int, ...]) -> Array | None:
-    """The matrix in a message; None if it has another size."""
-    found = np.frombuffer(data, kind) if len(data) == 4 * int(np.prod(shape)) else None
-    return None if found is None else found.reshape(shape).astype(np.float64)
