@@ -14,6 +14,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
 
+from services.monitor.web.server import VIEWER_FILES
+
 TIMEOUT = 30.0  # s
 
 
@@ -47,7 +49,7 @@ class ViewerFiles:
         quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         with subprocess.Popen(command, env=private, **quiet) as serving:  # type: ignore[call-overload]  # the three streams
             try:
-                for name in ("re_viewer.js", "re_viewer_bg.wasm"):
+                for name in VIEWER_FILES:
                     _download(f"http://127.0.0.1:{web}/{name}", self._folder / name)
             finally:
                 serving.kill()
