@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor: a page on loopback that tells what the robot does, from which people can act on it; and a recording.
+"""The monitor: a page on loopback that shows what the robot does and has controls for it; and a recording.
 
 Reads: clock, {part}/state, {part}/motion, {part}/reach, model/forces, controller/forces, model/contacts, world/*,
 vision/image/{camera}, agents/*/{decision,transition,learned}, event/*, estop, alive/*/*; asks model/rpc/world/list.

@@ -231,7 +231,7 @@ class PageControls:
         if name is None:
             sphere = Geometry(kind="sphere", size=[radius])
             if TARGET in self._known.objects:
-                with suppress(CallFailed):
+                with suppress(CallFailed):  # removed already; if the model does not answer, the call below fails
                     self._call(keys.world_rpc("remove"), OneName, Done, name=TARGET)
             self._call(
                 keys.world_rpc("add"),

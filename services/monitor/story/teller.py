@@ -88,7 +88,7 @@ class Teller:
         agent = self._agent(seen.agent)
         if agent is not None:
             agent.last = seen
-            if agent.decision is not None and agent.decision.n < seen.n:  # else it is the next one, which was heard before
+            if agent.decision is not None and agent.decision.n < seen.n:  # else it is the next one, which arrived before this outcome
                 agent.decision = None
             agent.recent.append((surprise_of(seen.probability), seen.s_next == seen.goal))
             self.changed.add("cards")

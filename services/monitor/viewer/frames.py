@@ -52,8 +52,8 @@ class _Part:
 class Frames:
     """A stream that logs to a file, if there is one, and for open viewers keeps what they need.
 
-    What is static is kept for all; changes are kept up to a size; of the updates of the robot's pose only the newest is kept, and it is made
-    only if a viewer waits for one. The file gets every fourth update.
+    What is static is kept for all; changes are kept up to a size; of the updates of the robot's pose only the newest is kept, and it is
+    made only if a viewer waits for one. The file gets every fourth update.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor: what it shows, and that nobody else notices it."""
+"""The monitor: what it shows, and that it disturbs no other process."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_the_page_shows_the_parts_of_any_robot(tmp_path: Path) -> None:
 
 
 def test_the_plot_of_forces_has_all_that_are_told() -> None:
-    """Those of the law from the beginning, those from outside as soon as the controller tells them."""
+    """Those of the law from the beginning, those from outside as soon as the controller publishes them."""
     notebook = Notebook()
     plots = Plots(notebook.stream, ROBOT)
     header = {"v": VERSION, "run": "r", "src": "s", "seq": 0, "k": 1, "t": 0, "tw": 0, "re_k": 1, "part_age": {}, "touched": {}}
@@ -238,9 +238,9 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
 
 
 def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published(stage: Stage, web_port: int) -> None:
-    heard: set[str] = set()
+    published: set[str] = set()
     with stage.running("services.monitor", "monitor", "--web-port", str(web_port)) as monitor:
-        watch = stage.session.declare_subscriber("**", lambda sample: heard.add(str(sample.key_expr)))
+        watch = stage.session.declare_subscriber("**", lambda sample: published.add(str(sample.key_expr)))
         assert stage.play(DOWN, lambda: stage.k > 100)
         with urllib.request.urlopen(f"http://127.0.0.1:{web_port}/", timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()
@@ -248,7 +248,7 @@ def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published
         assert {(c.laddr.ip, c.laddr.port) for c in own} == {("127.0.0.1", web_port)}
         watch.undeclare()
     others = {Clock.stream.key(), Truth.stream.key()} | {State.stream.key(part) for part in ROBOT.parts}
-    assert heard - others <= {Event.stream.key("monitor")}
+    assert published - others <= {Event.stream.key("monitor")}
 
 
 def test_browsers_that_do_not_read_do_not_stop_the_monitor(stage: Stage, web_port: int) -> None:
@@ -288,7 +288,7 @@ def test_a_monitor_that_was_killed_is_started_again_with_the_same_address(stage:
     assert (tmp_path / "page.key").stat().st_mode & 0o077 == 0
 
 
-def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, web_port: int) -> None:
+def test_a_port_in_use_is_reported_in_one_line_with_the_remedy(free_port: int, web_port: int) -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", web_port))
         other.listen()
@@ -300,7 +300,7 @@ def test_a_port_in_use_is_told_in_one_line_with_the_remedy(free_port: int, web_p
     assert "mobee stop" in done.stderr
 
 
-def test_a_missing_run_dir_is_told(free_port: int, tmp_path: Path) -> None:
+def test_a_missing_run_dir_is_reported(free_port: int, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "services.monitor", "--endpoint", f"tcp/127.0.0.1:{free_port}", "--run-dir", str(tmp_path / "none")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2

@@ -187,11 +187,14 @@ def test_the_story_of_an_agent_from_its_messages() -> None:
     json.dumps(told)
 
 
-def test_a_decision_that_is_heard_before_the_outcome_of_the_one_before_stays() -> None:
+def test_a_decision_that_arrives_before_the_outcome_of_the_one_before_stays() -> None:
     teller = Teller(ROBOT, colors_of_all(ROBOT.parts))
     teller.note_learned(learned(TransitionModel(SPACE), n=0))
-    for heard, shown in ((transition(n=7), False), (decision(n=7), True), (transition(n=7), True), (transition(n=8), False)):
-        (teller.note_transition if isinstance(heard, Transition) else teller.note_decision)(heard)  # type: ignore[arg-type]
+    for arrived, shown in ((transition(n=7), False), (decision(n=7), True), (transition(n=7), True), (transition(n=8), False)):
+        if isinstance(arrived, Transition):
+            teller.note_transition(arrived)
+        else:
+            teller.note_decision(arrived)
         (card,) = teller.values()["cards"]
         assert ("now" in card) == shown
 
