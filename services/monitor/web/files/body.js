@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the body in parallel projection with the places of its hands; places and the ball can be pointed at.
+import { title } from "./cards.js";
+import { add, applied, cross, dot, mean, outlineOf, scaled, STILL } from "./geometry.js";
 
 const VIEWS = { oblique: [28, 24], front: [0, 4], top: [0, 89], side: [90, 6] };
 const FLAT = 15; // degrees of elevation below which things are dragged in the plane of the picture, not horizontally
@@ -73,12 +75,11 @@ export class BodyPicture {
   }
 
   link(index) {
-    return this.body.links[index] || [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+    return this.body.links[index] || STILL;
   }
 
   moved(index, p) {
-    const m = this.link(index);
-    return [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]);
+    return applied(this.link(index), p);
   }
 
   points(shape, place) {
@@ -335,13 +336,6 @@ export class BodyPicture {
   }
 }
 
-export const title = (part) => part.replaceAll("_", " ");
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-const scaled = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const mean = (numbers) => numbers.reduce((sum, one) => sum + one, 0) / (numbers.length || 1);
-
 function circle(ink, [x, y], radius) {
   ink.beginPath();
   ink.arc(x, y, radius, 0, 2 * Math.PI);
@@ -364,19 +358,3 @@ function arrow(ink, [x0, y0], [x1, y1]) {
   if (Math.hypot(x1 - x0, y1 - y0) < 6) return;
   line(ink, [[x1 - 9 * Math.cos(angle - 0.45), y1 - 9 * Math.sin(angle - 0.45)], [x1, y1], [x1 - 9 * Math.cos(angle + 0.45), y1 - 9 * Math.sin(angle + 0.45)]]);
 }
-
-// The convex hull of points in the plane (monotone chain).
-export function outlineOf(points) {
-  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  const half = (list) => {
-    const chain = [];
-    for (const p of list) {
-      while (chain.length > 1 && turn(chain[chain.length - 2], chain[chain.length - 1], p) <= 0) chain.pop();
-      chain.push(p);
-    }
-    return chain.slice(0, -1);
-  };
-  return [...half(sorted), ...half(sorted.reverse())];
-}
-
-const turn = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cards on which the story of each agent is told.
+// The cards with the story of each agent.
+
+// The name of a part for people.
+export const title = (part) => part.replaceAll("_", " ");
 
 export function node(tag, kind, ...content) {
   const made = document.createElement(tag);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The legends of the 3D view, and of the places in the picture of the body.
-import { title } from "./body.js";
-import { node } from "./cards.js";
+import { node, title } from "./cards.js";
 
 // A sample of a mark, given its style, and what the mark means.
 function entry(kind, style, text) {

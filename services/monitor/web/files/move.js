@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel with which a person takes a part over, and moves it by sliders.
-import { title } from "./body.js";
+import { title } from "./cards.js";
 
 const SEND_PERIOD = 150; // ms between two goals while a slider moves
 

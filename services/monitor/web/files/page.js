@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: asks the monitor for news, shows them, and sends what a person asks for.
-import { BodyPicture, title } from "./body.js";
-import { card, node, waiting } from "./cards.js";
+import { BodyPicture } from "./body.js";
+import { card, node, title, waiting } from "./cards.js";
 import { drawCurves, drawSurprise } from "./curves.js";
 import { placesLegend, viewLegend } from "./legend.js";
 import { MovePanel } from "./move.js";

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the robot in perspective, shaded, by a depth buffer in JavaScript: it needs no graphics card, and a frame costs milliseconds.
 
-import { outlineOf } from "./body.js";
+import { applied, cross, dot, outlineOf, radians, STILL, sub, unit } from "./geometry.js";
+import { fill, rgb, SHADES, shadesOf, surfaceOf, surfacesIn } from "./surfaces.js";
 
 const FIELD_OF_VIEW = 42; // degrees, of the smaller side
-const SHADES = 64; // of a colour
 const LIGHT = unit([-0.55, 0.8, 0.5]); // where the light comes from: to the right, up and back as the camera sees it
 const RESOLUTIONS = [0.5, 0.75, 1, 1.5, 2]; // pixels that are computed for each of the page's, along a side
 const ENOUGH = 9; // ms of a frame below which a finer picture is computed
@@ -12,7 +12,6 @@ const TOO_MUCH = 20; // ms of a frame above which a coarser one is
 const TINT = 0.4; // share of an agent's colour in that of its part
 const FILLED = 0.86; // of the picture
 const TRAIL = 60; // places of a hand
-const OBJECT_ROUND = 20; // corners of a circle
 
 export class SceneView {
   constructor(canvas) {
@@ -190,7 +189,7 @@ export class SceneView {
 
   thing(one) {
     const key = `${one.kind} ${one.size} ${one.color}`;
-    if (!this.things.has(key)) this.things.set(key, thingSurface(one));
+    if (!this.things.has(key)) this.things.set(key, surfaceOf(one));
     return this.things.get(key);
   }
 
@@ -217,12 +216,12 @@ export class SceneView {
       const m = body.links[shape.link] || STILL;
       ink.strokeStyle = ink.fillStyle = touched.has(shape.name) ? "rgba(255,70,60,0.24)" : "rgba(90,200,220,0.10)";
       if (shape.vertices) {
-        const at = (v) => this.project(apply(m, shape.position.map((p, i) => p + dot(shape.rotation[i], v))));
+        const at = (v) => this.project(applied(m, shape.position.map((p, i) => p + dot(shape.rotation[i], v))));
         polygon(ink, outlineOf(shape.vertices.map(at)));
         continue;
       }
       const half = shape.kind === "capsule" ? shape.size[1] / 2 : 0;
-      const ends = [-half, half].map((z) => this.project(apply(m, shape.position.map((p, i) => p + shape.rotation[i][2] * z))));
+      const ends = [-half, half].map((z) => this.project(applied(m, shape.position.map((p, i) => p + shape.rotation[i][2] * z))));
       ink.lineWidth = this.focal * shape.size[0] * (ends[0][2] + ends[1][2]);
       stroke(ink, [ends[0], [ends[1][0] + 0.01, ends[1][1]]]);
     }
@@ -270,38 +269,6 @@ export class SceneView {
   }
 }
 
-const STILL = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
-
-function surfacesIn(data) {
-  const length = new DataView(data).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-  let at = 4 + length;
-  const take = (kind, count) => {
-    const found = new kind(data, at, count);
-    at += 4 * count;
-    return found;
-  };
-  return header.map((one) => {
-    const vertices = take(Float32Array, 3 * one.vertices);
-    const normals = take(Float32Array, 3 * one.vertices);
-    return surface(one.link, one.part, one.color, vertices, normals, take(Uint32Array, 3 * one.triangles));
-  });
-}
-
-function surface(link, part, color, vertices, normals, triangles) {
-  return { link, part, color, vertices, normals, triangles, shades: shadesOf(color), screen: new Float32Array((4 * vertices.length) / 3) };
-}
-
-function shadesOf(color) {
-  const shades = new Uint32Array(SHADES);
-  for (let i = 0; i < SHADES; i++) {
-    const bright = i / (SHADES - 1);
-    const white = 90 * Math.max(0, bright - 0.75) ** 1.5;
-    shades[i] = rgb(...color.map((channel) => Math.min(255, channel * (0.22 + 0.95 * bright) + white)));
-  }
-  return shades;
-}
-
 // Right, up and back of a camera.
 function cameraAxes({ azimuth, elevation }) {
   const back = [Math.cos(azimuth) * Math.cos(elevation), Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation)];
@@ -309,111 +276,8 @@ function cameraAxes({ azimuth, elevation }) {
   return [right, cross(back, right), back];
 }
 
-function thingSurface({ kind, size, color }) {
-  if (kind === "box") {
-    const [vertices, normals, triangles] = [[], [], []];
-    for (let axis = 0; axis < 3; axis++) {
-      for (const side of [-1, 1]) {
-        const first = vertices.length / 3;
-        const [a, b] = side > 0 ? [(axis + 1) % 3, (axis + 2) % 3] : [(axis + 2) % 3, (axis + 1) % 3];
-        for (const [s, t] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
-          const [corner, normal] = [[0, 0, 0], [0, 0, 0]];
-          corner[axis] = (side * size[axis]) / 2;
-          corner[a] = (s * size[a]) / 2;
-          corner[b] = (t * size[b]) / 2;
-          normal[axis] = side;
-          vertices.push(...corner);
-          normals.push(...normal);
-        }
-        triangles.push(first, first + 1, first + 2, first, first + 2, first + 3);
-      }
-    }
-    return surface(0, -1, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
-  }
-  const [radius, half] = [size[0], kind === "sphere" ? 0 : size[1] / 2];
-  const flat = kind === "cylinder";
-  const profile = flat ? [[0, -1, 0, -1], [1, -1, 0, -1], [1, -1, 1, 0], [1, 1, 1, 0], [1, 1, 0, 1], [0, 1, 0, 1]] : [];
-  for (let i = 0; !flat && i <= OBJECT_ROUND / 2; i++) {
-    const angle = Math.PI * ((2 * i) / OBJECT_ROUND - 0.5);
-    profile.push([Math.cos(angle), Math.sin(angle), Math.cos(angle), Math.sin(angle)]);
-  }
-  const [vertices, normals, triangles] = [[], [], []];
-  for (let i = 0; i <= OBJECT_ROUND; i++) {
-    const [c, s] = [Math.cos((2 * Math.PI * i) / OBJECT_ROUND), Math.sin((2 * Math.PI * i) / OBJECT_ROUND)];
-    profile.forEach(([r, z, nr, nz], j) => {
-      vertices.push(radius * r * c, radius * r * s, flat ? half * z : radius * z + Math.sign(z) * half);
-      normals.push(nr * c, nr * s, nz);
-      const first = i * profile.length + j;
-      const beside = first + profile.length;
-      if (i < OBJECT_ROUND && j < profile.length - 1) triangles.push(first, beside, beside + 1, first, beside + 1, first + 1);
-    });
-  }
-  return surface(0, -1, color, Float32Array.from(vertices), Float32Array.from(normals), Uint32Array.from(triangles));
-}
-
 function pose({ rotation: r, position: p }) {
   return [...r[0], p[0], ...r[1], p[1], ...r[2], p[2]];
-}
-
-// Fill a triangle that faces the camera: rows from top to bottom, depth and shade linear in the picture.
-function fill({ pixels, depth, image: { width, height } }, screen, a, b, c, shades) {
-  if (screen[a + 2] < 0 || screen[b + 2] < 0 || screen[c + 2] < 0) return; // behind the camera
-  const [ax, ay, bx, by, cx, cy] = [screen[a], screen[a + 1], screen[b], screen[b + 1], screen[c], screen[c + 1]];
-  const area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay);
-  if (area >= 0) return; // seen from behind
-  const top = Math.max(0, Math.ceil(Math.min(ay, by, cy) - 0.5));
-  const bottom = Math.min(height - 1, Math.floor(Math.max(ay, by, cy) - 0.5));
-  if (top > bottom) return;
-  const [az, al] = [screen[a + 2], screen[a + 3]];
-  const [zb, zc, lb, lc] = [screen[b + 2] - az, screen[c + 2] - az, screen[b + 3] - al, screen[c + 3] - al];
-  const zx = (zb * (cy - ay) - zc * (by - ay)) / area;
-  const zy = (zc * (bx - ax) - zb * (cx - ax)) / area;
-  const lx = (lb * (cy - ay) - lc * (by - ay)) / area;
-  const ly = (lc * (bx - ax) - lb * (cx - ax)) / area;
-  for (let y = top; y <= bottom; y++) {
-    const row = y + 0.5;
-    let left = Infinity;
-    let right = -Infinity;
-    if (ay > row !== by > row) {
-      const x = ax + ((row - ay) * (bx - ax)) / (by - ay);
-      if (x < left) left = x;
-      if (x > right) right = x;
-    }
-    if (by > row !== cy > row) {
-      const x = bx + ((row - by) * (cx - bx)) / (cy - by);
-      if (x < left) left = x;
-      if (x > right) right = x;
-    }
-    if (cy > row !== ay > row) {
-      const x = cx + ((row - cy) * (ax - cx)) / (ay - cy);
-      if (x < left) left = x;
-      if (x > right) right = x;
-    }
-    const first = Math.max(0, Math.ceil(left - 0.5));
-    const last = Math.min(width - 1, Math.ceil(right - 0.5) - 1);
-    let z = az + zx * (first + 0.5 - ax) + zy * (row - ay);
-    let light = al + lx * (first + 0.5 - ax) + ly * (row - ay);
-    for (let x = first, at = y * width + first; x <= last; x++, at++) {
-      if (z > depth[at]) {
-        depth[at] = z;
-        pixels[at] = shades[light < 0 ? 0 : light > SHADES - 1 ? SHADES - 1 : light | 0];
-      }
-      z += zx;
-      light += lx;
-    }
-  }
-}
-
-const radians = (degrees) => (Math.PI * degrees) / 180;
-const rgb = (r, g, b) => ((255 << 24) | (Math.round(b) << 16) | (Math.round(g) << 8) | Math.round(r)) >>> 0;
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const apply = (m, p) => [0, 4, 8].map((i) => m[i] * p[0] + m[i + 1] * p[1] + m[i + 2] * p[2] + m[i + 3]);
-
-function unit(v) {
-  const length = Math.hypot(...v);
-  return v.map((one) => one / length);
 }
 
 function stroke(ink, points) {
