@@ -181,16 +181,17 @@ class PageControls:
 
     def _explore(self, given: dict[str, Any]) -> str:
         """Change the explorer of the agent of a part, or of all agents."""
-        name = str(given["explorer"])
-        agents = [f"agent_{self._part(given)}"] if given.get("part") else [who for who in self._service.alive if who.startswith("agent_")]
+        explorer = str(given["explorer"])
+        running = [name for name in self._service.alive if name.startswith("agent_")]
+        agents = [f"agent_{self._part(given)}"] if given.get("part") else running
         if not agents:
             raise Refused("no agent runs")
         for agent in agents:
             if not self._service.alive.get(agent):
                 raise Refused(f"{agent} does not run")
-            self._call(keys.service_rpc(agent, "explore"), Explore, Done, explorer=name)
+            self._call(keys.service_rpc(agent, "explore"), Explore, Done, explorer=explorer)
         whose = listed([title_of(agent.removeprefix("agent_")) for agent in sorted(agents)])
-        return f"From the next action on the {whose} explore{'s' if len(agents) == 1 else ''} {STRATEGIES.get(name, f'by {name}')}."
+        return f"From the next action on the {whose} explore{'s' if len(agents) == 1 else ''} {STRATEGIES.get(explorer, f'by {explorer}')}."
 
     # Parts
 

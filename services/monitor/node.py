@@ -225,7 +225,7 @@ class MonitorNode:
             "banner": said,
             "mode": seen.mode,
             "time": round(self._last, 1),
-            "agents": sorted(title_of(who.removeprefix("agent_")) for who in seen.services if who.startswith("agent_")),
+            "agents": sorted(title_of(name.removeprefix("agent_")) for name in seen.services if name.startswith("agent_")),
             "services": sorted(seen.services),
             "moving": [title_of(part) for part, motion in self._known.motions.items() if motion.status == "moving"],
         }

@@ -31,7 +31,7 @@ class Seen:
 
 
 def banner(seen: Seen) -> dict[str, Any] | None:
-    """Return what must be said in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
+    """Return what the page must show in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
     names = sorted(seen.services)
     if seen.ended:
         return _said(
@@ -45,9 +45,9 @@ def banner(seen: Seen) -> dict[str, Any] | None:
         return _said("waiting", "Waiting for the robot", text, "If this takes more than a minute: mobee status")
     stopped = [part for part, gate in seen.gates.items() if gate == "estop"]
     if seen.stop is not None or stopped:
-        who = f"{seen.stop.reason[:1].upper()}{seen.stop.reason[1:]}." if seen.stop is not None else "All motors are stopped."
+        why = f"{seen.stop.reason[:1].upper()}{seen.stop.reason[1:]}." if seen.stop is not None else "All motors are stopped."
         return _said(
-            "stop", "EMERGENCY STOP", who, "Release: key R, or mobee estop --reset. The controller then arms all parts, and agents go on."
+            "stop", "EMERGENCY STOP", why, "Release: key R, or mobee estop --reset. The controller then arms all parts, and agents go on."
         )
     faulty = [title_of(part) for part, gate in seen.gates.items() if gate == "fault"]
     if faulty:
@@ -65,9 +65,9 @@ def banner(seen: Seen) -> dict[str, Any] | None:
         return _said(
             "fault", "The robot does not answer", f"No tick of its clock for {seen.clock_age:.0f} s.", "mobee status shows what runs"
         )
-    for who in ("model", "controller"):
-        if who in seen.known and who not in seen.services:
-            return _said("fault", f"The {who} is gone", "The whole robot holds.", "The launcher starts it again; if not: mobee status")
+    for name in ("model", "controller"):
+        if name in seen.known and name not in seen.services:
+            return _said("fault", f"The {name} is gone", "The whole robot holds.", "The launcher starts it again; if not: mobee status")
     held = [part for part, since in seen.held_for.items() if since > HELD]
     if held:
         reasons = sorted({seen.why_held.get(part, "") for part in held} - {""})

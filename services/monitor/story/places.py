@@ -17,7 +17,7 @@ from mobee.model.kinematics import link_transforms
 from mobee.robot.robot import Robot
 from services.common.hands import moved_markers
 
-MAX_STATES = 4096  # more places could not be told apart
+MAX_STATES = 4096  # more places could not be distinguished
 
 
 def space_of(settings: str, robot: Robot) -> Space | None:

@@ -23,7 +23,7 @@ CERTAIN = (92, 98, 110, 110)  # colour of an action that has always reached its 
 MIN_WIDTH, MAX_WIDTH = 0.012, 0.06  # of arrows, in steps of the lattice
 MIN_RADIUS, MAX_RADIUS = 0.06, 0.16  # of states, in steps of the lattice
 ARROW_GAP = 0.12  # between an arrow's ends and the centres of its states
-MAX_DRAWN = 65_536  # state-actions; more could not be told apart, and drawing them would take all of the monitor's time
+MAX_DRAWN = 65_536  # state-actions; more could not be distinguished, and drawing them would take all of the monitor's time
 QUANTITIES = ("tries", "reward", "value")
 
 

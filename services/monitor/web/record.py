@@ -13,7 +13,7 @@ from typing import Any
 from mobee.errors import MobeeError
 
 STORY = "story.jsonl"  # in the folder of a run
-LEFT_OUT = ("body", "control", "events")  # the body is recorded as motor positions, events one by one; who held the controls is of no use
+LEFT_OUT = ("body", "control", "events")  # recorded in other forms: motor positions, single events; or not at all
 SHOWN_EVENTS = 60  # the newest
 SELDOM = {"curves": 10.0, "baselines": 10.0}  # s of the robot between two values that are recorded: a curve is long, and grows slowly
 FULL = 500_000_000  # bytes at which a record ends
