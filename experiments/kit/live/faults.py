@@ -201,7 +201,7 @@ class FaultInjector:
         elif kind == "arm" and (taken := self._call(keys.drive(FORGED_PART, "take"), Take, Taken, instance="i1_forged")) is not None:
             self._call(keys.drive(FORGED_PART, "arm"), WithEpoch, Driven, epoch=taken.epoch)
 
-    def _call(self, key: str, request: type[Request], reply: type[_R], **fields: object) -> _R | None:
+    def _call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R | None:
         with suppress(rpc.CallFailed):  # refused, as it should be, or robot_sim is down
             return rpc.call(self._session, "controller", key, request, reply, timeout=0.2, **fields)
         return None
