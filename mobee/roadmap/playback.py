@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,10 @@ from mobee.arrays import Array, real_array
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
 from mobee.model.contact import Contact
+from mobee.model.kinematics import tables
 from mobee.model.model import Model
 from mobee.roadmap.edges import Flags
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 
@@ -234,7 +236,7 @@ def play(
     rested = False
     while not rested and len(traces) * PERIOD < wanted.times[-1] + PATIENCE:
         traces.append(plant.run(ticks))
-        rested = bool(np.abs(traces[-1].velocity).max() < law.settle.speed)
+        rested = bool((np.abs(traces[-1].velocity) < law.settle.speed * fine_units(robot)).all())
     q, encoders = (np.concatenate([getattr(one, name) for one in traces]) for name in ("q", "encoders"))
     solid, field = (np.concatenate([getattr(one, name) for one in traces]) for name in ("solid", "field"))
     times: Array = plant.dt * np.arange(1.0, len(q) + 1.0)
@@ -289,6 +291,16 @@ def moving(robot: Robot, path: Array) -> tuple[str, ...]:
     """Return the parts that a path (K, n) moves."""
     moves = np.ptp(path, axis=0) > 0.0
     return tuple(name for name, part in robot.parts.items() if moves[part.slice].any())
+
+
+def carrying(robot: Robot, motors: Sequence[str]) -> tuple[str, ...]:
+    """Return the parts of motors, and the parts that move these parts: of the iCub's arm, the arm and the torso."""
+    moves = np.isin(robot.motors, motors) @ np.abs(tables(robot).coupling) > 0.0  # (J,)
+    above = np.zeros(len(robot.joints), dtype=bool)
+    for joint in np.flatnonzero(moves):
+        above[tables(robot).ancestry[joint + 1]] = True
+    chain = np.abs(tables(robot).coupling) @ above > 0.0  # (n,)
+    return tuple(name for name, part in robot.parts.items() if chain[part.slice].any())
 
 
 def standing(robot: Robot, q: Array) -> Robot:

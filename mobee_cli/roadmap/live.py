@@ -23,7 +23,7 @@ from mobee.errors import ActionInterrupted, MobeeError
 from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.world_object import Geometry
 from mobee.roadmap.archive import robot_digest, world_digest
-from mobee.roadmap.playback import PERIOD, Played, attractors, moving, timed, watched
+from mobee.roadmap.playback import PERIOD, Played, attractors, carrying, moving, timed, watched
 from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
@@ -59,6 +59,8 @@ def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
         trm = in_running_world(trm, running, arguments.other_world)
         plant = BusFollower(running.service, running.robot)
         running.service.ready()
+        # The path begins where the robot is: a torso that turns back after a reach is elsewhere a second later.
+        plant.come_to_rest(carrying(running.robot, trm.motors), running.gains.settle)
         found = find_path(trm, np.clip(plant.q, *running.robot.limits.T), arguments.to)
         require_free(trm, found, arguments.anyway)
         try:

@@ -10,11 +10,13 @@ from contextlib import suppress
 
 import numpy as np
 
-from bus_schema.messages import Tick
+from bus_schema.messages import Motion, Tick
 from bus_schema.rpc import Goal
 from mobee.arrays import Array
+from mobee.control.gains import Settle
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 from services.common.bus_plant import BusPlant
 from services.common.rpc import CallFailed
@@ -40,6 +42,16 @@ class BusFollower(BusPlant):
         if not self._seen:
             raise MobeeError("no tick of the robot was received: `mobee status` shows whether robot_sim runs")
         return self._seen[-1][1]
+
+    def come_to_rest(self, parts: Sequence[str], settle: Settle) -> None:
+        """Wait until these parts are commanded no more than speed and acceleration of `settle`; raises MobeeError after TAKE_TIMEOUT."""
+
+        def moving() -> list[str]:
+            return [part for part in parts if (one := self._motion.get(part)) is None or not self._rests(part, one, settle)]
+
+        self._service.spin(time.monotonic() + TAKE_TIMEOUT, lambda: not moving())
+        if moving():
+            raise MobeeError(f"{', '.join(moving())}: still moving after {TAKE_TIMEOUT:g} s; `mobee status` shows which process moves it")
 
     def take(self, parts: Sequence[str]) -> None:
         """Take the goals of parts; raises MobeeError if a part stays in hold or belongs to another service."""
@@ -121,3 +133,8 @@ class BusFollower(BusPlant):
 
     def _note_tick(self, tick: Tick) -> None:
         self._seen.append((tick.t * 1e-9, np.array(tick.q)))
+
+    def _rests(self, part: str, motion: Motion, settle: Settle) -> bool:
+        unit = fine_units(self.robot)[self.robot.part(part).slice]
+        slow, calm = np.abs(motion.dq) <= settle.speed * unit, np.abs(motion.ddq) <= settle.acceleration * unit
+        return bool((slow & calm).all())

@@ -65,7 +65,9 @@ def test_the_command_reaches_a_place_in_the_running_system(live: tuple[Launch, W
 
 
 def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], tmp_path: Path) -> None:
+    """Also just after a reach, when the torso turns back, which the reach's force had turned."""
     system, watcher = live
+    command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", system.endpoint)
     played = command("roadmap", "play", str(two_poses(tmp_path / "map.npz")), "--to", "1", "--live", "--endpoint", system.endpoint)
     print(f"remaining error {1e3 * played['remaining_error']:.1f} mm")
     assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0

@@ -6,7 +6,7 @@ import pytest
 
 import mobee
 from mobee.errors import InvalidValue
-from mobee.roadmap.playback import PERIOD, attractors, moving, play, timed
+from mobee.roadmap.playback import PERIOD, attractors, carrying, moving, play, timed
 
 MOTORS = ("torso_yaw", "r_shoulder_pitch", "r_shoulder_roll", "r_elbow")
 
@@ -64,6 +64,11 @@ def test_the_attractor_leads_and_ends_at_the_end(icub: mobee.Robot, path: np.nda
 
 def test_only_parts_that_move_are_moved(icub: mobee.Robot, path: np.ndarray) -> None:
     assert moving(icub, path) == ("torso", "right_arm")
+
+
+def test_a_part_is_carried_by_those_between_it_and_the_base(icub: mobee.Robot) -> None:
+    assert carrying(icub, ["r_elbow"]) == ("torso", "right_arm")
+    assert carrying(icub, ["torso_yaw"]) == ("torso",)
 
 
 def test_invalid_paths_are_refused(free: mobee.Model, path: np.ndarray) -> None:
