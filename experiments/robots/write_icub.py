@@ -246,9 +246,10 @@ def fields() -> list[Field]:
 
 
 def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add what is drawn of a link, relative to a point: the mesh of the URDF's link of that name, which has the same zero pose.
+    """Add the visuals of a link, with positions relative to `point`: the mesh that the URDF has for this link, or a hand's solids.
 
-    Of a hand the solids are drawn, as the fingers of the mesh are one piece with the palm and do not move.
+    The link has the same zero pose in the URDF. The URDF's mesh of a hand cannot be used: palm and fingers are one piece, so the fingers
+    would not move.
     """
     if "hand" in link:
         for shape in model["primitives"]:

@@ -12,7 +12,7 @@ from tests.system.live import running, transitions, until
 
 pytestmark = pytest.mark.system
 
-ACTIONS = 6
+ACTIONS = 4
 SEED = 4
 GAINS = "default"
 ATTEMPTS = 5
@@ -29,7 +29,7 @@ def test_live_actions_end_in_the_same_states(tmp_path: Path) -> None:
             break
     assert live is not None, f"a stall of this machine interrupted an action in each of {ATTEMPTS} attempts"
     assert live == offline()
-    assert len({row[3] for row in live}) > 4
+    assert len({row[3] for row in live}) > 2
 
 
 def on_the_bus(folder: Path) -> list[Row] | None:

@@ -61,7 +61,7 @@ Action = tuple[int, int]  # source and goal state
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every law, prior and discount; the short version tries every action once, under the first law."""
+    """Return one condition for each law, prior and discount; with --quick only for the first law, where each action is tried once."""
     least, name = (1, "quick-") if arguments.quick else (MIN_TRIES, "")
     return [
         Condition(f"{name}{number}-{initial}-g{discount:g}", {"law": law, "initial": initial, "discount": discount, "least": least})
