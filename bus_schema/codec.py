@@ -17,6 +17,10 @@ _PREFIX = "application/msgpack;icub/"
 _encoder = msgspec.msgpack.Encoder()
 
 
+UNDECODABLE = (msgspec.MsgspecError, ValueError, RecursionError)
+"""What msgspec raises for bytes that are no message: also UnicodeDecodeError, which is a ValueError, for text that is not UTF-8."""
+
+
 class Refused(Exception):
     """Raised for a message that must not be used; counters group these by `reason`: type, version, decode, length or value."""
 
@@ -51,7 +55,7 @@ def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = N
         _refuse_encoding(cls, encoding)
     try:
         message = _decoder(cls).decode(payload)
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+    except UNDECODABLE as error:
         raise Refused("decode", f"{cls.__name__}: {error}") from None
     version = getattr(message, "v", VERSION)
     if version != VERSION:

@@ -113,6 +113,14 @@ BENCHES = {
             "--shrink": _number("performances to shrink a schedule that breaks a promise (default: none)"),
         },
     ),
+    "fuzz": Bench(
+        "nearly valid messages, calls and tokens to a live system: processes that end, memory that grows",
+        quick="40 000 messages",
+        options={
+            "--messages": _number("messages, calls and tokens together (default: 1 000 000)"),
+            "--seed": _number("of what is drawn (default: 1)", int),
+        },
+    ),
     "plant": Bench(
         "the offline plant beside MuJoCo's stepper: one arm, reaching, three agents at the table, and the same hash twice",
         quick="one short round",

@@ -22,7 +22,7 @@ from bus_schema.rpc import Driven, PartMeta, Taken
 from mobee.errors import MobeeError
 from mobee_cli.replaying.differences import OF_THE_RUN, Difference, compare
 from mobee_cli.replaying.stage import PATIENCE, Stage, Stopped
-from mobee_cli.replaying.ticks import Item, TickOf
+from mobee_cli.replaying.ticks import Item, TickOf, served_of
 
 START = 30.0  # s until the service has answered tick 0
 START_PERIOD = 0.1  # s between two repetitions of tick 0, as of robot_sim
@@ -170,8 +170,8 @@ class _Replay:
         for item in items:
             if item.type != "Served":
                 continue
-            served = msgspec.msgpack.decode(item.message.payload, type=Served)
-            if served.reply_type == "Failure" or served.key.endswith(_NO_INPUT):
+            served = served_of(item.message)
+            if served is None or served.reply_type == "Failure" or served.key.endswith(_NO_INPUT):
                 continue
             request = msgspec.msgpack.decode(served.request)
             if "epoch" in request:
@@ -198,8 +198,8 @@ class _Replay:
     def _note_drives(self, tick: TickOf) -> None:
         """Keep the replies of robot_sim to the service's calls, so that it gets them again."""
         for item in tick.of("Served", "robot_sim"):
-            served = msgspec.msgpack.decode(item.message.payload, type=Served)
-            if msgspec.msgpack.decode(served.request).get("who") == self._stage.who and served.reply_type != "Failure":
+            served = served_of(item.message)
+            if served and served.reply_type != "Failure" and msgspec.msgpack.decode(served.request).get("who") == self._stage.who:
                 replies = self._drives.setdefault(served.key, deque())
                 if tick.k == 0:
                     replies.clear()  # the last try of the start is the one whose epoch holds

@@ -12,11 +12,12 @@ from typing import Any
 import msgspec
 
 from bus_schema import VERSION, encode, encoding_of, keys
-from bus_schema.messages import Clock, Message, PartStatus, Served, State, Tick
+from bus_schema.messages import Clock, Message, PartStatus, State, Tick
 from bus_schema.rpc import World
 from mobee.errors import MobeeError
 from mobee.robot.load import load_robot
 from mobee_cli.replaying.stage import Stage
+from mobee_cli.replaying.ticks import served_of
 from services.common.tap import Raw
 from services.common.worlds import object_state, world_around
 from services.recorder.reader import Recording
@@ -68,8 +69,8 @@ class Player:
             if token["who"] not in ("monitor", "router"):
                 self.stage.token(token["who"], token["instance"], token["up"])
         elif message.type == "Served":
-            served = msgspec.msgpack.decode(message.payload, type=Served)
-            if served.key == keys.world_rpc("list") and served.reply_type == World.__name__:
+            served = served_of(message)
+            if served and served.key == keys.world_rpc("list") and served.reply_type == World.__name__:
                 self._world = served.reply
         elif message.type not in _MADE:
             self.stage.send(message.key, message.encoding, message.payload)

@@ -10,6 +10,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from bus_schema import UNDECODABLE
+from bus_schema.messages import Served
 from mobee.errors import MobeeError
 from services.common.bus import NO_RUN
 from services.common.tap import Raw
@@ -49,7 +51,7 @@ class Item:
         try:
             decode = msgspec.msgpack.decode if self.type else msgspec.json.decode
             return dict(decode(self.message.payload))
-        except (msgspec.MsgspecError, TypeError, ValueError, RecursionError) as error:
+        except (*UNDECODABLE, TypeError) as error:
             raise MobeeError(f"a message on {self.key} cannot be read: {error}") from None
 
 
@@ -102,5 +104,13 @@ def _header_of(message: Raw) -> _Header:
         return _Header()
     try:
         return _header.decode(message.payload)
-    except msgspec.MsgspecError:
+    except UNDECODABLE:
         return _Header()
+
+
+def served_of(message: Raw) -> Served | None:
+    """Return the answered call in a message of this type; None if it cannot be decoded: then no service sent it."""
+    try:
+        return msgspec.msgpack.decode(message.payload, type=Served)
+    except UNDECODABLE:
+        return None

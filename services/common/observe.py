@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import zenoh
 
-from bus_schema import keys, type_of
+from bus_schema import UNDECODABLE, keys, type_of
 from bus_schema.rpc import Stat
 from services.common import rpc
 
@@ -34,7 +34,7 @@ class Received:
         """Return the message as dicts, lists and values, unchecked; raises ValueError if it is not msgpack."""
         try:
             return msgspec.msgpack.decode(self.payload)
-        except (msgspec.MsgspecError, RecursionError) as error:
+        except UNDECODABLE as error:
             raise ValueError(f"not msgpack: {error}") from None
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from bus_schema import encoding_of
-from bus_schema.messages import Camera, Clock, Contacts, Image, Message, Pose, State
+from bus_schema import UNDECODABLE, encoding_of
+from bus_schema.messages import Camera, Clock, Contacts, Count, Image, Message, Pose, State
 from bus_schema.page import streams
 from mobee.robot.robot import Robot
 from services.common.service import Service
@@ -29,6 +29,7 @@ RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, 
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
 NICENESS = 10
 ALIVE, JSON = "alive", "json"  # key and encoding of the liveliness tokens, which are no messages on the bus
+MOST_LOST = 2**53  # messages; a forged number may be any
 _MEGABYTE = 1_000_000
 
 
@@ -36,10 +37,19 @@ class _Header(Struct):
     """The sender of a message, and its number."""
 
     src: str = ""
-    seq: int = 0
+    seq: Count = 0
 
 
 _header = msgspec.msgpack.Decoder(_Header)
+
+
+def sender_of(payload: bytes) -> tuple[str, int] | None:
+    """Return the sender of a message and its number; None for a message that services refuse: it is recorded all the same."""
+    try:
+        header = _header.decode(payload)
+    except UNDECODABLE:
+        return None
+    return header.src, header.seq
 
 
 FOR_SUBSCRIBERS: tuple[type[Message], ...] = (Clock, State, Pose, Contacts, Image, Camera)
@@ -140,15 +150,15 @@ class RecorderNode:
 
     def _number_of(self, message: Raw) -> int:
         """Return the number that the sender gave to a message; count the messages between it and the last one."""
-        try:
-            header = _header.decode(message.payload)
-        except msgspec.MsgspecError:  # services refuse it; it is recorded all the same
+        sender = sender_of(message.payload)
+        if sender is None:
             return 0
-        stream = message.key, header.src
-        last, self._last[stream] = self._last.get(stream, -1), header.seq
-        if 0 <= last < header.seq - 1:
-            self._lost += header.seq - 1 - last
-        return header.seq & 0xFFFFFFFF
+        src, seq = sender
+        stream = message.key, src
+        last, self._last[stream] = self._last.get(stream, -1), seq
+        if 0 <= last < seq - 1:
+            self._lost = min(self._lost + seq - 1 - last, MOST_LOST)
+        return seq & 0xFFFFFFFF
 
     def _new_channel(self, message: Raw) -> tuple[Channel, str]:
         """Return the channel of a key and an encoding, and the type of its messages; "" if the contract has none of this encoding."""

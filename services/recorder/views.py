@@ -10,6 +10,7 @@ from functools import cache
 import msgspec
 import numpy as np
 
+from bus_schema import UNDECODABLE
 from bus_schema.messages import Tick
 from bus_schema.schemas import schemas_of
 from mobee import Model
@@ -48,7 +49,7 @@ class Views:
                 if kind == "Served":
                     content["request"], content["reply"] = _decode(content["request"]), _decode(content["reply"])
                 yield _json_channel(message.key, kind), msgspec.json.encode(content)
-        except (msgspec.MsgspecError, ValueError, TypeError, KeyError, RecursionError):
+        except (*UNDECODABLE, TypeError, KeyError):
             return  # a message that services refuse too; it is recorded as it is
 
     def _of_tick(self, tick: Tick) -> Iterator[Copy]:
