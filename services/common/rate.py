@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from array import array
 
 import numpy as np
 
@@ -32,19 +32,20 @@ class Rate:
 
 
 class Percentiles:
-    """Percentiles of the newest values of a quantity."""
+    """Percentiles of the newest values of a quantity; takes the same memory however many there were."""
 
     def __init__(self, keep: int = 20_000) -> None:
-        self._values: deque[float] = deque(maxlen=keep)
+        self._values, self._count = array("d", [0.0]) * keep, 0
 
     def add(self, value: float) -> None:
         """Add a value."""
-        self._values.append(value)
+        self._values[self._count % len(self._values)] = value
+        self._count += 1
 
     def clear(self) -> None:
         """Drop all values, at the start of a measurement."""
-        self._values.clear()
+        self._count = 0
 
     def at(self, percent: float) -> float:
         """The percentile; NOT_MEASURED if there is no value yet."""
-        return float(np.percentile(self._values, percent)) if self._values else NOT_MEASURED
+        return float(np.percentile(np.frombuffer(self._values)[: self._count], percent)) if self._count else NOT_MEASURED
