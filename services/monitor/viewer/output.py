@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -28,6 +29,7 @@ from services.monitor.web.server import Controls, PageServer, Refused, Site
 from services.monitor.web.surfaces import surfaces_of
 
 HOST = "127.0.0.1"
+BATCH = timedelta(seconds=2)  # of a recording: written one by one, updates of the robot take six times the room
 RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
 
 
@@ -81,8 +83,9 @@ def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Itera
         board = Board(record.put if record else None)
         controls = LaterControls()
         identity = f"mobee-{secrets.token_hex(4)}"
-        file = rr.RecordingStream("mobee", recording_id=identity) if folder else None
-        if file is not None and folder is not None:
+        file = None
+        if folder is not None:
+            file = rr.RecordingStream("mobee", recording_id=identity, batcher_config=_in_batches())
             sink = rr.FileSink(folder / RECORDING, write_footer=False)  # a footer would keep data of every chunk in memory until the end
             file.set_sinks(sink, default_blueprint=layout)
         frames = Frames(file, layout, identity)
@@ -102,6 +105,12 @@ def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Itera
             frames.close()
             if file is not None:
                 file.disconnect()
+
+
+def _in_batches() -> rr.ChunkBatcherConfig:
+    batches = rr.ChunkBatcherConfig()
+    batches.flush_tick = BATCH
+    return batches
 
 
 def _key_of(folder: Path | None) -> str:
