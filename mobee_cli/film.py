@@ -10,7 +10,7 @@ from pathlib import Path
 from mobee.errors import InvalidValue, MobeeError, NotInstalled
 from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT
-from services.monitor.film import film
+from services.monitor.film.film import film
 
 _NOTES = """The film takes 20 s: four stretches of the run, from its begin to its end, at
 twice the robot's speed, with the stories of up to three agents."""

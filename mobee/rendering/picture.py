@@ -11,10 +11,12 @@ from scipy.ndimage import gaussian_filter
 
 from mobee.arrays import Array
 from mobee.rendering.camera import NOTHING, Camera, Floats, Raster, framing, pixel_middles, places
+from mobee.rendering.palette import Color
 from mobee.rendering.solid import Solid
 
 Picture = NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
+WHITE: Color = (255, 255, 255)
 RAYS = 3  # a pixel, in each direction
 SKY_LIGHT, GROUND_LIGHT, LAMP_LIGHT = 0.62, 0.34, 0.50  # from above, from below, from the lamp
 SHADOW = 0.75  # share of the lamp's light that is missing in its shadow
@@ -27,11 +29,14 @@ OUTLINE, FOLD_LINE = 0.45, 0.20  # how dark outlines and folds are
 HOLLOW, HOLLOW_WIDTH, HOLLOW_DEPTH = 0.35, 0.02, 0.06  # how dark it is behind something, within that width [m], full at that depth [m]
 
 
-def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, rays: int = RAYS) -> Picture:
-    """Draw solids as a parallel camera sees them, with `rays` x `rays` rays per pixel; `floor`: height [m] where shadows fall, or None."""
+def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, rays: int = RAYS, ground: Color = WHITE) -> Picture:
+    """Draw solids as a parallel camera sees them, with `rays` x `rays` rays per pixel.
+
+    `floor`: height [m] where shadows fall, or None.  `ground`: the colour behind all solids, 8-bit red, green, blue.
+    """
     lamp = _Lamp(camera, [solid for solid in solids if solid.opacity >= 1.0 and not solid.veiled])
     seen = Raster(camera.finer(rays), [solid for solid in solids if solid.opacity >= 1.0])
-    picture = _fine(_floor(camera, lamp, floor), rays)
+    picture = _fine(_floor(camera, lamp, floor, ground), rays)
     something = np.isfinite(seen.depth)
     picture[something] = seen.color[something] * lamp.light(seen.points(), seen.normal[something])[:, None]
     picture *= 1.0 - HOLLOW * _fine(_hollows(seen, camera, rays), rays)[..., None]
@@ -92,9 +97,9 @@ def _coarse(values: Floats, times: int) -> Floats:
     return found
 
 
-def _floor(camera: Camera, lamp: _Lamp, height: float | None) -> Floats:
-    """Return a white background, with the shadow on the floor if the camera sees the floor from above."""
-    picture = np.ones((camera.height, camera.width, 3), np.float32)
+def _floor(camera: Camera, lamp: _Lamp, height: float | None, ground: Color) -> Floats:
+    """Return a background of one colour, with the shadow on the floor if the camera sees the floor from above."""
+    picture = np.tile(np.array(ground, np.float32) / np.float32(255.0), (camera.height, camera.width, 1))
     steep = float(camera.axes[2][2])
     if height is None or steep > -0.05:
         return picture

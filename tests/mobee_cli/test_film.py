@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mobee_cli.__main__ import main
-from services.monitor import film
+from services.monitor.film import film
 from services.monitor.past import Story
 from tests.mobee_cli.test_replay import recorded
 
@@ -24,9 +24,13 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = recorded(tmp_path)
     robot = {"name": "arm", "parts": [{"name": "arm", "color": [255, 0, 0]}], "shapes": []}
     last = {"outcome": "It got there.", "surprise": "Surprise 0.69 nats.", "reached": True}
-    card = {"part": "arm", "title": "arm", "now": "pan +10°. 1st try from here.", "n": 3, "tried": 0.2, "last": last}
+    card = {"part": "arm", "title": "arm", "now": "pan +10°. 1st try from here.", "n": 3, "tried": 0.2, "predictable": 0.1, "last": last}
     told: list[tuple[float, str, Any]] = [(0.0, "robot", robot), (0.0, "cards", [card])]
     told += [(0.0, "places", {"arm": {"link": 0, "marker": "tip", "points": [[-0.3, 0.0, 0.2], [-0.3, 0.1, 0.2]]}})]
+    told += [
+        (0.0, "curves", {"arm": [[0, 0.0, 0.0], [3, 0.2, 0.1]]}),
+        (0.0, "baselines", {"arm": {"random": [[0, 0.0, 0.0], [3, 0.1, 0.0]]}}),
+    ]
     told += [(0.0, "left", {"arm": {"left": [1.0, 0.1], "here": 0, "path": [1], "untried": [1, 0], "actions": [1, 1]}})]
     lines = [json.loads(line) for line in (folder / "story.jsonl").read_text().splitlines()]
     lines = [*told, *(one for one in lines if one[1] == "q")]
@@ -43,8 +47,8 @@ def test_a_film_shows_the_robot_in_motion_and_its_story(run: Path, capsys: pytes
         made.seek(7)
         last = np.asarray(made.convert("RGB")).astype(int)
     assert (np.abs(last - first)[:, : film.ROBOT_WIDTH].max(axis=2) > 60).sum() > 200  # pixels: the arm has turned
-    text = first[:120, film.ROBOT_WIDTH :].max(axis=2)
-    assert (text < 120).sum() > 200
+    text = first[:120, film.ROBOT_WIDTH :].min(axis=2)
+    assert (text > 150).sum() > 200
 
 
 def test_an_mp4_is_written_too(run: Path) -> None:
