@@ -32,6 +32,7 @@ Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
 MotionStatus = Literal["idle", "moving", "settled", "timeout", "suspended", "held"]  # suspended: in hold; the action may continue
 ReachPhase = Literal["reaching", "returning", "over", "interrupted"]
+PlaybackPhase = Literal["moving", "over", "interrupted"]
 Aim = Literal["centre", "surface"]
 Role = Literal["obstacle", "target", "ghost"]
 GeometryKind = Literal["sphere", "capsule", "cylinder", "box"]
@@ -207,6 +208,22 @@ class Reach(Message, frozen=True, kw_only=True):
     missing: float  # m, remaining distance of the marker to its goal
     settled: bool  # True: the force ended because the part had settled
     touched: list[Name]  # world objects in contact
+
+
+class Playback(Message, frozen=True, kw_only=True):
+    """State of a motion along a path of a roadmap."""
+
+    stream: ClassVar[Stream] = Stream(
+        "roadmap/playback", "NEWEST", writer="`mobee roadmap play --live`, five times a second while it moves the robot", readers="monitor"
+    )
+
+    phase: PlaybackPhase  # moving: until the robot rests; over: it rests; interrupted: a part was lost, or the command was ended
+    place: Text  # where the path leads, in the coordinates of the roadmap
+    marker: Name  # of the roadmap
+    path: Annotated[list[Vector3], Meta(max_length=200)]  # m, places of the marker in the planned motion, equal times apart
+    share: Annotated[float, Meta(ge=0, le=1)]  # of the planned motion that is over
+    duration: float  # s, of the planned motion
+    missing: float  # m, distance of the marker from the end of the path
 
 
 class Targets(Message, frozen=True, kw_only=True):

@@ -11,6 +11,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from bus_schema import keys
 from bus_schema.rpc import Config, Empty
 from bus_schema.rpc import World as WorldReply
 from mobee import Gains, Model, World
-from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, MobeeError
 from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.world_object import Geometry
@@ -30,6 +30,7 @@ from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.play import report, require_free
+from mobee_cli.roadmap.progress import Progress
 from mobee_cli.roadmap.query import find_path
 from services.common import rpc
 from services.common.bus_follow import BusFollower
@@ -58,13 +59,14 @@ def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
     with running_system(arguments.endpoint) as running:
         trm = in_running_world(trm, running, arguments.other_world)
         plant = BusFollower(running.service, running.robot)
+        progress = Progress(running.service, trm)
         running.service.ready()
         # The path begins where the robot is: a torso that turns back after a reach is elsewhere a second later.
         plant.come_to_rest(carrying(running.robot, trm.motors), running.gains.settle)
         found = find_path(trm, np.clip(plant.q, *running.robot.limits.T), arguments.to)
         require_free(trm, found, arguments.anyway)
         try:
-            played = _played(plant, running, np.array(found["poses"]), arguments.speed)
+            played = _played(plant, running, found, arguments.speed, progress)
         except ActionInterrupted as interruption:
             raise UserError(f"the motion was interrupted: {interruption}. `mobee status` shows the state of the robot.", FAILED) from None
         except KeyboardInterrupt:
@@ -72,17 +74,23 @@ def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
         except MobeeError as error:
             raise UserError(str(error), FAILED) from None
         finally:
+            progress.end()
             plant.let_go()
     return report(trm, found, played, running.gains, arguments)
 
 
-def _played(plant: BusFollower, running: Running, path: Array, speed: float) -> Played:
+def _played(plant: BusFollower, running: Running, found: dict[str, Any], speed: float, progress: Progress) -> Played:
+    path = np.array(found["poses"])
     parts = moving(running.robot, path)
     if not parts:
         raise UserError("the robot is at the goal already", BAD_INPUT)
     wanted = timed(running.robot, path, running.gains, speed)
     plant.take(parts)
-    outcomes = plant.follow(parts, list(attractors(running.robot, wanted, running.gains)), PERIOD)
+    progress.begin(np.array(found["place"]), wanted)
+    outcomes = plant.follow(
+        parts, list(attractors(running.robot, wanted, running.gains)), PERIOD, lambda share: progress.note(share, plant.q)
+    )
+    progress.rest(plant.q)
     return watched(Model(running.robot, running.world), wanted, *plant.seen(), all(one.settled for one in outcomes.values()))
 
 

@@ -23,6 +23,7 @@ from bus_schema.messages import (
     Image,
     Learned,
     Motion,
+    Playback,
     Reach,
     Transition,
     WorldObject,
@@ -40,7 +41,7 @@ from services.monitor.controls import Known, PageControls
 from services.monitor.status import STALE, Seen, banner
 from services.monitor.story.sentences import STRATEGIES
 from services.monitor.story.teller import Teller
-from services.monitor.story.words import joint_words, title_of
+from services.monitor.story.words import joint_words, slides, title_of
 from services.monitor.viewer.blueprint import TIMELINE, shown_of
 from services.monitor.viewer.learning import Learning
 from services.monitor.viewer.output import Output
@@ -111,6 +112,7 @@ class MonitorNode:
         service.on_each(Decision, self._teller.note_decision, history=True)
         service.on_each(Transition, self._show_transition)
         service.on_each(Learned, self._show_learned, history=True)
+        service.on_each(Playback, self._teller.note_playback, history=True)
         service.on_each(Event, self._show_event, history=True, any_run=True)
         service.on_each(EStop, self._note_stop, any_run=True)
 
@@ -123,7 +125,7 @@ class MonitorNode:
                 "title": title_of(name),
                 "color": list(self._colors[name]),
                 "motors": [
-                    {"name": joint_words(motor, name, robot), "low": float(low), "high": float(high)}
+                    {"name": joint_words(motor, name, robot), "low": float(low), "high": float(high), "slides": slides(motor, robot)}
                     for motor, (low, high) in zip(part.motors, robot.limits[part.slice], strict=True)
                 ],
             }
@@ -282,6 +284,8 @@ class MonitorNode:
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         self._stream.log("events", rr.TextLog(f"{who} {'is up' if up else 'is gone'}", level="INFO" if up else "WARN"))
         self._tell("info" if up else "warning", who, "is up" if up else "is gone")
+        if not up:
+            self._teller.note_gone(who)
 
     def _tell(self, level: str, who: str, text: str) -> None:
         event = {"t": round(self._last, 1), "level": level, "who": who, "text": text[:300]}

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from bus_schema import decode, keys
-from bus_schema.messages import Reach
+from bus_schema.messages import Playback, Reach
 from bus_schema.rpc import Empty, World
 from experiments.kit.live.launch import summary_of
 from mobee import Gains, Model, OfflinePlant, load_robot, load_world
@@ -68,9 +68,17 @@ def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], 
     """Also just after a reach, when the torso turns back, which the reach's force had turned."""
     system, watcher = live
     command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", system.endpoint)
+    seen: list[Playback] = []
+    subscriber = watcher.session.declare_subscriber(
+        Playback.stream.key(), lambda sample: seen.append(decode(Playback, sample.payload.to_bytes(), str(sample.encoding)))
+    )
     played = command("roadmap", "play", str(two_poses(tmp_path / "map.npz")), "--to", "1", "--live", "--endpoint", system.endpoint)
     print(f"remaining error {1e3 * played['remaining_error']:.1f} mm")
     assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
+    seen = [one for one in seen if one.src == seen[-1].src]  # of the last attempt
+    assert {one.phase for one in seen[:-1]} == {"moving"} and len(seen) > 3
+    assert seen[-1].phase == "over" and 1e3 * abs(seen[-1].missing - played["remaining_error"]) < 1.0
+    subscriber.undeclare()
     until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be released")
 
 

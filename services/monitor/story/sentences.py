@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bus_schema.messages import Decision, Reach, Transition
+from bus_schema.messages import Decision, Playback, Reach, Transition
 from mobee.arrays import Array
 from mobee.learning.beliefs import LEAST_PROBABILITY, surprise_of
 from mobee.learning.space import Space
-from services.monitor.story.words import action_words, displacement, listed, ordinal, percent
+from services.monitor.story.words import action_words, displacement, listed, ordinal, percent, title_of
 
 UNSURE = 0.05  # an outcome that is likelier than the goal by less is not expected
 STRATEGIES = {
@@ -85,3 +85,16 @@ def reach_sentence(reach: Reach) -> str:
     if reach.missing < 0.01:
         return f"Has reached {target}: {left} from it."
     return f"Reached for {target} and came to rest {left} from it."
+
+
+def playback_sentence(seen: Playback) -> str:
+    """Return the state of a motion along a path of a roadmap."""
+    marker, left = f"the {title_of(seen.marker)}", f"{1000 * seen.missing:.0f} mm"
+    where = seen.place.replace(f"{seen.marker} ", "")  # coordinates of a roadmap are named by their marker
+    if seen.phase == "interrupted":
+        return f"The motion of {marker} to {where} was interrupted, {left} from its end."
+    if seen.phase == "over":
+        return f"Moved {marker} to {where}: it rests {left} from the end of the path."
+    if seen.share >= 1.0:
+        return f"Moves {marker} to {where}: {left} to go; it comes to rest."
+    return f"Moves {marker} to {where}: {left} to go, {percent(seen.share)} of {seen.duration:.1f} s are over."

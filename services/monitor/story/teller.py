@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
-from bus_schema.messages import Decision, Learned, Reach, Transition
+from bus_schema.messages import Decision, Learned, Playback, Reach, Transition
 from mobee.arrays import Array
 from mobee.learning.beliefs import surprise_of
 from mobee.learning.space import Space
@@ -22,6 +23,7 @@ from services.monitor.story.sentences import (
     STRATEGIES,
     expects_sentence,
     outcome_sentence,
+    playback_sentence,
     reach_sentence,
     surprise_sentence,
     tries_sentence,
@@ -63,6 +65,7 @@ class Teller:
         """`colors`: of all parts."""
         self._robot, self._colors = robot, colors
         self._agents: dict[str, _Agent] = {}
+        self._playback: Playback | None = None
         self.changed: set[str] = set()
 
     @property
@@ -74,12 +77,14 @@ class Teller:
         """A new run of the robot: actions under way are void."""
         for agent in self._agents.values():
             agent.decision = agent.reach = None
-        self.changed.add("cards")
+        self._playback = None
+        self.changed |= {"cards", "path"}
 
     def note_decision(self, seen: Decision) -> None:
         """An agent begins an action."""
         agent = self._agent(seen.agent)
         if agent is not None:
+            self._drop_playback()
             agent.decision, agent.explorer = seen, seen.explorer
             self.changed |= {"cards", "left"}
 
@@ -118,14 +123,32 @@ class Teller:
         """A part reaches, or has reached."""
         agent = self._agent(part)
         if agent is not None and agent.reach != reach:
+            self._drop_playback()
             agent.reach = reach
             self.changed.add("cards")
+
+    def note_playback(self, seen: Playback) -> None:
+        """The robot moves along a path of a roadmap, or has moved."""
+        self._playback = seen
+        self.changed.add("path")
+
+    def note_gone(self, who: str) -> None:
+        """A process has ended: a motion that it has not ended itself was interrupted."""
+        seen = self._playback
+        if seen is not None and seen.src == who and seen.phase == "moving":
+            self.note_playback(replace(seen, phase="interrupted"))
 
     def values(self) -> dict[str, Any]:
         """Return the values that have changed, by name, as plain JSON data."""
         made = {name: getattr(self, f"_{name}")() for name in sorted(self.changed)}
         self.changed.clear()
         return made
+
+    def _drop_playback(self) -> None:
+        """The robot does something else: a path on which it has moved is shown no longer."""
+        if self._playback is not None and self._playback.phase != "moving":
+            self._playback = None
+            self.changed.add("path")
 
     def _agent(self, part: str) -> _Agent | None:
         if part not in self._colors:  # of another robot
@@ -203,6 +226,18 @@ class Teller:
                 "path": [] if decision is None else [decision.goal, *decision.plan],
             }
         return found
+
+    def _path(self) -> dict[str, Any]:
+        seen = self._playback
+        if seen is None:
+            return {}
+        return {
+            "marker": title_of(seen.marker),
+            "points": np.round(np.array(seen.path), 4).tolist(),
+            "share": round(seen.share, 3),
+            "phase": seen.phase,
+            "now": playback_sentence(seen),
+        }
 
     def _baselines(self) -> dict[str, Any]:
         return {part: agent.baselines for part, agent in self._agents.items() if agent.baselines}

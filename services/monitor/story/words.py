@@ -68,7 +68,7 @@ def _direction(axis: int, along: float, robot: str) -> str:
         return ICUB_AXES[axis][along < 0.0]
     if axis == 2:
         return "up" if along > 0.0 else "down"
-    return f"{'+' if along > 0.0 else '−'}{ROOT_AXES[axis]}"
+    return f"along {'+' if along > 0.0 else '−'}{ROOT_AXES[axis]}"
 
 
 def action_words(space: Space, state: int, goal: int) -> str:
@@ -81,11 +81,15 @@ def action_words(space: Space, state: int, goal: int) -> str:
     return ", ".join(named) or "stay in this pose"
 
 
+def slides(motor: str, robot: Robot) -> bool:
+    """Whether a motor moves along a line: its position is in m, not in rad."""
+    joints = robot.motor_table[robot.motor_index(motor)].joints
+    return any(robot.joints[joint].kind == "prismatic" for joint, _, _ in joints)
+
+
 def _amount(space: Space, index: int, turn: float) -> str:
-    motor = space.robot.motor_table[space.robot.motor_index(space.joints[index])]
-    slides = any(space.robot.joints[joint].kind == "prismatic" for joint, _, _ in motor.joints)
     sign = "+" if turn > 0.0 else "−"
-    return f"{sign}{1000 * abs(turn):.0f} mm" if slides else f"{sign}{np.rad2deg(abs(turn)):.0f}°"
+    return f"{sign}{1000 * abs(turn):.0f} mm" if slides(space.joints[index], space.robot) else f"{sign}{np.rad2deg(abs(turn)):.0f}°"
 
 
 def percent(share: float) -> str:

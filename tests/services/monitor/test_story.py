@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bus_schema import VERSION
-from bus_schema.messages import Decision, EStop, Learned, Reach, Transition
+from bus_schema.messages import Decision, EStop, Learned, Playback, Reach, Transition
 from mobee import Lattice, TransitionModel, load_robot
 from mobee.model.kinematics import link_transforms
 from mobee.rendering.palette import colors_of_all
@@ -22,6 +22,7 @@ from services.monitor.story.places import base_link, places, shown_spot
 from services.monitor.story.sentences import (
     expects_sentence,
     outcome_sentence,
+    playback_sentence,
     reach_sentence,
     surprise_sentence,
     tries_sentence,
@@ -65,7 +66,7 @@ def test_directions_are_those_of_the_robot_in_front_of_a_person() -> None:
     assert displacement(np.array([-0.1, 0.0, 0.08]), "icub") == "13 cm forward and up"
     assert displacement(np.array([0.0, 0.2, -0.01]), "icub") == "20 cm right"
     assert displacement(np.array([0.001, 0.002, 0.0]), "icub") == ""
-    assert displacement(np.array([-0.1, 0.0, -0.08]), "panda") == "13 cm −x and down"
+    assert displacement(np.array([-0.1, 0.0, -0.08]), "panda") == "13 cm along −x and down"
 
 
 def test_what_it_tries_is_said_by_joints_and_hand() -> None:
@@ -240,3 +241,25 @@ def test_a_scenario_without_model_and_controller_is_well() -> None:
 
 def test_nothing_is_said_when_all_is_well_also_if_a_part_holds_for_a_moment() -> None:
     assert banner(Seen(clock_age=0.0, mode="free", services=ALL, held_for={"torso": 0.2}, gates={"torso": "hold"})) is None
+
+
+def playback(**changes: Any) -> Playback:
+    fields = {"phase": "moving", "place": "right_palm x -0.3", "marker": "right_palm", "path": [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]}
+    return Playback(**(HEADER | {"src": "player"} | fields | {"share": 0.25, "duration": 4.0, "missing": 0.08} | changes))
+
+
+def test_a_motion_along_a_roadmap_is_told_until_the_robot_does_something_else() -> None:
+    assert playback_sentence(playback()) == "Moves the right palm to x -0.3: 80 mm to go, 25 % of 4.0 s are over."
+    assert playback_sentence(playback(share=1.0, missing=0.004)) == "Moves the right palm to x -0.3: 4 mm to go; it comes to rest."
+    teller = Teller(ROBOT, colors_of_all(ROBOT.parts))
+    teller.note_playback(playback())
+    told = teller.values()["path"]
+    assert (told["phase"], told["share"], told["marker"], len(told["points"])) == ("moving", 0.25, "right palm", 2)
+    teller.note_gone("someone else")
+    assert teller.values() == {}
+    teller.note_gone("player")
+    assert "was interrupted, 80 mm from its end" in teller.values()["path"]["now"]
+    teller.note_playback(playback(phase="over", share=1.0, missing=0.002))
+    assert teller.values()["path"]["now"] == "Moved the right palm to x -0.3: it rests 2 mm from the end of the path."
+    teller.note_decision(decision())
+    assert teller.values()["path"] == {}
