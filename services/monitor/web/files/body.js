@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the body in parallel projection with the places of its hands; places and the ball can be pointed at.
 import { title } from "./cards.js";
-import { add, applied, cross, dot, mean, outlineOf, scaled, STILL } from "./geometry.js";
+import { drawPath } from "./path.js";
+import { add, applied, cross, degrees, dot, mean, outlineOf, radians, scaled, STILL, sub, unit } from "./geometry.js";
 
-const VIEWS = { oblique: [28, 24], front: [0, 4], top: [0, 89], side: [90, 6] };
+const VIEWS = { front: [0, 4], top: [0, 89], side: [90, 6] }; // azimuth and elevation in degrees; oblique: that of the 3D view
 const FLAT = 15; // degrees of elevation below which things are dragged in the plane of the picture, not horizontally
 const NEAR = 13; // pixels
+const TOP = 34; // pixels above what is drawn, for the title
+const EDGE = 16; // pixels at the other sides
+const ROOM = 0.8; // share of the picture for a robot of which is not known where it will move
 const DARK = [26, 34, 44];
 
 export class BodyPicture {
-  constructor(canvas, tip, { dropped, picked, changed }) {
+  // `legend`: stands below the picture, and takes some of its height.
+  constructor(canvas, { tip, legend, dropped, picked, changed }) {
     this.canvas = canvas;
+    this.legend = legend;
     this.tip = tip;
     this.dropped = dropped; // (name, place): an object was dragged there
     this.picked = picked; // (place or null): a place was clicked
@@ -20,11 +26,12 @@ export class BodyPicture {
     this.objects = [];
     this.places = {};
     this.left = {};
+    this.path = {}; // of a roadmap
     this.chosen = null; // part whose places are shown; null: of all
     this.fields = false;
     this.place = null; // the one that was clicked
     this.dragging = null;
-    this.view = [...VIEWS.oblique];
+    this.view = [...VIEWS.front];
     this.spots = [];
     this.dirty = true;
     this.listen();
@@ -36,8 +43,13 @@ export class BodyPicture {
   }
 
   look(name) {
-    this.view = [...VIEWS[name]];
-    if (!this.isIcub() && name !== "top") this.view[0] += 180;
+    if (name === "oblique") {
+      const [dx, dy, dz] = unit(sub(this.robot.eye, this.robot.target));
+      this.view = [180 - degrees(Math.atan2(dy, dx)), degrees(Math.asin(dz))];
+    } else {
+      this.view = [...VIEWS[name]];
+      if (!this.isIcub() && name !== "top") this.view[0] += 180;
+    }
     this.refit();
   }
 
@@ -53,7 +65,7 @@ export class BodyPicture {
 
   // Right, up and ahead of the camera, as in mobee.rendering.camera.
   axes() {
-    const [a, e] = this.view.map((degrees) => (degrees * Math.PI) / 180);
+    const [a, e] = this.view.map(radians);
     const ahead = [Math.cos(a) * Math.cos(e), -Math.sin(a) * Math.cos(e), -Math.sin(e)];
     const right = [-Math.sin(a), -Math.cos(a), 0];
     return [right, cross(right, ahead), ahead];
@@ -101,20 +113,23 @@ export class BodyPicture {
     for (const shape of this.robot.shapes) if (!shape.field) seen.push(...this.points(shape, (p) => this.moved(shape.link, p)));
     for (const where of Object.values(this.places)) seen.push(...where.points.map((p) => this.moved(where.link, p)));
     for (const thing of this.objects) if (thing.role === "target") seen.push(thing.position);
+    seen.push(...(this.path.points || []));
     return seen.length ? seen : [[0, 0, 0], [0, 0, 0.3]];
   }
 
   // Fit what is drawn into the canvas; kept until the view or the size changes, so that the picture does not swim.
   fit(width, height) {
-    const key = `${width} ${height} ${this.view} ${this.robot.name} ${Object.keys(this.places)}`;
+    const key = `${width} ${height} ${this.legend.clientHeight} ${this.view} ${this.robot.name} ${Object.keys(this.places)} ${this.path.points?.at(-1) || ""}`;
     if (this.frame && this.frame.key === key) return;
     this.camera = this.axes();
     const seen = this.extent();
     const us = seen.map((p) => dot(p, this.camera[0]));
     const vs = seen.map((p) => dot(p, this.camera[1]));
     const [u0, u1, v0, v1] = [Math.min(...us), Math.max(...us), Math.min(...vs), Math.max(...vs)];
-    const scale = Math.min((width - 30) / (u1 - u0 + 0.1), (height - 62) / (v1 - v0 + 0.1));
-    this.frame = { key, scale, x: width / 2 - (scale * (u0 + u1)) / 2, y: (height - 4) / 2 + 4 + (scale * (v0 + v1)) / 2 };
+    const bottom = height - this.legend.clientHeight - EDGE;
+    const share = Object.keys(this.places).length ? 1 : ROOM; // places show where the robot will move
+    const scale = share * Math.min((width - 2 * EDGE) / (u1 - u0), (bottom - TOP) / (v1 - v0));
+    this.frame = { key, scale, x: width / 2 - (scale * (u0 + u1)) / 2, y: (TOP + bottom) / 2 + (scale * (v0 + v1)) / 2 };
   }
 
   draw() {
@@ -152,6 +167,7 @@ export class BodyPicture {
     for (const one of volumes) this.volume(ink, one, one.color || this.solid(one.shape, (far - one.depth) / (far - near || 1)));
     this.spots = [];
     for (const [part, where] of Object.entries(this.places)) if (!this.chosen || this.chosen === part) this.drawPlaces(ink, part, where);
+    if (this.path.points) drawPath(ink, this.path.points.map((p) => this.project(p)), this.path.share, 1);
     this.drawPicked(ink);
     const box = this.canvas.getBoundingClientRect();
     const targets = this.objects.filter((thing) => thing.role === "target");
@@ -162,7 +178,7 @@ export class BodyPicture {
   solid(shape, nearness) {
     const part = this.robot.parts[shape.part];
     const base = part && (part.name in this.places || !Object.keys(this.places).length) ? part.color : [150, 160, 176];
-    const light = 0.34 + 0.26 * nearness;
+    const light = 0.42 + 0.34 * nearness;
     const [r, g, b] = base.map((channel) => Math.round(light * (0.35 * channel + 0.65 * 170)));
     return `rgb(${r},${g},${b})`;
   }

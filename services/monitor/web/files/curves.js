@@ -2,9 +2,13 @@
 // The curves of what each agent knows beside what other explorers would, and the small plot of surprise on each card.
 
 const MARGIN = { left: 40, right: 10, top: 22, bottom: 30 };
+const GROUND = "#161c23"; // --panel of page.css
 const LEGEND = 20; // pixels
+const LEAST = 0.01; // share at the top of an axis, at least
+const ROW = 12; // pixels between two numbers
 const WIDE = 600; // pixels: the legend is written out
 const NARROW = 180; // pixels of a plot, with room for its title only
+const NICE = [1.2, 1.6, 2, 2.4, 3.2, 4, 4.8, 6, 8, 12]; // ends of an axis, times a power of ten: with whole quarters from 8 on
 const OTHERS = {
   least_tried: ["least tried", "tried, if least tried first", "#b9c4cf", []],
   random: ["random", "tried, if at random", "#7c8a99", [2, 3]],
@@ -65,7 +69,7 @@ function drawPlot(ink, width, height, curve, others, color, title) {
   const newest = curve.at(-1)[0];
   const most = nice(Math.max(8, newest));
   const ends = [curve.at(-1)[1], ...Object.values(others).map((points) => points.at(-1)[1])];
-  const top = Math.min(1, nice(100 * Math.max(0.05, ...ends)) / 100);
+  const top = Math.min(1, nice(100 * Math.max(LEAST, ...ends)) / 100);
   const x = (n) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * n) / most;
   const y = (share) => height - MARGIN.bottom - ((height - MARGIN.top - MARGIN.bottom) * share) / top;
   ink.strokeStyle = "#262f3a";
@@ -80,8 +84,8 @@ function drawPlot(ink, width, height, curve, others, color, title) {
   }
   for (let step = 0; step <= steps; step++) {
     const n = (most * step) / steps;
-    ink.textAlign = step === steps ? "right" : "center";
-    ink.fillText(`${Math.round(n)}`, x(n) + (step === steps ? 6 : 0), height - MARGIN.bottom + 13);
+    ink.textAlign = step === steps ? "right" : step ? "center" : "left";
+    ink.fillText(`${Math.round(n)}`, x(n), height - MARGIN.bottom + 13);
   }
   ink.textAlign = "center";
   ink.fillText("transitions", (MARGIN.left + width - MARGIN.right) / 2, height - 4);
@@ -102,12 +106,14 @@ function drawPlot(ink, width, height, curve, others, color, title) {
     ink.lineWidth = thick;
     const points = curve.map((point) => [x(point[0]), y(Math.min(top, point[column]))]);
     line(ink, points);
-    dot(ink, points.at(-1), `rgb(${color})`);
+    const end = points.at(-1);
+    dot(ink, end, `rgb(${color})`, dash.length > 0);
   }
   ink.restore();
   ink.setLineDash([]);
-  ink.textAlign = "left";
   ink.fillStyle = `rgb(${color})`;
+  writeEnds(ink, x(newest), curve.at(-1).slice(1, 3), y, { right: width - MARGIN.right, top: y(top) + 10 });
+  ink.textAlign = "left";
   ink.fillText(title, MARGIN.left, 13);
   const gain = newest > 20 && others.random?.length ? others.random.at(-1)[1] : 0;
   if (gain > 0 && width > NARROW) {
@@ -117,10 +123,22 @@ function drawPlot(ink, width, height, curve, others, color, title) {
   }
 }
 
+// Write the shares, tried and predictable, beside the ends of their lines at a pixel column; `y`: the row of a share.
+function writeEnds(ink, column, shares, y, { right, top }) {
+  const texts = shares.map((share) => `${share > 0 && share < 0.1 ? (100 * share).toFixed(1) : Math.round(100 * share)} %`);
+  const isRight = column + 8 + ink.measureText(texts[0]).width < right;
+  ink.textAlign = isRight ? "left" : "right";
+  const lower = Math.min(y(0) - 3, Math.max(top + ROW, y(shares[1]) + 4));
+  const upper = Math.min(lower - ROW, Math.max(top, y(shares[0]) + 4));
+  [upper, lower].forEach((row, i) => ink.fillText(texts[i], column + (isRight ? 7 : -7), row));
+}
+
 export function drawSurprise(canvas, recent, hue) {
   const { ink, width, height } = sharpened(canvas);
   const most = Math.max(1, ...recent.map(([surprise]) => surprise));
   const step = width / 60;
+  ink.fillStyle = "#262f3a";
+  ink.fillRect(0, height - 1, width, 1);
   recent.forEach(([surprise, reached], i) => {
     ink.fillStyle = reached ? `rgba(${hue},0.75)` : "#ffca61";
     const tall = Math.max(1.5, ((height - 2) * surprise) / most);
@@ -134,14 +152,18 @@ function line(ink, points) {
   ink.stroke();
 }
 
-function dot(ink, [a, b], color) {
-  ink.fillStyle = color;
+function dot(ink, [a, b], color, isHollow) {
   ink.beginPath();
   ink.arc(a, b, 3, 0, 7);
+  ink.fillStyle = isHollow ? GROUND : color;
   ink.fill();
+  if (!isHollow) return;
+  ink.setLineDash([]);
+  ink.strokeStyle = color;
+  ink.stroke();
 }
 
 function nice(number) {
   const power = 10 ** Math.floor(Math.log10(number));
-  return [1.2, 2, 4, 8, 12].map((one) => one * power).find((one) => one >= number);
+  return NICE.map((one) => one * power).find((one) => one >= number);
 }

@@ -2,7 +2,8 @@
 // Vectors [x, y, z]; poses, rows of [R | p] as one list of 12 numbers; hulls in the plane.
 
 export const STILL = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]; // the pose of what stands in the root frame
-export const radians = (degrees) => (Math.PI * degrees) / 180;
+export const radians = (angle) => (Math.PI * angle) / 180;
+export const degrees = (angle) => (180 * angle) / Math.PI;
 export const mean = (numbers) => numbers.reduce((sum, one) => sum + one, 0) / (numbers.length || 1);
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];

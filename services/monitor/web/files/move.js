@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel with which a person takes a part over, and moves it by sliders.
 import { title } from "./cards.js";
+import { degrees } from "./geometry.js";
 
 const SEND_PERIOD = 150; // ms between two goals while a slider moves
 
@@ -67,11 +68,11 @@ export class MovePanel {
     name.textContent = motor.name;
     Object.assign(input, { type: "range", min: motor.low, max: motor.high, step: (motor.high - motor.low) / 200 });
     input.addEventListener("input", () => {
-      output.textContent = degrees(input.value);
+      output.textContent = amount(input.value, motor.slides);
       this.moved();
     });
     label.append(name, input, output);
-    return { label, input, output };
+    return { label, input, output, slides: motor.slides };
   }
 
   moved() {
@@ -104,7 +105,7 @@ export class MovePanel {
     this.wasTaken = this.isTaken(); // once more, so that they begin where the part is
     this.sliders.forEach((one, i) => {
       one.input.value = q[this.start[this.part] + i];
-      one.output.textContent = degrees(one.input.value);
+      one.output.textContent = amount(one.input.value, one.slides);
     });
   }
 
@@ -127,7 +128,8 @@ export class MovePanel {
   }
 }
 
-const degrees = (rad) => `${Math.round((180 * rad) / Math.PI)}°`;
+// A position of a motor: in m if it slides, else in rad.
+const amount = (position, slides) => (slides ? `${Math.round(1000 * position)} mm` : `${Math.round(degrees(position))}°`);
 
 function row(...content) {
   const made = document.createElement("div");

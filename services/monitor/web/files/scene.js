@@ -2,6 +2,7 @@
 // Draws the robot in perspective, shaded, by a depth buffer in JavaScript: it needs no graphics card, and a frame costs milliseconds.
 
 import { applied, cross, dot, outlineOf, radians, STILL, sub, unit } from "./geometry.js";
+import { drawPath } from "./path.js";
 import { fill, rgb, SHADES, shadesOf, surfaceOf, surfacesIn } from "./surfaces.js";
 
 const FIELD_OF_VIEW = 42; // degrees, of the smaller side
@@ -115,12 +116,14 @@ export class SceneView {
   }
 
   redraw() {
-    if (this.shown) this.draw(...this.shown);
+    if (this.shown) this.draw(this.shown);
   }
 
-  // `body`: poses of the links and contacts; `marks`: of each agent its hand's place, where it goes, and its colour.
-  draw(body, objects, marks, fields) {
-    this.shown = [body, objects, marks, fields];
+  // `body`: poses of the links and contacts; `marks`: of each agent its hand's place, where it goes, and its colour; `fields`: all are shown;
+  // `path`: of a roadmap.
+  draw(shown) {
+    this.shown = shown;
+    const { body, objects } = shown;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (!width || !height || !this.camera) return;
     const begun = performance.now();
@@ -129,7 +132,7 @@ export class SceneView {
     for (const one of this.surfaces) this.surface(one, body.links[one.link] || STILL);
     for (const one of objects) this.surface(this.thing(one), pose(one));
     this.present(width, height);
-    this.overlay(body, marks, touched, fields);
+    this.overlay(shown, touched);
     this.adapt(performance.now() - begun);
   }
 
@@ -207,8 +210,8 @@ export class SceneView {
     this.unit = 1 / (scale / ratio); // a pixel of the page
   }
 
-  // What stands before everything: fields that are touched, contacts, the hands' trails and where they go.
-  overlay(body, marks, touched, fields) {
+  // What stands before everything: fields that are touched, contacts, the hands' trails and where they go, and the path of a roadmap.
+  overlay({ body, marks, fields, path }, touched) {
     const { ink, unit: px } = this;
     ink.lineCap = "round";
     for (const shape of this.robot.shapes) {
@@ -238,6 +241,7 @@ export class SceneView {
       }
       if (mark.to && mark.hand) this.goal(ink, mark, px);
     }
+    if (path.points) drawPath(ink, path.points.map((p) => this.project(p)), path.share, px);
     for (const one of body.contacts) {
       const [x, y] = this.project(one.point);
       ink.fillStyle = one.kind === "solid" ? "rgb(255,70,60)" : "rgba(255,120,90,0.9)";
