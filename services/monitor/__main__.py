@@ -12,7 +12,7 @@ from services.monitor.config import Config
 from services.monitor.node import MonitorNode
 from services.monitor.viewer.output import open_output
 
-LAST_WORDS = 2.0  # s for which the end waits until open pages have shown that the system has ended
+LAST_WORDS = 1.0  # s for which the end waits until open pages have shown that the system has ended; the launcher waits for twice that
 
 
 def main(argv: Sequence[str] | None = None) -> None:

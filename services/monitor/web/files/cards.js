@@ -38,7 +38,7 @@ export function playback(path) {
 
 // The card of an agent.  `color`: of its part; `isTaken`: a person moves the part; `isPast`: the page shows a recording; `click`: when it is clicked.
 export function card(one, { color, isChosen, isTaken, isPast, click }) {
-  const facts = one.n === undefined ? "" : `${one.n} transition${one.n === 1 ? "" : "s"}, ${share(one.tried)} of its actions tried, ${share(one.predictable)} predictable`;
+  const facts = one.n === undefined ? "" : `${one.n} transition${one.n === 1 ? "" : "s"}, ${share(one.tried)} of actions tried, ${share(one.predictable)} predictable`;
   const plot = node("span", "surprise", "surprise", node("canvas", ""));
   plot.title = "Surprise of the last 60 transitions, −ln p in nats; amber: it did not get where it wanted";
   const small = node("small", "", facts);

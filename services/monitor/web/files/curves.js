@@ -130,7 +130,14 @@ function writeEnds(ink, column, shares, y, { right, top }) {
   ink.textAlign = isRight ? "left" : "right";
   const lower = Math.min(y(0) - 3, Math.max(top + ROW, y(shares[1]) + 4));
   const upper = Math.min(lower - ROW, Math.max(top, y(shares[0]) + 4));
-  [upper, lower].forEach((row, i) => ink.fillText(texts[i], column + (isRight ? 7 : -7), row));
+  const color = ink.fillStyle;
+  [upper, lower].forEach((row, i) => {
+    const wide = ink.measureText(texts[i]).width;
+    ink.fillStyle = GROUND;
+    ink.fillRect(column + (isRight ? 6 : -8 - wide), row - ROW + 3, wide + 2, ROW);
+    ink.fillStyle = color;
+    ink.fillText(texts[i], column + (isRight ? 7 : -7), row);
+  });
 }
 
 export function drawSurprise(canvas, recent, hue) {

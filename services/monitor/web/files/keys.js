@@ -3,6 +3,15 @@
 import { key, say, send } from "./calls.js";
 import { node } from "./cards.js";
 
+const MEANINGS = [
+  ["tried", "share of the agent's actions that it tried at least once; an action goes from one state, a pose, to a neighbouring one"],
+  ["predictable", "share of its actions that were tried at least twice and ended alike in at least 80 % of the tries"],
+  ["n × random", "actions tried, over those that random exploration would have tried after as many transitions"],
+  ["surprise", "−ln p of what happened, in nats; p: the probability that the agent gave to it before. 0.69 nats: one half"],
+  ["learned", "information gain, in nats: how much the outcome changed the agent's model (Kullback-Leibler divergence)"],
+  ["left to learn", "mean of the last information gains of a state's actions, over the largest one that this agent ever had"],
+  ["s behind", "how much later the page shows the body than the robot moved it, in seconds of the robot's time"],
+];
 const QUICK_EXPLORERS = ["curious", "least_tried", "random"];
 const TWICE = 2500; // ms between two presses of the key that starts the simulation again
 const SEEK_PERIOD = 80; // ms
@@ -38,7 +47,7 @@ export class Keys {
       "-": ["slower", "lockstep: halve the largest speed", () => this.pace(0.5)],
       "0": ["reset", "start the simulation again at home (press twice)", () => this.reset()],
       v: ["viewer", "change between the light 3D view and Rerun's, which has plots, eyes and events too", () => view.toggle()],
-      "?": ["help", "list these keys", () => this.help()],
+      "?": ["help", "list these keys, and what the numbers mean", () => this.help()],
     };
     this.byName = Object.fromEntries(Object.values(this.actions).map(([name, , act]) => [name, act]));
     this.byName.play = () => fetch("seek?toggle=1");
@@ -83,6 +92,7 @@ export class Keys {
   toggleFields() {
     this.picture.fields = !this.picture.fields;
     this.picture.touch();
+    this.story.showLegends();
     if (key && !this.state.past) send("fields", { shown: this.picture.fields });
   }
 
@@ -112,7 +122,9 @@ export class Keys {
     const dialog = document.getElementById("help");
     close.addEventListener("click", () => dialog.close());
     const note = key || this.state.past ? "" : "This page can only show: it was opened without the key that the launcher prints in its address.";
-    dialog.replaceChildren(node("h2", "", "Keys"), node("p", "", note), node("table", "", ...rows), close);
+    const words = MEANINGS.map(([word, text]) => node("tr", "", node("td", "", node("b", "", word)), node("td", "", text)));
+    const tables = [node("p", "", note), node("table", "", ...rows), node("h2", "", "Numbers"), node("table", "", ...words)];
+    dialog.replaceChildren(close, node("h2", "", "Keys"), ...tables);
     dialog.showModal();
   }
 }

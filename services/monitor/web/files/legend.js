@@ -10,11 +10,13 @@ function entry(kind, style, text) {
 }
 
 // `hasPlaces`: whether an agent shows where its actions lead.  `hasPath`: whether the robot moves along a path of a roadmap.
-export function viewLegend(robot, hasPlaces, hasPath) {
+// `showsFields`: whether fields are shown that nothing touches.
+export function viewLegend(robot, { hasPlaces, hasPath, showsFields }) {
   const entries = [];
   if (hasPath) entries.push(entry("ramp", "background: linear-gradient(90deg, #ffd640 55%, #ffd64055 55%)", "planned path, bright: done; ring: its end"));
   if (hasPlaces) entries.push(entry("", "background: transparent; box-shadow: 0 0 0 1.5px #fff", "where an action leads"));
   if (robot?.shapes.some((one) => one.field)) entries.push(entry("", "background: #ff463c88", "field of the skin that is touched: it pushes the robot away"));
+  if (showsFields) entries.push(entry("", "background: #5ac8dc88", "field that nothing touches"));
   entries.push(entry("", "background: #ff785a", "contact"));
   return entries;
 }

@@ -91,7 +91,7 @@ export class MovePanel {
   update() {
     if (!this.takes) return;
     this.takes.disabled = this.isTaken();
-    this.gives.disabled = !this.isTaken();
+    this.gives.disabled = !this.state.control.taken?.length;
     for (const one of this.sliders) one.input.disabled = !this.isTaken();
     const card = this.state.cards.find((one) => one.part === this.part);
     this.explores.hidden = !card?.explorer;
@@ -113,8 +113,9 @@ export class MovePanel {
     return this.send("take", { part: this.part });
   }
 
+  // Give the chosen part back, or, if it is not taken, one that is: a hand that reaches.
   give() {
-    return this.send("give", { part: this.part });
+    return this.send("give", { part: this.isTaken() ? this.part : this.state.control.taken?.[0] || this.part });
   }
 
   next() {

@@ -174,7 +174,7 @@ function showState() {
   $("state").className = `pill ${kind}`;
   if (state.status.time !== undefined) $("clock").textContent = `${state.status.time.toFixed(0)} s`;
   $("pause").firstChild.textContent = state.status.mode === "paused" ? "Go on " : "Pause ";
-  for (const button of document.querySelectorAll("[data-do=stop], [data-do=pause], [data-do=tab-move]")) button.hidden = state.past;
+  for (const button of document.querySelectorAll("[data-do=stop], [data-do=pause]")) button.hidden = state.past;
   if (!state.cards.length) story.showCards();
   arrange();
 }
@@ -183,8 +183,10 @@ function showState() {
 let isArranged = false;
 function arrange() {
   const agents = state.status.agents?.length || Object.keys(state.curves).length;
-  $("wonders-title").textContent = agents ? "What it wonders about" : "The robot";
   const runs = (service) => state.status.services?.includes(service);
+  $("wonders-title").textContent = agents ? "What it wonders about" : "The robot";
+  document.querySelector("[data-do=tab-knows]").hidden = !agents;
+  document.querySelector("[data-do=tab-move]").hidden = state.past || !runs("controller");
   if (isArranged || !state.robot || !(runs("controller") || runs("port_filter"))) return;
   isArranged = true;
   if (!agents && !state.past) tab(runs("controller") ? "move" : "events");

@@ -66,7 +66,7 @@ export class Story {
   showLegends() {
     const { robot, path } = this.state;
     const places = this.picture.places;
-    $("view-legend").replaceChildren(...viewLegend(robot, Object.keys(places).length > 0, Boolean(path.now)));
+    $("view-legend").replaceChildren(...viewLegend(robot, { hasPlaces: Object.keys(places).length > 0, hasPath: Boolean(path.now), showsFields: this.picture.fields }));
     $("legend").replaceChildren(...placesLegend(places, (part) => this.colorOf(part)));
   }
 
