@@ -32,15 +32,15 @@ class StoryView:
         for card in cards:
             self._card(ink, card, (left, top, right, top + CARD))
             top += CARD + GAP
-        curves = {card["part"]: values.get("curves", {})[card["part"]] for card in cards if card["part"] in values.get("curves", {})}
         ink.rounded_rectangle((left, top, right, bottom), 6, fill=PANEL, outline=LINE)
         ink.text((left + INSET, top + 5), "What it knows: share of its actions tried", font=self._fonts.small, fill=TEXT)
         ink.text((right - INSET, top + 5), "dotted: at random", font=self._fonts.small, fill=QUIET, anchor="ra")
-        wide = (right - left) / max(1, len(curves))
-        for number, (part, curve) in enumerate(curves.items()):
-            others = values.get("baselines", {}).get(part, {}).get("random", [])
-            inner = (round(left + number * wide) + INSET, top + 22, round(left + (number + 1) * wide) - INSET, bottom - 5)
-            self._curve(ink, part, curve, others, inner)
+        wide = (right - left) / max(1, len(cards))
+        for number, part in enumerate(card["part"] for card in cards):
+            if part in values.get("curves", {}):
+                others = values.get("baselines", {}).get(part, {}).get("random", [])
+                inner = (round(left + number * wide) + INSET, top + 22, round(left + (number + 1) * wide) - INSET, bottom - 5)
+                self._curve(ink, part, values["curves"][part], others, inner)
 
     def _card(self, ink: Any, card: dict[str, Any], box: tuple[int, int, int, int]) -> None:
         left, top, right, _ = box
@@ -96,7 +96,10 @@ def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
     """Write what the film shows, and the robot's time, s since the begin of the run."""
     ink.text((12, 8), f"MoBeE: {name}", font=fonts.title, fill=TEXT)
     minutes, seconds = divmod(round(moment), 60)
-    passed = f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
+    if minutes >= 60:
+        passed = f"{minutes // 60} h {minutes % 60:02d} min"
+    else:
+        passed = f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
     ink.text((12, 26), f"{passed} after the start", font=fonts.small, fill=QUIET)
 
 
