@@ -30,6 +30,7 @@ from bus_schema.messages import (
 )
 from bus_schema.rpc import World
 from mobee.rendering.palette import colors_of_all
+from mobee.robot.motor_units import slides
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.rate import Percentiles, Rate
@@ -41,7 +42,7 @@ from services.monitor.controls import Known, PageControls
 from services.monitor.status import STALE, Seen, banner
 from services.monitor.story.sentences import STRATEGIES
 from services.monitor.story.teller import Teller
-from services.monitor.story.words import joint_words, slides, title_of
+from services.monitor.story.words import joint_words, title_of
 from services.monitor.viewer.blueprint import TIMELINE, shown_of
 from services.monitor.viewer.learning import Learning
 from services.monitor.viewer.output import Output
@@ -125,8 +126,8 @@ class MonitorNode:
                 "title": title_of(name),
                 "color": list(self._colors[name]),
                 "motors": [
-                    {"name": joint_words(motor, name, robot), "low": float(low), "high": float(high), "slides": slides(motor, robot)}
-                    for motor, (low, high) in zip(part.motors, robot.limits[part.slice], strict=True)
+                    {"name": joint_words(motor.name, name, robot), "low": float(low), "high": float(high), "slides": slides(robot, motor)}
+                    for motor, (low, high) in zip(robot.motor_table[part.slice], robot.limits[part.slice], strict=True)
                 ],
             }
             for name, part in robot.parts.items()

@@ -11,6 +11,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.learning.space import Space
+from mobee.robot.motor_units import slides
 from mobee.robot.robot import Robot
 from services.common.worlds import AT_TABLE
 
@@ -81,15 +82,10 @@ def action_words(space: Space, state: int, goal: int) -> str:
     return ", ".join(named) or "stay in this pose"
 
 
-def slides(motor: str, robot: Robot) -> bool:
-    """Whether a motor moves along a line: its position is in m, not in rad."""
-    joints = robot.motor_table[robot.motor_index(motor)].joints
-    return any(robot.joints[joint].kind == "prismatic" for joint, _, _ in joints)
-
-
 def _amount(space: Space, index: int, turn: float) -> str:
     sign = "+" if turn > 0.0 else "−"
-    return f"{sign}{1000 * abs(turn):.0f} mm" if slides(space.joints[index], space.robot) else f"{sign}{np.rad2deg(abs(turn)):.0f}°"
+    motor = space.robot.motor_table[space.robot.motor_index(space.joints[index])]
+    return f"{sign}{1000 * abs(turn):.0f} mm" if slides(space.robot, motor) else f"{sign}{np.rad2deg(abs(turn)):.0f}°"
 
 
 def percent(share: float) -> str:
