@@ -144,7 +144,7 @@ def test_the_ball_is_dragged_and_a_hand_reaches_for_it(page: Page, live: tuple[L
     page.until("document.querySelector('#cards').textContent.match(/mm from it/)", "the end of the reach")
     moved = {one.name: one for one in world(session)}["ball"].position
     assert np.linalg.norm(np.array(moved) - ball["position"]) > 0.01
-    missing = float(re.search(r"(\d+) mm from it", page.page.inner_text("#cards"))[1])  # type: ignore[index]  # waited for above
+    missing = float(re.search(r"(\d+)\smm from it", page.page.inner_text("#cards"))[1])  # type: ignore[index]  # waited for above
     print(f"page: the hand rests {missing:g} mm from the ball")
     page.until("document.querySelector('.card').textContent.includes('Tries')", "the agent's next action, after the part was given back")
 
