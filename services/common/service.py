@@ -183,7 +183,7 @@ class Service(Listener):
             self._require_no_other()
         gc.collect()
         gc.freeze()  # objects that live as long as the process: a full collection of them would delay a tick
-        _return_free_memory()
+        return_free_memory()
         self._is_ready = True
         self._kept.append(self.bus.session.liveliness().declare_token(keys.alive(self.who, self.instance)))
         self.log.info("ready as %s", self.instance)
@@ -320,8 +320,8 @@ def _measured(value: float) -> int | float | None:
     return int(value) if isinstance(value, Integral) else float(value)
 
 
-def _return_free_memory() -> None:
-    """Return memory that was freed after the start to the system, if the C library can: 23 MB if meshes were read."""
+def return_free_memory() -> None:
+    """Return memory that is free to the system, if the C library can: after the start 23 MB if meshes were read."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc
     if trim is not None:
         trim(0)

@@ -35,7 +35,7 @@ from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.rate import Percentiles, Rate
 from services.common.rpc import CallFailed
-from services.common.service import Service
+from services.common.service import Service, return_free_memory
 from services.common.worlds import AT_TABLE
 from services.monitor.config import Config
 from services.monitor.controls import Known, PageControls
@@ -55,6 +55,7 @@ WORLD_PERIOD = 1.0  # s between two requests for the model's world
 BODY_PERIOD = 0.1  # s between two poses of the page's own picture of the body
 STORY_PERIOD = 0.25  # s between two updates of the story and the state
 RECORD_PERIOD = 0.2  # s between two poses in the record of the page
+TRIM_PERIOD = 60.0  # s; messages that wait while the processor is busy leave free memory in the heaps of Zenoh's threads
 STOP_REPEATED = 2.0  # s after the last message of an emergency stop, which robot_sim repeats, for which it counts as set
 JPEG_QUALITY = 85
 LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
@@ -100,6 +101,7 @@ class MonitorNode:
             (BODY_PERIOD, self._show_body),
             (STORY_PERIOD, self._show_story),
             (RECORD_PERIOD, self._record_pose),
+            (TRIM_PERIOD, return_free_memory),
         ):
             self._repeat(Rate(period), show)
 
