@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, Struct
 
-from bus_schema.stream import Stream
+from bus_schema.stream import EVERYONE, Party, Stream
 
 PartVector = Annotated[list[float], Meta(extra={"length": "part"})]
 RobotVector = Annotated[list[float], Meta(extra={"length": "robot"})]
@@ -27,6 +27,8 @@ Name = Annotated[str, Meta(min_length=1, max_length=64)]
 Text = Annotated[str, Meta(max_length=2000)]
 Link = Annotated[int, Meta(ge=-1)]  # index of the link that carries a shape, -1 = none
 Count = Annotated[int, Meta(ge=0, le=2**62)]  # so small that the difference of two fits into msgpack
+
+PARTICIPANTS: tuple[Party, ...] = ("model", "controller", "port_filter", "agent", "client", "driver")  # of lockstep
 
 Mode = Literal["position", "velocity", "torque", "hold"]
 GateState = Literal["idle", "hold", "armed", "fault", "estop"]
@@ -55,7 +57,7 @@ class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Clock(Message, frozen=True, kw_only=True):
     """Start of tick k.  In mode "lock" the next tick begins when all participants have answered this one."""
 
-    stream: ClassVar[Stream] = Stream("clock", "CONTROL", writer="robot_sim, every tick up to 100 per second", readers="all others")
+    stream: ClassVar[Stream] = Stream("clock", "CONTROL", writers=("robot_sim",), readers=EVERYONE, when="every tick up to 100 per second")
 
     dt: Annotated[int, Meta(gt=0, le=10_000_000_000)]  # ns per tick
     mode: Literal["free", "lock", "paused"]
@@ -79,7 +81,7 @@ class Tick(Clock, frozen=True, kw_only=True):
     """Start of tick k, with the newest state of every part; each part has its own sampling time."""
 
     stream: ClassVar[Stream] = Stream(
-        "tick", "CONTROL", writer="robot_sim, every tick", readers="model, controller, port_filter; clients that need all motors"
+        "tick", "CONTROL", writers=("robot_sim",), readers=("model", "controller", "port_filter", "agent"), when="every tick"
     )
 
     q: RobotVector  # rad, encoders
@@ -89,7 +91,7 @@ class Tick(Clock, frozen=True, kw_only=True):
 class StepDone(Message, frozen=True, kw_only=True):
     """Lockstep: the sender has published all its messages for tick re_k."""
 
-    stream: ClassVar[Stream] = Stream("done/{service}", "STEP", writer="lockstep: every participant", readers="robot_sim")
+    stream: ClassVar[Stream] = Stream("done/{service}", "STEP", writers=PARTICIPANTS, readers=("robot_sim",), when="in lockstep")
 
     re_k: Count  # tick that is answered
     ok: bool = True  # False: an input was missing, so the run is not repeatable
@@ -101,7 +103,7 @@ class StepDone(Message, frozen=True, kw_only=True):
 class Turn(Message, frozen=True, kw_only=True):
     """Lockstep: tick k waits for this participant, which may have an action to decide."""
 
-    stream: ClassVar[Stream] = Stream("turn/{service}", "STEP", writer="robot_sim, in lockstep", readers="that service")
+    stream: ClassVar[Stream] = Stream("turn/{participant}", "STEP", writers=("robot_sim",), readers=PARTICIPANTS, when="in lockstep")
 
     dt: Count  # ns per tick
 
@@ -112,8 +114,9 @@ class State(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "{part}/state",
         "CONTROL",
-        writer="robot_sim, every tick at the part's own time, if there is a subscriber",
-        readers="renderer, monitor, port_filter",
+        writers=("robot_sim",),
+        readers=("renderer", "monitor", "port_filter"),
+        when="every tick at the part's own time, if there is a subscriber",
     )
 
     q: PartVector  # rad, encoders
@@ -131,7 +134,7 @@ class Command(Message, frozen=True, kw_only=True):
     """Command to the motors of one part, computed from the state of tick re_k."""
 
     stream: ClassVar[Stream] = Stream(
-        "{part}/cmd", "CONTROL", writer="a client that drives a single part", readers="robot_sim, port_filter"
+        "{part}/cmd", "CONTROL", writers=("port_filter", "driver"), readers=("robot_sim",), when="every tick, for a single part"
     )
 
     epoch: Count
@@ -159,7 +162,7 @@ class Answer(Struct, frozen=True, forbid_unknown_fields=True):
 class Commands(Message, frozen=True, kw_only=True):
     """Commands to the motors of several parts, computed from the state of tick re_k; parts that are not named are not affected."""
 
-    stream: ClassVar[Stream] = Stream("commands", "CONTROL", writer="controller, every tick", readers="robot_sim, port_filter")
+    stream: ClassVar[Stream] = Stream("commands", "CONTROL", writers=("controller", "driver"), readers=("robot_sim",), when="every tick")
 
     re_k: Count
     parts: dict[Name, Order]
@@ -172,7 +175,11 @@ class Motion(Message, frozen=True, kw_only=True):
     """State of a part's action."""
 
     stream: ClassVar[Stream] = Stream(
-        "{part}/motion", "CONTROL", writer="controller, at once after a change, else up to 100 per second", readers="agents, monitor"
+        "{part}/motion",
+        "CONTROL",
+        writers=("controller",),
+        readers=("agent", "monitor"),
+        when="at once after a change, else up to 100 per second",
     )
 
     action_id: Text  # empty: none yet
@@ -193,8 +200,9 @@ class Reach(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "{part}/reach",
         "CONTROL",
-        writer="controller, at once after a change, during a reach up to 100 per second",
-        readers="model, agents, monitor",
+        writers=("controller",),
+        readers=("model", "agent", "monitor"),
+        when="at once after a change, during a reach up to 100 per second",
     )
 
     action_id: Text  # as in Motion
@@ -214,7 +222,11 @@ class Playback(Message, frozen=True, kw_only=True):
     """State of a motion along a path of a roadmap."""
 
     stream: ClassVar[Stream] = Stream(
-        "roadmap/playback", "NEWEST", writer="`mobee roadmap play --live`, five times a second while it moves the robot", readers="monitor"
+        "roadmap/playback",
+        "NEWEST",
+        writers=("operator",),
+        readers=("monitor",),
+        when="five times a second while `mobee roadmap play --live` moves the robot",
     )
 
     phase: PlaybackPhase  # moving: until the robot rests; over: it rests; interrupted: a part was lost, or the command was ended
@@ -229,7 +241,9 @@ class Playback(Message, frozen=True, kw_only=True):
 class Targets(Message, frozen=True, kw_only=True):
     """Positions at tick re_k of the targets of all reaches; a target that is not in the model's world has no position."""
 
-    stream: ClassVar[Stream] = Stream("model/targets", "CONTROL", writer="model, every tick during a reach", readers="controller")
+    stream: ClassVar[Stream] = Stream(
+        "model/targets", "CONTROL", writers=("model",), readers=("controller",), when="every tick during a reach"
+    )
 
     re_k: Count
     positions: dict[Name, Vector3]  # m
@@ -246,7 +260,7 @@ class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
 class Pose(Message, frozen=True, kw_only=True):
     """Marker poses at tick re_k."""
 
-    stream: ClassVar[Stream] = Stream("model/pose", "LATEST", writer="model, every tick, if there is a subscriber", readers="monitor")
+    stream: ClassVar[Stream] = Stream("model/pose", "LATEST", writers=("model",), readers=(), when="every tick, if there is a subscriber")
 
     re_k: Count
     q: RobotVector  # rad, assembled from the parts' samples
@@ -272,8 +286,9 @@ class Forces(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "{source}/forces",
         "CONTROL",
-        writer="model, every tick; controller, if it has user-defined terms (LATEST)",
-        readers="controller; monitor",
+        writers=("model", "controller"),
+        readers=("controller", "monitor"),
+        when="every tick; of the controller, if it has user-defined terms (LATEST)",
     )
 
     re_k: Count
@@ -286,7 +301,9 @@ class Forces(Message, frozen=True, kw_only=True):
 class Contacts(Message, frozen=True, kw_only=True):
     """All contacts at tick re_k."""
 
-    stream: ClassVar[Stream] = Stream("model/contacts", "LATEST", writer="model, every tick, if there is a subscriber", readers="monitor")
+    stream: ClassVar[Stream] = Stream(
+        "model/contacts", "LATEST", writers=("model",), readers=("monitor",), when="every tick, if there is a subscriber"
+    )
 
     re_k: Count
     contacts: list[ContactItem]
@@ -302,7 +319,7 @@ class Geometry(Struct, frozen=True, forbid_unknown_fields=True):
 class WorldObject(Message, frozen=True, kw_only=True):
     """An object as perceived by vision."""
 
-    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writer="vision", readers="model, monitor")
+    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "monitor"))
 
     name: Name
     geometry: Geometry
@@ -317,7 +334,7 @@ class WorldObject(Message, frozen=True, kw_only=True):
 class Image(Message, frozen=True, kw_only=True):
     """Picture of one camera at tick k_capture: rows top to bottom, height x width x 3 bytes."""
 
-    stream: ClassVar[Stream] = Stream("vision/image/{camera}", "BULK", writer="renderer", readers="vision, monitor")
+    stream: ClassVar[Stream] = Stream("vision/image/{camera}", "BULK", writers=("renderer",), readers=("vision", "monitor"))
 
     camera: Name
     k_capture: Count
@@ -330,7 +347,7 @@ class Image(Message, frozen=True, kw_only=True):
 class Camera(Message, frozen=True, kw_only=True):
     """Calibration of a camera, and the posture of the robot at the picture's tick."""
 
-    stream: ClassVar[Stream] = Stream("vision/camera/{camera}", "BULK", writer="renderer", readers="vision")
+    stream: ClassVar[Stream] = Stream("vision/camera/{camera}", "BULK", writers=("renderer",), readers=("vision",))
 
     camera: Name
     k_capture: Count
@@ -341,7 +358,7 @@ class Camera(Message, frozen=True, kw_only=True):
 class Transition(Message, frozen=True, kw_only=True):
     """One observed transition of an agent."""
 
-    stream: ClassVar[Stream] = Stream("agents/{part}/transition", "EVENTS", writer="agents", readers="monitor, launcher")
+    stream: ClassVar[Stream] = Stream("agents/{part}/transition", "EVENTS", writers=("agent",), readers=("monitor",))
 
     agent: Name
     n: Count  # number of transitions that the agent has observed, including this one
@@ -360,7 +377,9 @@ class Transition(Message, frozen=True, kw_only=True):
 class Decision(Message, frozen=True, kw_only=True):
     """The action that an agent begins, and what it expects of it."""
 
-    stream: ClassVar[Stream] = Stream("agents/{part}/decision", "NEWEST", writer="agents, at the start of an action", readers="monitor")
+    stream: ClassVar[Stream] = Stream(
+        "agents/{part}/decision", "NEWEST", writers=("agent",), readers=("monitor",), when="at the start of an action"
+    )
 
     agent: Name
     n: Count  # transitions the agent has observed
@@ -388,7 +407,9 @@ class Surprise(Struct, frozen=True, forbid_unknown_fields=True):
 class Learned(Message, frozen=True, kw_only=True):
     """Counts, rewards and values of an agent's state-actions: matrices of S states (rows) with at most A actions (columns)."""
 
-    stream: ClassVar[Stream] = Stream("agents/{part}/learned", "NEWEST", writer="agents, at most twice a second", readers="monitor")
+    stream: ClassVar[Stream] = Stream(
+        "agents/{part}/learned", "NEWEST", writers=("agent",), readers=("monitor",), when="at most twice a second"
+    )
 
     agent: Name
     n: Count  # transitions observed
@@ -403,7 +424,7 @@ class Learned(Message, frozen=True, kw_only=True):
 class Event(Message, frozen=True, kw_only=True):
     """A log entry for a person."""
 
-    stream: ClassVar[Stream] = Stream("event/{service}", "EVENTS", writer="all", readers="monitor, launcher")
+    stream: ClassVar[Stream] = Stream("event/{service}", "EVENTS", writers=EVERYONE, readers=("monitor",))
 
     level: Literal["info", "warning", "error"]
     code: Name
@@ -417,8 +438,9 @@ class EStop(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "estop",
         "STOP",
-        writer="any client; robot_sim repeats it while it is latched, launcher and controller until then",
-        readers="robot_sim, controller, port_filter, launcher, monitor",
+        writers=EVERYONE,
+        readers=("robot_sim", "controller", "port_filter", "launcher", "monitor"),
+        when="robot_sim repeats it while it is latched, launcher and controller until then",
     )
 
     set: bool
@@ -430,7 +452,7 @@ class Served(Message, frozen=True, kw_only=True):
     """A call that the sender has answered, except `stat` and `config`: the request and the reply as they were sent."""
 
     stream: ClassVar[Stream] = Stream(
-        "served/{service}", "CONTROL", writer="every service, after each call, if there is a subscriber", readers="recorder"
+        "served/{service}", "CONTROL", writers=EVERYONE, readers=(), when="after each call, if there is a subscriber"
     )
 
     key: Text  # of the call
@@ -451,7 +473,9 @@ class ObjectTruth(Struct, frozen=True, forbid_unknown_fields=True):
 class Truth(Message, frozen=True, kw_only=True):
     """Ground truth of the simulator: for tests, figures and the renderer, never for a service of the robot."""
 
-    stream: ClassVar[Stream] = Stream("sim/truth", "DATA", writer="robot_sim", readers="renderer, tests; never a service of the robot")
+    stream: ClassVar[Stream] = Stream(
+        "sim/truth", "DATA", writers=("robot_sim",), readers=("renderer",), when="never for a service of the robot"
+    )
 
     q: RobotVector  # rad, joint side, without noise
     depth: float  # m, deepest solid contact of a watched pair since the last message, 0 = none

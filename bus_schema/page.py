@@ -14,7 +14,7 @@ from msgspec import Struct
 from bus_schema import messages, rpc
 from bus_schema.messages import Message
 from bus_schema.rpc import CALLS, Reply, Request
-from bus_schema.stream import DELIVERIES
+from bus_schema.stream import DELIVERIES, EVERYONE, Party
 
 PAGE = Path(__file__).parents[1] / "docs" / "bus.md"
 BASES: tuple[type[Struct], ...] = (Message, Request, Reply)
@@ -53,7 +53,8 @@ def _deliveries() -> str:
 def _streams() -> str:
     rows = ((f"`{cls.stream.pattern}`", f"[`{cls.__name__}`](#{_anchor(cls)})", cls.stream) for cls in streams())
     return _table(
-        ("key", "message", "writes", "reads", "delivery"), ((key, name, s.writer, s.readers, s.delivery) for key, name, s in rows)
+        ("key", "message", "who may write it", "when", "who reads it", "delivery"),
+        ((key, name, _listed(s.writers), s.when, _listed(s.readers), s.delivery) for key, name, s in rows),
     )
 
 
@@ -61,8 +62,14 @@ def _calls() -> str:
     rows = []
     for call in CALLS:
         keys = [f"`{call.pattern.replace('{verb}', verb)}`" for verb in call.verbs or ("",)]
-        rows.append((", ".join(keys), f"`{call.request.__name__}`", f"`{call.reply.__name__}`", call.server))
-    return _table(("key", "request", "reply", "server"), rows)
+        rows.append(
+            (", ".join(keys), f"`{call.request.__name__}`", f"`{call.reply.__name__}`", _listed(call.servers), _listed(call.callers))
+        )
+    return _table(("key", "request", "reply", "who answers", "who may call"), rows)
+
+
+def _listed(parties: Sequence[Party]) -> str:
+    return "all" if parties == EVERYONE else ", ".join("agents" if party == "agent" else party for party in parties)
 
 
 def _messages() -> str:

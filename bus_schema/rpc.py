@@ -9,6 +9,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from bus_schema.messages import Aim, Count, GateState, Geometry, Name, PartVector, Quaternion, RobotVector, Role, Text, Vector3
+from bus_schema.stream import EVERYONE, Party
 
 
 class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -236,40 +237,46 @@ class Failure(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Keys of calls with the same request and reply, and the service that answers them; a row of the table in docs/bus.md."""
+    """Keys of calls with the same request and reply, who answers them and who may call; rows of the table in docs/bus.md."""
 
     pattern: str
     verbs: tuple[str, ...]  # for {verb} in the pattern
     request: type[Request]
     reply: type[Reply]
-    server: str
+    servers: tuple[Party, ...]
+    callers: tuple[Party, ...]
 
+
+_PERSONS: tuple[Party, ...] = ("operator", "monitor")  # a person at a terminal or at the page
+_READERS: tuple[Party, ...] = ("operator", "monitor", "observer", "client", "driver")
+_DRIVERS: tuple[Party, ...] = ("controller", "port_filter", "driver")
+_USERS: tuple[Party, ...] = ("operator", "monitor", "agent", "client")  # of parts that the controller drives, and of the model's world
 
 CALLS = (
-    Call("{service}/rpc/{verb}", ("stat",), Empty, Stat, "every service"),
-    Call("{service}/rpc/{verb}", ("pulse",), Empty, Pulse, "every service"),
-    Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, "every service"),
-    Call("{service}/rpc/{verb}", ("config",), Empty, Config, "every service"),
-    Call("{service}/rpc/{verb}", ("rest", "go_on"), Empty, Done, "agents"),
-    Call("{service}/rpc/{verb}", ("explore",), Explore, Done, "agents"),
-    Call("{part}/meta", (), Empty, PartMeta, "robot_sim"),
-    Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, "robot_sim"),
-    Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, "robot_sim"),
-    Call("sim/rpc/{verb}", ("reset", "pause", "resume"), Empty, Done, "robot_sim"),
-    Call("sim/rpc/{verb}", ("place",), Place, Done, "robot_sim"),
-    Call("sim/rpc/{verb}", ("pace",), Pace, Done, "robot_sim"),
-    Call("estop/rpc/{verb}", ("reset",), Empty, Done, "robot_sim"),
-    Call("{part}/rpc/{verb}", ("take",), Take, Taken, "controller"),
-    Call("{part}/rpc/{verb}", ("release",), WithEpoch, Done, "controller"),
-    Call("{part}/rpc/{verb}", ("goal",), Goal, Started, "controller"),
-    Call("{part}/rpc/{verb}", ("force",), Force, Done, "controller"),
-    Call("{part}/rpc/{verb}", ("reach",), ReachFor, Started, "controller"),
-    Call("model/rpc/world/{verb}", ("add",), AddObject, Done, "model"),
-    Call("model/rpc/world/{verb}", ("move",), MoveObject, Done, "model"),
-    Call("model/rpc/world/{verb}", ("remove", "detach"), OneName, Done, "model"),
-    Call("model/rpc/world/{verb}", ("role",), SetRole, Done, "model"),
-    Call("model/rpc/world/{verb}", ("attach",), Attach, Done, "model"),
-    Call("model/rpc/world/{verb}", ("list",), Empty, World, "model"),
-    Call("model/rpc/{verb}", ("jacobian",), JacobianAt, JacobianReply, "model"),
-    Call("{part}/rpc/{verb}", ("waypoint",), Empty, Done, "port_filter"),
+    Call("{service}/rpc/{verb}", ("stat",), Empty, Stat, EVERYONE, EVERYONE),
+    Call("{service}/rpc/{verb}", ("pulse",), Empty, Pulse, EVERYONE, ("launcher", "operator")),
+    Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, EVERYONE, ("launcher", "operator")),
+    Call("{service}/rpc/{verb}", ("config",), Empty, Config, EVERYONE, _READERS),
+    Call("{service}/rpc/{verb}", ("rest", "go_on"), Empty, Done, ("agent",), _PERSONS),
+    Call("{service}/rpc/{verb}", ("explore",), Explore, Done, ("agent",), _PERSONS),
+    Call("{part}/meta", (), Empty, PartMeta, ("robot_sim",), ("controller", "port_filter", *_READERS)),
+    Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, ("robot_sim",), _DRIVERS),
+    Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, ("robot_sim",), _DRIVERS),
+    Call("sim/rpc/{verb}", ("reset", "pause", "resume"), Empty, Done, ("robot_sim",), _PERSONS),
+    Call("sim/rpc/{verb}", ("place",), Place, Done, ("robot_sim",), _PERSONS),
+    Call("sim/rpc/{verb}", ("pace",), Pace, Done, ("robot_sim",), _PERSONS),
+    Call("estop/rpc/{verb}", ("reset",), Empty, Done, ("robot_sim",), (*_PERSONS, "port_filter")),
+    Call("{part}/rpc/{verb}", ("take",), Take, Taken, ("controller",), _USERS),
+    Call("{part}/rpc/{verb}", ("release",), WithEpoch, Done, ("controller",), _USERS),
+    Call("{part}/rpc/{verb}", ("goal",), Goal, Started, ("controller",), _USERS),
+    Call("{part}/rpc/{verb}", ("force",), Force, Done, ("controller",), _USERS),
+    Call("{part}/rpc/{verb}", ("reach",), ReachFor, Started, ("controller",), _USERS),
+    Call("model/rpc/world/{verb}", ("add",), AddObject, Done, ("model",), _USERS),
+    Call("model/rpc/world/{verb}", ("move",), MoveObject, Done, ("model",), _USERS),
+    Call("model/rpc/world/{verb}", ("remove", "detach"), OneName, Done, ("model",), _USERS),
+    Call("model/rpc/world/{verb}", ("role",), SetRole, Done, ("model",), _USERS),
+    Call("model/rpc/world/{verb}", ("attach",), Attach, Done, ("model",), _USERS),
+    Call("model/rpc/world/{verb}", ("list",), Empty, World, ("model",), (*_USERS, "observer", "driver")),
+    Call("model/rpc/{verb}", ("jacobian",), JacobianAt, JacobianReply, ("model",), ("agent", *_READERS)),
+    Call("{part}/rpc/{verb}", ("waypoint",), Empty, Done, ("port_filter",), (*_PERSONS, "driver")),
 )

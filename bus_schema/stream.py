@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams of the bus: the key and the delivery class of each message, and the services that write and read it."""
+"""Streams of the bus: the key and the delivery class of each message, and who may write and read it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 Delivery = Literal["CONTROL", "LATEST", "STEP", "STOP", "DATA", "BULK", "EVENTS", "NEWEST"]
+
+Party = Literal[
+    "robot_sim", "renderer", "model", "controller", "port_filter", "agent", "vision", "monitor", "recorder", "launcher",
+    "operator", "observer", "client", "driver",
+]  # fmt: skip
+"""A service, or a kind of program that connects to a running system; `agent` is the agent of each part (bus_schema/authority.py)."""
+
+EVERYONE: tuple[Party, ...] = get_args(Party)
+READERS_OF_ALL: tuple[Party, ...] = ("recorder", "operator", "observer", "client", "driver")
+"""Those that may read every stream, beside the readers that the streams name."""
 
 DELIVERIES: dict[Delivery, str] = {
     "CONTROL": "LATEST in free mode, STEP in lockstep",
@@ -36,14 +46,19 @@ def chunk(name: str) -> str:
 class Stream:
     """The key and the delivery class of a message; the tables in docs/bus.md are written from these.
 
-    `pattern`: the key, with at most one variable in braces, such as "{part}/state".  `writer` and `readers`: names of services, and when
-    they write.
+    Attributes:
+        pattern: the key, with at most one variable in braces, such as "{part}/state".
+        delivery: its delivery class.
+        writers: who may write it; nobody else may (bus_schema/authority.py).
+        readers: who reads it, beside READERS_OF_ALL.
+        when: when it is written.
     """
 
     pattern: str
     delivery: Delivery
-    writer: str
-    readers: str
+    writers: tuple[Party, ...]
+    readers: tuple[Party, ...]
+    when: str = ""
 
     @property
     def variable(self) -> str:

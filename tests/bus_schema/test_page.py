@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -15,10 +14,13 @@ import pytest
 from bus_schema import keys, messages, page, rpc
 from bus_schema.messages import Message
 from bus_schema.rpc import CALLS
+from bus_schema.stream import EVERYONE
 
 ROOT = Path(__file__).parents[2]
-NAMES = ("robot_sim", "renderer", "model", "controller", "port_filter", "agents", "vision", "monitor", "launcher")
-SHARED = {"bus_plant.py": "agents"}  # files of services/common that one service uses
+SHARED = {"bus_plant.py": "agent"}  # files of services/common that one service uses
+FOLDERS = {"agents": "agent"}  # whose parties have another name
+IMPLIED = {"on_clock": "Clock", "on_tick": "Tick", "Body": "State", "StopLine": "EStop"}  # functions that read one stream
+PROGRAMS = {"client", "driver"}  # of a user, outside of this repository
 MIRRORS = "port_filter"  # publishes the robot's own streams to its clients
 
 
@@ -66,13 +68,13 @@ def service_of(path: Path) -> str:
     folder = path.relative_to(ROOT / "services").parts[0]
     if folder == "common":
         return SHARED.get(path.name, "")
-    return "renderer" if path.name.startswith("renderer") else folder
+    return "renderer" if path.name.startswith("renderer") else FOLDERS.get(folder, folder)
 
 
 def calls(tree: ast.AST) -> Iterator[tuple[str, list[ast.expr]]]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-            yield node.func.attr, node.args
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute | ast.Name):
+            yield node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id, node.args
 
 
 @cache
@@ -81,6 +83,7 @@ def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
     writers, readers = defaultdict(set), defaultdict(set)
     for path in (ROOT / "services").rglob("*.py"):
         service, tree = service_of(path), ast.parse(path.read_text())
+        modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         imports = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "bus_schema.messages")
         aliases = {name.asname or name.name: name.name for node in imports for name in node.names}
         for method, arguments in calls(tree):
@@ -89,19 +92,14 @@ def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
                 writers[name].add(service)
             elif name and service and method in ("on_newest", "on_each", "latest"):
                 readers[name].add(service)
+            if service and method in IMPLIED and (method != "Body" or "services.common.body" in modules):
+                readers[IMPLIED[method]].add(service)
     return writers, readers
-
-
-def named(text: str) -> set[str]:
-    return set(re.findall(r"\w+", text)) & set(NAMES)
 
 
 @pytest.mark.parametrize("cls", page.streams(), ids=lambda cls: cls.__name__)
 def test_the_services_write_and_read_the_streams_of_the_contract(cls: type[Message]) -> None:
     writers, readers = (each[cls.__name__] for each in found())
-    if not named(cls.stream.writer) and not named(cls.stream.readers):
-        return  # every service, through services/common
-    assert writers - {MIRRORS} <= named(cls.stream.writer) or cls.stream.writer.startswith("any")
-    assert named(cls.stream.writer) - {"launcher"} <= writers or cls.__name__ in ("Turn", "StepDone")
-    if cls.__name__ not in ("Clock", "Tick", "State", "StepDone"):
-        assert readers - {MIRRORS} <= named(cls.stream.readers)
+    if cls.__name__ not in ("Turn", "StepDone", "Event", "Served"):  # which all services write and read, through services/common
+        assert writers - {MIRRORS} == set(cls.stream.writers) - PROGRAMS - {MIRRORS} or cls.stream.writers == EVERYONE
+        assert readers - {MIRRORS} == set(cls.stream.readers) - PROGRAMS - {MIRRORS} or cls.stream.readers == EVERYONE

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who may write, read, call and answer which keys, from the streams and calls of the contract.
+
+The table is `writers` and `readers` of each `Stream` and `servers` and `callers` of each `Call`.  docs/bus.md, the tests of the services
+and the access list of a secured system are made from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from bus_schema.messages import Message
+from bus_schema.page import streams
+from bus_schema.rpc import CALLS
+from bus_schema.stream import EVERYONE, READERS_OF_ALL, Party
+
+AGENT = "agent_"
+TOKENS = "alive/{service}/*"
+ROUTER = "router"
+
+_PROGRAMS: tuple[Party, ...] = ("observer", "client", "driver")  # a process of theirs may add its number to the name
+_OWN = ("{service}", "{source}")  # variables that stand for the name of the writer
+
+
+@dataclass(frozen=True, slots=True)
+class Rights:
+    """What one identity may do, as key expressions without the namespace; what is not listed it may not."""
+
+    writes: tuple[str, ...]
+    reads: tuple[str, ...]
+    calls: tuple[str, ...]
+    answers: tuple[str, ...]
+    tokens: tuple[str, ...]  # liveliness tokens that it may declare; all may read all tokens
+    keeps: tuple[str, ...]  # streams among `writes` whose past messages it sends to late readers
+    catches_up: tuple[str, ...]  # streams among `reads` whose past messages it may request
+
+
+def party_of(name: str) -> Party:
+    """Return the party of a name: that of a service, `agent` for agent_<part>, or `client` for any other program."""
+    if name.startswith(AGENT):
+        return "agent"
+    return next((party for party in EVERYONE if party == name and party != "agent"), "client")
+
+
+def rights_of(name: str, party: Party) -> Rights:
+    """Return what the identity `name` of a party may do.
+
+    A key with {service} or {source} is written and answered under the own name only, and the keys of an agent are those of its part.
+    """
+    own, part = _own_names(name, party), name.removeprefix(AGENT) if party == "agent" else "*"
+    written = [cls for cls in streams() if party in cls.stream.writers]
+    read = [cls for cls in streams() if party in cls.stream.readers or party in READERS_OF_ALL]
+    return Rights(
+        writes=_expressions((cls.stream.pattern for cls in written), own, part),
+        reads=tuple(cls.stream.keys() for cls in read),
+        calls=_expressions(_patterns("callers", party), ("*",), part),
+        answers=_expressions(_patterns("servers", party), own, "*"),
+        tokens=_expressions([TOKENS], own, part),
+        keeps=_expressions((cls.stream.pattern for cls in written if _has_history(cls)), own, part),
+        catches_up=tuple(cls.stream.keys() for cls in read if _has_history(cls)),
+    )
+
+
+def _own_names(name: str, party: Party) -> tuple[str, ...]:
+    """Return the names under which an identity appears on the bus; those of the commands at a terminal begin with mobee."""
+    if party == "operator":
+        name = "mobee"
+    return (name, f"{name}_$*") if party in (*_PROGRAMS, "operator") else (name,)
+
+
+def _patterns(side: str, party: Party) -> list[str]:
+    return [
+        call.pattern.replace("{verb}", verb) for call in CALLS if party in getattr(call, side) for verb in call.verbs or ("",)
+    ]  # fmt: skip
+
+
+def _expressions(patterns: Iterable[str], own: tuple[str, ...], part: str) -> tuple[str, ...]:
+    found: list[str] = []
+    for pattern in patterns:
+        names = own if any(variable in pattern for variable in _OWN) else ("",)
+        for name in names:
+            key = pattern.replace("{part}", part)
+            for variable in _OWN:
+                key = key.replace(variable, name)
+            found.append("/".join("*" if chunk.startswith("{") else chunk for chunk in key.split("/")))
+    return tuple(found)
+
+
+def _has_history(cls: type[Message]) -> bool:
+    return cls.stream.delivery in ("EVENTS", "NEWEST")
