@@ -50,10 +50,11 @@ def rights_of(name: str, party: Party) -> Rights:
     """
     own, part = _own_names(name, party), name.removeprefix(AGENT) if party == "agent" else "*"
     written = [cls for cls in streams() if party in cls.stream.writers]
-    read = [cls for cls in streams() if party in cls.stream.readers or party in READERS_OF_ALL]
+    reads_all = party in READERS_OF_ALL
+    read = [cls for cls in streams() if party in cls.stream.readers or reads_all]
     return Rights(
         writes=_expressions((cls.stream.pattern for cls in written), own, part),
-        reads=tuple(cls.stream.keys() for cls in read),
+        reads=("**",) if reads_all else tuple(cls.stream.keys() for cls in read),
         calls=_expressions(_patterns("callers", party), ("*",), part),
         answers=_expressions(_patterns("servers", party), own, "*"),
         tokens=_expressions([TOKENS], own, part),

@@ -18,6 +18,7 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, INTERRUPTED
 VERBS = {
     "play": "make any robot curious: derive its parts, learn offline, go on live",
     "launch": "start a scenario and supervise it",
+    "keys": "make the keys of a secured system: new, add, list",
     "status": "print the state of the running system",
     "stop": "end the running system",
     "estop": "stop the robot at once; --reset releases it",
@@ -44,6 +45,7 @@ VERBS = {
 
 EXTRAS = {
     "zenoh": "live",
+    "cryptography": "live",
     "mcap": "live",
     "msgspec": "live",
     "tyro": "live",

@@ -25,7 +25,7 @@ OLDEST_PYTHON = (3, 11)
 LEAST_MEMORY, LEAST_DISK = 1.0, 0.5  # GB that a system with a page and the record of a long run take
 LEAST_CORES = 2
 EXTRAS = {
-    "live": {"zenoh": "eclipse-zenoh", "msgspec": "msgspec", "tyro": "tyro"},
+    "live": {"cryptography": "cryptography", "zenoh": "eclipse-zenoh", "msgspec": "msgspec", "tyro": "tyro"},
     "sim": {"mujoco": "mujoco-core", "pybullet": "pybullet", "icub_models": "icub-models"},
     "viz": {"rerun": "rerun-sdk", "trimesh": "trimesh", "collada": "pycollada", "fast_simplification": "fast-simplification"},
     "figures": {"matplotlib": "matplotlib"},

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The identity of a process on a secured bus: a key and a certificate in a folder of keys, named by two environment variables."""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from mobee.errors import MobeeError
+
+KEYS, IDENTITY = "MOBEE_KEYS", "MOBEE_IDENTITY"
+"""Environment variables: the folder of keys, and the name of the identity in it; without the first the connection is not secured."""
+
+OPERATOR = "operator"  # the identity of the commands at a terminal, unless another is named
+ROUTER = "router"  # the only identity that a process may listen with
+AUTHORITY = "ca"
+_SECURED, _PLAIN = "tls/", "tcp/"
+
+
+class BadKeys(MobeeError):
+    """Raised for keys that are missing, unsafe, expired or of another authority; the message holds the remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """An identity in a folder of keys."""
+
+    folder: Path
+    name: str
+
+    @classmethod
+    def of_environment(cls) -> Identity | None:
+        """Return the identity that the environment names; None if it names no folder of keys."""
+        folder = os.environ.get(KEYS)
+        return cls(Path(folder), os.environ.get(IDENTITY, OPERATOR)) if folder else None
+
+    def environment(self) -> dict[str, str]:
+        """Return the environment variables that give a process this identity."""
+        return {KEYS: str(self.folder), IDENTITY: self.name}
+
+    @property
+    def certificate(self) -> Path:
+        """The certificate of this identity."""
+        return self.folder / f"{self.name}.crt"
+
+    @property
+    def key(self) -> Path:
+        """The private key of this identity."""
+        return self.folder / f"{self.name}.key"
+
+    @property
+    def authority(self) -> Path:
+        """The certificate of the authority, by which others are checked."""
+        return self.folder / f"{AUTHORITY}.crt"
+
+    def require(self) -> None:
+        """Raise BadKeys if a file is missing, or if others may read the private key."""
+        require_private(self.folder)
+        for path in (self.authority, self.certificate, self.key):
+            if not path.is_file():
+                raise BadKeys(
+                    f"{path} is missing, so that nothing can connect as {self.name}: make it with `mobee keys add {self.name} "
+                    f"--keys {self.folder}` where {AUTHORITY}.key is, or name another folder with --keys or {KEYS}"
+                )
+        require_private(self.key)
+
+    def settings(self) -> dict[str, object]:
+        """Return Zenoh's settings, by which this process shows its certificate and accepts only those of the same authority.
+
+        The name of the host is not compared: the authority signs one certificate only that may listen, the router's.
+        """
+        listens = self.name == ROUTER
+        own = {"listen_certificate": str(self.certificate), "listen_private_key": str(self.key)}
+        if not listens:
+            own = {"connect_certificate": str(self.certificate), "connect_private_key": str(self.key)}
+        common = {"root_ca_certificate": str(self.authority), "enable_mtls": True, "verify_name_on_connect": False}
+        return {"transport/link/tls": {**common, **own}}
+
+
+def assume(identity: Identity | None) -> None:
+    """Give this process an identity, or none: that of its user, which it has inherited, is not for the services of a launcher."""
+    for name in (KEYS, IDENTITY):
+        os.environ.pop(name, None)
+    if identity is not None:
+        os.environ.update(identity.environment())
+
+
+def require_private(path: Path) -> None:
+    """Raise BadKeys if a file or folder does not exist, belongs to another user, or can be read by others."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise BadKeys(f"{path}: {error.strerror}; `mobee keys new` makes a folder of keys, --keys or {KEYS} names one") from None
+    if os.name != "posix":
+        return
+    if found.st_uid not in (os.geteuid(), 0):
+        raise BadKeys(f"{path} belongs to another user (number {found.st_uid}): use keys of your own")
+    if stat.S_IMODE(found.st_mode) & 0o077:
+        mode = "700" if path.is_dir() else "600"
+        raise BadKeys(f"{path} can be read by other users (mode {stat.S_IMODE(found.st_mode):03o}): run `chmod {mode} {path}`")
+
+
+def default_folder() -> Path:
+    """Return the folder in which `mobee keys` keeps the keys unless another is named."""
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "mobee" / "keys"
+
+
+def secured(endpoint: str) -> str:
+    """Return the address at which a secured router listens: TLS in place of plain TCP."""
+    return _SECURED + endpoint.removeprefix(_PLAIN) if endpoint.startswith(_PLAIN) else endpoint
+
+
+def is_local(endpoint: str) -> bool:
+    """Return whether only processes of this host reach an address."""
+    protocol, _, place = endpoint.partition("/")
+    host = place.rpartition(":")[0].strip("[]")
+    return protocol.startswith("unix") or host in ("localhost", "::1") or host.startswith("127.")

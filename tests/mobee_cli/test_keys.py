@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`mobee keys`: what it makes and says, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mobee_cli.__main__ import main
+
+
+def test_keys_are_made_listed_added_and_renewed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "keys"
+    assert main(["keys", "new", str(folder), "--parts", "arm", "--days", "100"]) == 0
+    said = capsys.readouterr().out
+    assert f"Next: mobee launch --secure --keys {folder}" in said
+    assert "valid for 100 days" in said
+    assert main(["keys", "add", "--keys", str(folder), "tool", "robot_sim", "--days", "10"]) == 0
+    assert capsys.readouterr().out.startswith("made tool (client) in")
+    assert main(["keys", "add", "--keys", str(folder), "mine", "--as", "driver"]) == 0
+    capsys.readouterr()
+    assert main(["keys", "list", "--keys", str(folder), "--json"]) == 0
+    rows = {row["name"]: (row["party"], row["days_left"]) for row in json.loads(capsys.readouterr().out)}
+    assert rows["agent_arm"] == ("agent", 99)
+    assert rows["robot_sim"] == ("robot_sim", 9)
+    assert rows["tool"] == ("client", 9)
+    assert rows["mine"] == ("driver", 364)
+    assert rows["router"] == ("router", 99)
+    assert main(["keys", "list", "--keys", str(folder)]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["new", "{folder}"], 3, "holds files already"),
+        (["new", "{folder}/x", "--days", "0"], 2, "give 1 to 3650 days"),
+        (["add", "--keys", "{folder}", "model", "--as", "client"], 2, "model is the name of a service"),
+        (["add", "--keys", "{folder}", "a b"], 3, "cannot name an identity"),
+        (["list", "--keys", "{folder}/none"], 3, "`mobee keys new` makes a folder of keys"),
+    ],
+)
+def test_mistakes_are_said_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, said: str
+) -> None:
+    folder = tmp_path / "keys"
+    assert main(["keys", "new", str(folder)]) == 0
+    capsys.readouterr()
+    assert main(["keys", *(word.format(folder=folder) for word in arguments)]) == code
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+    assert told.err.count("\n") == 1
