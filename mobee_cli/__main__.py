@@ -106,8 +106,10 @@ def _run(verb: str, arguments: list[str]) -> int:
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     try:
-        parser = parser_of(verb)
-        return int(importlib.import_module(f"mobee_cli.{verb}").run(parser.parse_args(arguments)))
+        given = parser_of(verb).parse_args(arguments)
+        if folder := getattr(given, "operator_keys", None):
+            os.environ["MOBEE_KEYS"] = folder  # as services.common.identity, which is not imported here, names it
+        return int(importlib.import_module(f"mobee_cli.{verb}").run(given))
     except UserError as error:
         print(f"mobee {verb}: {' '.join(str(error).split())}", file=sys.stderr)
         return error.code

@@ -10,15 +10,18 @@ from typing import Any
 
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT
+from services.common.identity import IDENTITY, KEYS, OPERATOR, BadKeys
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 
 PATIENCE = 0.3  # s: a system that runs answers at once
 
 
 def add_endpoint(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the address of the router."""
+    """Add the options for the address of the router, and for the keys of a secured system."""
     text = "address of the router (default: %(default)s)"
     parser.add_argument("--endpoint", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ADDRESS", help=text)
+    text = f"folder of keys of a secured system (default: ${KEYS}); the identity is {OPERATOR}, unless ${IDENTITY} names another"
+    parser.add_argument("--keys", dest="operator_keys", metavar="DIR", help=text)
 
 
 def endpoint(text: str) -> str:
@@ -34,7 +37,7 @@ def connected(endpoint: str, patience: float = PATIENCE) -> Iterator[Any]:
     """Open a session with the running system; raises UserError if there is none within `patience` s."""
     try:
         session = open_client(endpoint, patience=patience)
-    except BusUnreachable as error:
+    except (BusUnreachable, BadKeys) as error:
         raise UserError(str(error), ENVIRONMENT) from None
     with session:
         yield session

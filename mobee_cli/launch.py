@@ -8,7 +8,10 @@ from pathlib import Path
 
 from experiments.kit.command_line import positive_number, positive_whole
 from mobee_cli.connect import endpoint
+from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_cameras
+from services.common.exit_codes import BAD_INPUT
+from services.common.identity import default_folder
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 
@@ -38,11 +41,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     text = "address of the router (default: the scenario's, or tcp/127.0.0.1:7447)"
     parser.add_argument("--endpoint", type=endpoint, metavar="ADDRESS", help=text)
+    parser.add_argument("--secure", action="store_true", help="admit only processes with keys, each to what is its own")
+    text = "folder of keys for --secure (default: the one that `mobee keys new` makes)"
+    parser.add_argument("--keys", type=Path, metavar="DIR", help=text)
+    text = "allow an ADDRESS that other hosts reach, without --secure: every program that reaches it can move the robot"
+    parser.add_argument("--insecure", action="store_true", help=text)
     parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="parent of the run's folder (default: runs)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Launch, and return at the end."""
+    if arguments.keys is not None and not arguments.secure:
+        raise UserError("--keys is for --secure: give both, or neither", BAD_INPUT)
+    if arguments.secure and arguments.insecure:
+        raise UserError("--secure and --insecure contradict each other: give one of them", BAD_INPUT)
     return launch(
         Options(
             scenario=arguments.scenario,
@@ -56,5 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
             json=arguments.json,
             endpoint=arguments.endpoint,
             runs=arguments.runs,
+            keys=(arguments.keys or default_folder()) if arguments.secure else None,
+            insecure=arguments.insecure,
         )
     )

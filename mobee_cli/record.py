@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"recording {arguments.endpoint} to {folder}/messages-*.mcap; Ctrl-C ends it", flush=True)
     settings = {name: getattr(arguments, name) for name in ("endpoint", "namespace", "robot", "largest", "everything")}
     try:
-        record(f"record_{os.getpid()}", convert({**settings, "run_dir": str(folder)}, Config))
+        record(f"mobee_record_{os.getpid()}", convert({**settings, "run_dir": str(folder)}, Config))
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
     except (MobeeError, ValidationError) as error:

@@ -103,8 +103,9 @@ def require_private(path: Path) -> None:
 
 
 def default_folder() -> Path:
-    """Return the folder in which `mobee keys` keeps the keys unless another is named."""
-    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "mobee" / "keys"
+    """Return the folder of keys of this user, unless a command names another."""
+    given = os.environ.get(KEYS)
+    return Path(given) if given else Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "mobee" / "keys"
 
 
 def secured(endpoint: str) -> str:

@@ -17,6 +17,7 @@ from bus_schema.messages import Served
 from bus_schema.rpc import Empty, Failure, Reply, Request
 from mobee.errors import MobeeError
 from services.common.bus import Bus
+from services.common.identity import Identity
 
 _R = TypeVar("_R", bound=Reply)
 TIMEOUT = 0.5  # s
@@ -99,7 +100,8 @@ def _result(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R | CallFailed:
 
 
 def _no_answer(key: str) -> str:
-    return f"{key}: no service answers"
+    identity = Identity.of_environment()
+    return f"{key}: no service answers" + (f", or {identity.name} may not call it" if identity else "")
 
 
 def _read(key: str, answer: zenoh.Reply, reply: type[_R]) -> _R:

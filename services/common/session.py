@@ -13,6 +13,8 @@ from contextlib import contextmanager, suppress
 
 import zenoh
 
+from services.common.identity import Identity, secured
+
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
@@ -85,30 +87,39 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
     """Open a session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
     `namespace`: prefix of all keys, of the robot or of the filter in front of it.  `lease`: s without a message after which this process
-    counts as dead.
+    counts as dead.  If the environment names an identity, the connection is secured by it; raises BadKeys if that is not possible.
     """
+    identity = Identity.of_environment()
     settings: dict[str, object] = {
         "mode": "client",
-        "connect/endpoints": [endpoint],
         "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
     }
+    if identity is not None:
+        identity.require()
+        endpoint = secured(endpoint)
+        settings |= identity.settings()
+    settings["connect/endpoints"] = [endpoint]
     give_up = time.monotonic() + patience
     while True:
         try:
             return zenoh.open(_config(namespace, lease, settings))
         except zenoh.ZError as error:
             if time.monotonic() >= give_up:
+                secure = "its keys with --keys, if it is secured" if identity is None else f"other keys than {identity.folder} with --keys"
                 raise BusUnreachable(
                     f"no router at {endpoint} within {patience:g} s ({_reason(error)}). Is the system up? Start it with `mobee launch`, "
-                    "or name its endpoint with --endpoint."
+                    f"or name its endpoint with --endpoint, or {secure}."
                 ) from None
             time.sleep(0.1)
 
 
-def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -> zenoh.Session:
+def open_router(
+    endpoint: str, lease: float = LEASE, local_endpoint: str = "", identity: Identity | None = None, access: dict[str, object] | None = None
+) -> zenoh.Session:
     """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable.
 
-    Connections that say nothing are closed soon, and many may wait meanwhile, so that they keep nobody out.
+    `identity`, `access`: the certificate that a secured router shows, and its access list.  Connections that say nothing are closed soon,
+    and many may wait meanwhile, so that they keep nobody out.
     """
     settings: dict[str, object] = {
         "mode": "router",
@@ -117,6 +128,8 @@ def open_router(endpoint: str, lease: float = LEASE, local_endpoint: str = "") -
         "transport/unicast/accept_timeout": 5000,  # ms
         "transport/unicast/max_sessions": _MOST_CONNECTIONS,
     }
+    if identity is not None:
+        settings |= {**identity.settings(), "access_control": access}
     if local_endpoint:
         settings |= _NOT_HELD_UP
     _allow_many_descriptors()

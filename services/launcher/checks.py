@@ -73,7 +73,7 @@ def check_ports(scenario: Scenario, endpoint: str) -> None:
 
 def launcher_at(endpoint: str) -> Stat | None:
     """Return the status of the launcher whose router listens at a TCP endpoint; None if none answers."""
-    host, _, port = endpoint.removeprefix("tcp/").rpartition(":")
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_TIMEOUT).close()
         with open_client(endpoint, patience=0.0) as session:

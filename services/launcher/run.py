@@ -21,6 +21,8 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.emergency_stop import BY_LAUNCHER, StopRecord
 from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
+from services.common.identity import BadKeys, assume, is_local, secured
+from services.common.refusals import RefusalLog
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.common.session import (
@@ -50,6 +52,7 @@ from services.launcher.child import Program
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
+from services.launcher.security import LAUNCHER, Refusals, Security
 from services.launcher.stops import EmergencyStops
 from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
@@ -74,6 +77,8 @@ class Options:
     json: bool = False
     endpoint: str | None = None
     runs: Path = Path("runs")
+    keys: Path | None = None  # folder of keys; with it the system is secured
+    insecure: bool = False  # an address that other hosts reach is allowed without keys
 
 
 def launch(options: Options) -> int:
@@ -95,13 +100,17 @@ def refused_now(options: Options) -> int:
 
 
 def _endpoint(options: Options, scenario: Scenario) -> str:
-    return options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+    endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+    return endpoint if options.keys is None else secured(endpoint)
 
 
 def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
     started, local = time.monotonic(), ""
     try:
         scenario = _read(options)
+        endpoint = _endpoint(options, scenario)
+        security = _security(options, scenario, endpoint)
+        log = None if security is None else RefusalLog.open()
         library()  # if the core cannot be loaded: one error here instead of one from each service
         check_gains(scenario)
         check_lockstep(scenario)
@@ -109,17 +118,18 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         check_services(scenario, robots)
         check_rate(scenario, robots)
         check_extras(scenario)
-        endpoint = _endpoint(options, scenario)
         check_ports(scenario, endpoint)
         lease = LEASE
         if scenario.is_locked:
             spare_threads()
-            local, lease = open_meanwhile.enter_context(local_endpoint()), max(part.config.patience for part in scenario.parts)
-        router = open_meanwhile.enter_context(open_router(endpoint, lease, local))
+            lease = max(part.config.patience for part in scenario.parts)
+            local = "" if security else open_meanwhile.enter_context(local_endpoint())  # a socket shows no certificate
+        identity, access = (security.router, security.access) if security else (None, None)
+        router = open_meanwhile.enter_context(open_router(endpoint, lease, local, identity, access))
         session = open_client(local or endpoint, lease=lease)  # the router itself runs no Python, so that nothing here delays a message
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable, BadKeys) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before any service was started", INTERRUPTED)
@@ -136,7 +146,29 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
             ENVIRONMENT,
         )
     with service, router.liveliness().declare_token(keys.alive("router", service.instance)):
-        return _Run(service, scenario, directory, options, local, record).execute(started)
+        run = _Run(service, scenario, directory, options, local, security, record)
+        if log is not None:
+            Refusals(service, log)
+        return run.execute(started)
+
+
+def _security(options: Options, scenario: Scenario, endpoint: str) -> Security | None:
+    """Return the keys of a secured launch, and give this process the launcher's; raises ConfigError for an open endpoint without them."""
+    if options.keys is None:
+        assume(None)
+        if not is_local(endpoint):
+            if not options.insecure:
+                raise ConfigError(
+                    f"other hosts can reach {endpoint}: launch with --secure, for which `mobee keys new` makes the keys, or with "
+                    "--insecure: then every program that reaches it can move the robot"
+                )
+            print(f"mobee launch: every program that reaches {endpoint} can move the robot", file=sys.stderr)
+        return None
+    security = Security(options.keys, scenario)
+    assume(security.identity(LAUNCHER))
+    if security.expiring:
+        print(f"mobee launch: keys expire soon, renew them with `mobee keys add`: {', '.join(security.expiring)}", file=sys.stderr)
+    return security
 
 
 def _read(options: Options) -> Scenario:
@@ -164,13 +196,22 @@ def _refuse(text: str, code: int) -> int:
 class _Run:
     """The state of one run, in the launcher's main thread."""
 
-    def __init__(self, service: Service, scenario: Scenario, directory: Path, options: Options, local: str, record: StopRecord) -> None:
+    def __init__(
+        self,
+        service: Service,
+        scenario: Scenario,
+        directory: Path,
+        options: Options,
+        local: str,
+        security: Security | None,
+        record: StopRecord,
+    ) -> None:
         """`local`: the address at which the services connect to the router, if not its endpoint; `record`: of emergency stops."""
         self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
         self._record = record
         self._stops = EmergencyStops(service, record, self._announce)
-        self._supervisor = Supervisor(service, _programs(scenario, directory, local), self._stops, self._announce)
+        self._supervisor = Supervisor(service, _programs(scenario, directory, local, security), self._stops, self._announce)
         self._children = self._supervisor.children.values()
         self._stop_requested, self._starting = False, True
 
@@ -307,7 +348,7 @@ def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None
     waiting.discard(who)
 
 
-def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
+def _programs(scenario: Scenario, directory: Path, local: str, security: Security | None) -> list[Program]:
     return [
         Program(
             who=part.who,
@@ -319,7 +360,10 @@ def _programs(scenario: Scenario, directory: Path, local: str) -> list[Program]:
             vital=part.entry.vital,
             may_end=part.entry.may_end,
             patience=part.config.patience if scenario.is_locked else 0.0,
-            environment={LOCAL_ENDPOINT: local} if local and part.entry.vital else {},  # nothing waits for the others
+            environment={
+                **({LOCAL_ENDPOINT: local} if local and part.entry.vital else {}),  # nothing waits for the others
+                **(security.identity(part.who).environment() if security else {}),
+            },
         )
         for part in scenario.parts
     ]

@@ -22,6 +22,7 @@ from bus_schema.messages import Clock, Event, Message, Motion, State
 from bus_schema.rpc import Empty, Stat
 from experiments.kit.live.launch import free_endpoint
 from services.common import rpc
+from services.common.identity import Identity, assume
 from services.common.session import open_client
 
 PARTS = ("torso", "head", "left_arm", "right_arm")
@@ -61,6 +62,7 @@ def launch(
     ticks: int | None = None,
     endpoint: str | None = None,
     record: bool = False,
+    keys: Path | None = None,
 ) -> Launch:
     endpoint, runs, errors = endpoint or free_endpoint(), folder / "runs", folder / "launcher.err"
     argv = [sys.executable, "-m", "mobee_cli", "launch", scenario, "--endpoint", endpoint, "--runs", str(runs), "--json"]
@@ -68,6 +70,7 @@ def launch(
     argv += [] if record else ["--no-record"]
     argv += ["--duration", str(duration)] if duration else []
     argv += ["--ticks", str(ticks)] if ticks else []
+    argv += ["--secure", "--keys", str(keys)] if keys else []
     for setting in settings:
         argv += ["--set", setting]
     with errors.open("w") as sink:
@@ -76,13 +79,15 @@ def launch(
 
 
 @contextmanager
-def running(folder: Path, scenario: str, *settings: str, headless: bool = True) -> Iterator[tuple[Launch, Watcher]]:
-    """A system that is ready, and a client that watches it; stopped as by Ctrl-C afterwards."""
-    system = launch(folder, scenario, *settings, headless=headless)
+def running(
+    folder: Path, scenario: str, *settings: str, headless: bool = True, keys: Path | None = None
+) -> Iterator[tuple[Launch, Watcher]]:
+    """A system that is ready, and a client that watches it, of a secured one as operator; stopped as by Ctrl-C afterwards."""
+    system = launch(folder, scenario, *settings, headless=headless, keys=keys)
     try:
         until(lambda: "all ready" in system.errors.read_text() or system.process.poll() is not None, 120.0, "the system is ready")
         assert system.process.poll() is None, system.errors.read_text()[-3000:]
-        with Watcher(system.endpoint) as watcher:
+        with acting_as(keys and Identity(keys, "operator")), Watcher(system.endpoint) as watcher:
             until(lambda: watcher.clock, 20.0, "the watcher gets the clock")
             yield system, watcher
     finally:
@@ -93,6 +98,17 @@ def running(folder: Path, scenario: str, *settings: str, headless: bool = True) 
         except subprocess.TimeoutExpired:
             os.killpg(system.process.pid, signal.SIGKILL)
             raise
+
+
+@contextmanager
+def acting_as(identity: Identity | None) -> Iterator[None]:
+    """Sessions that are opened in the `with` block have the identity."""
+    before = Identity.of_environment()
+    assume(identity)
+    try:
+        yield
+    finally:
+        assume(before)
 
 
 def until(condition: Callable[[], Any], timeout: float, what: str) -> Any:

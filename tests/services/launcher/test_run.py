@@ -277,3 +277,48 @@ def test_a_runs_folder_that_cannot_be_written_is_refused_in_one_line(tmp_path: P
     assert done.returncode == 3
     assert len(done.stderr.splitlines()) == 1
     assert str(tmp_path / "file") in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "said"),
+    [
+        (("--endpoint", "tcp/0.0.0.0:{port}"), 2, "other hosts can reach tcp/0.0.0.0:{port}: launch with --secure, "),
+        (("--secure", "--keys", "{folder}/none"), 3, "{folder}/none: No such file or directory; `mobee keys new` makes a folder of keys"),
+        (("--secure", "--keys", "{folder}"), 3, "is missing: {folder} is no folder of keys"),
+        (("--keys", "{folder}"), 2, "--keys is for --secure"),
+        (("--secure", "--insecure"), 2, "contradict each other"),
+    ],
+)
+def test_a_launch_without_the_keys_that_it_needs_is_refused_in_one_line(
+    tmp_path: Path, free_port: int, options: tuple[str, ...], code: int, said: str
+) -> None:
+    tmp_path.chmod(0o700)
+    (tmp_path / "toys.toml").write_text(toys(one="healthy"))
+    given = [option.format(folder=tmp_path, port=free_port) for option in options]
+    done = mobee("launch", str(tmp_path / "toys.toml"), "--runs", str(tmp_path / "runs"), *given)
+    assert done.returncode == code, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert said.format(folder=tmp_path, port=free_port) in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_an_insecure_launch_for_other_hosts_warns_and_starts(launch: Launch, free_port: int) -> None:
+    launched = launch(toys(one="healthy"), "--insecure", "--duration", "0.1", at=f"tcp/0.0.0.0:{free_port}")
+    assert launched.end()[0] == 0
+    assert launched.news.splitlines()[0] == f"mobee launch: every program that reaches tcp/0.0.0.0:{free_port} can move the robot"
+
+
+def test_a_secured_launch_names_the_service_that_has_no_keys(tmp_path: Path, endpoint: str) -> None:
+    from services.common.certificates import KeyFolder
+
+    KeyFolder.new(tmp_path / "keys", [("router", None), ("launcher", "launcher")])
+    (tmp_path / "toys.toml").write_text(toys(one="healthy"))
+    done = mobee("launch", str(tmp_path / "toys.toml"), "--endpoint", endpoint, "--secure", "--keys", str(tmp_path / "keys"))
+    assert done.returncode == 3
+    assert "one.crt is missing, so that nothing can connect as one: make it with `mobee keys add one --keys" in done.stderr
+
+
+def test_services_of_a_launch_do_not_inherit_the_keys_of_its_user(launch: Launch, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("MOBEE_KEYS", str(tmp_path))
+    launched = launch(toys(one="healthy"), "--duration", "0.1")
+    assert launched.end()[0] == 0

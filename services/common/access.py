@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The access list of a secured router, in Zenoh's form, from the table of who may do what (bus_schema/authority.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from bus_schema.authority import ROUTER, Rights, rights_of
+from bus_schema.keys import ALL_ALIVE
+from bus_schema.stream import Party
+
+_HISTORY = "@adv"  # chunk of the keys by which Zenoh's advanced publishers and subscribers exchange past messages
+_ALL = ("put", "delete", "declare_subscriber", "declare_queryable", "query", "reply", "liveliness_token")
+_TO_CLIENTS = [*_ALL, "liveliness_query", "declare_liveliness_subscriber"]
+
+STANDS_FOR: Mapping[Party, Party] = {"port_filter": "robot_sim"}
+"""In the namespace of its clients the filter has the place of the robot."""
+
+
+def access_list(identities: Mapping[str, Party], namespace: str, clients: str = "") -> dict[str, object]:
+    """Return Zenoh's setting `access_control`; what it does not allow is denied, and so is every identity that is not listed.
+
+    Args:
+        identities: names in the certificates, with their parties.
+        namespace: prefix of all keys of the robot.
+        clients: prefix of the keys of the filtered robot; empty if there is none.
+    """
+    rules: list[dict[str, object]] = [_rule("to all", "egress", _TO_CLIENTS, ("**", f"**/{_HISTORY}/**"))]
+    policies, subjects = [], []
+    for name, party in identities.items():
+        allowed = _ingress(rights_of(name, party), namespace)
+        if clients:
+            stands_for = STANDS_FOR.get(party, party)
+            rights = rights_of(stands_for if stands_for != party else name, stands_for)
+            allowed = [
+                (messages, (*mine, *theirs)) for (messages, mine), (_, theirs) in zip(allowed, _ingress(rights, clients), strict=True)
+            ]
+            if stands_for != party:
+                allowed.append((["liveliness_token"], (f"{clients}/alive/{ROUTER}/*",)))
+        own = [_rule(f"{name} {number}", "ingress", messages, keys) for number, (messages, keys) in enumerate(allowed) if keys]
+        rules += own
+        subjects.append({"id": name, "cert_common_names": [name]})
+        policies.append({"subjects": [name], "rules": ["to all", *(rule["id"] for rule in own)]})
+    return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
+
+
+def _rule(name: str, flow: str, messages: Sequence[str], keys: Iterable[str]) -> dict[str, object]:
+    return {"id": name, "permission": "allow", "flows": [flow], "messages": list(messages), "key_exprs": list(dict.fromkeys(keys))}
+
+
+def _ingress(rights: Rights, namespace: str) -> list[tuple[list[str], tuple[str, ...]]]:
+    """Return what an identity may send to the router: Zenoh's kinds of messages, each with its key expressions."""
+
+    def at(keys: Iterable[str], suffix: str = "") -> tuple[str, ...]:
+        return tuple(f"{namespace}/{key}{suffix}" for key in keys)
+
+    sent, requested = f"/{_HISTORY}/pub/**", f"/{_HISTORY}/**"
+    return [
+        (["put"], at(rights.writes)),
+        (["declare_subscriber"], at(rights.reads)),
+        (["query"], (*at(rights.calls), *at(rights.catches_up, requested))),
+        (["declare_queryable", "reply"], (*at(rights.answers), *at(rights.keeps, sent))),
+        (["reply"], at(rights.keeps)),  # a past message has the key with which it was published
+        (["liveliness_token"], (*at(rights.tokens), *at(rights.keeps, sent))),
+        (["liveliness_query", "declare_liveliness_subscriber"], (*at([ALL_ALIVE]), *at(rights.catches_up, sent))),
+    ]

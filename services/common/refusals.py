@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a secured router refuses: connections without a valid certificate, and messages that the access list does not allow.
+
+Zenoh reports these in its log alone, on the standard output of the process.  There the log goes to a pipe, which is read several times a
+second; what the program itself prints still goes to the standard output.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import zenoh
+
+LEVELS = "zenoh::net::routing::interceptor::access_control=trace,zenoh_link_tls=warn"
+_LOG_LEVELS, _NO_COLOUR = "RUST_LOG", "NO_COLOR"  # environment variables that Zenoh reads
+_PIPE_SIZE = 1 << 20  # bytes: the log of half a second; if nobody reads it, Zenoh drops lines instead of waiting
+_CHUNK = 1 << 16
+
+_DENIED = re.compile(
+    r"(?P<session>[0-9a-f]+)(?: on \S*CertCommonName\((?P<name>[^)]*)\)\S*)? is unauthorized to "
+    r"(?P<action>[^(]+) \(ingress\) on (?P<key>\S+)"
+)
+_CACHED = "Using cached result"
+_PREPARES = re.compile(r"(?P<thread>ThreadId\(\d+\)).*ACL \((?:in|e)gress\): caching permissions for `(?P<key>[^`]*)`")
+_THREAD = re.compile(r"ThreadId\(\d+\)")
+_STRANGER = re.compile(r"(?P<session>[0-9a-f]+) did not match any configured ACL subject")
+_MATTERS = (b"is unauth", b"WARN", b"did not match", b"caching")  # in each line that is read; there are thousands of others a second
+_LINK = re.compile(r"zenoh_link_tls\S* (?P<why>.*?)\.? Hint:")
+_GAVE_UP = "tls handshake eof"  # the other side has ended the connection, for example because the machine is busy
+
+_SAID = {
+    "Put": "publish on",
+    "Delete": "delete",
+    "Query": "call",
+    "Reply": "answer",
+    "Declare Subscriber": "read",
+    "Declare Queryable": "answer",
+    "Liveliness Token": "declare the token",
+    "Liveliness Query": "read the tokens",
+    "Declare Liveliness Subscriber": "read the tokens",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Something that was refused; the same one is equal however often it happens."""
+
+    text: str
+
+    @classmethod
+    def of_message(cls, name: str, action: str, key: str) -> Refusal:
+        """The refusal of a message."""
+        return cls(f"{name} may not {_SAID.get(action, action.lower())} {key}")
+
+
+@dataclass
+class RefusalLog:
+    """Reads Zenoh's log of a router in this process."""
+
+    _reader: int
+    _rest: bytes = b""
+    _names: dict[str, str] = field(default_factory=dict)  # of identities, by the id of their session
+    _prepared: dict[str, tuple[str, set[str]]] = field(
+        default_factory=dict
+    )  # by thread: the key whose permissions it computes, which of them
+
+    @classmethod
+    def open(cls) -> RefusalLog:
+        """Send Zenoh's log to a pipe; call it once in a process, before its first session."""
+        import fcntl  # not on Windows
+
+        reader, writer = os.pipe()
+        for end in (reader, writer):
+            os.set_blocking(end, False)
+        if hasattr(fcntl, "F_SETPIPE_SZ"):
+            fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE_SIZE)
+        sys.stdout.flush()
+        sys.stdout = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+        os.dup2(writer, 1, inheritable=False)
+        os.close(writer)
+        before = {name: os.environ.get(name) for name in (_LOG_LEVELS, _NO_COLOUR)}
+        os.environ.update({_LOG_LEVELS: LEVELS, _NO_COLOUR: "1"})
+        zenoh.init_log_from_env_or(LEVELS)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+        return cls(reader)
+
+    def take(self) -> Counter[Refusal]:
+        """Return what was refused since the last call, and how often."""
+        found: Counter[Refusal] = Counter()
+        for line in self._lines():
+            if refusal := self._refusal(line):
+                found[refusal] += 1
+        return found
+
+    def _lines(self) -> Iterator[str]:
+        """Yield the new lines that matter."""
+        while True:
+            try:
+                chunk = os.read(self._reader, _CHUNK)
+            except BlockingIOError:
+                return
+            whole, _, self._rest = (self._rest + chunk).rpartition(b"\n")
+            if any(word in whole for word in _MATTERS):
+                lines = whole.split(b"\n")
+                yield from (line.decode(errors="replace") for line in lines if any(word in line for word in _MATTERS))
+
+    def _refusal(self, line: str) -> Refusal | None:
+        if denied := _DENIED.search(line):
+            session, action, key = denied["session"], denied["action"].strip(), denied["key"]
+            if denied["name"]:
+                self._names[session] = denied["name"]
+            if action.startswith("Undeclare") or self._is_preparation(line, action, key):
+                return None
+            return Refusal.of_message(self._names.get(session, f"session {session}"), action, key)
+        if prepares := _PREPARES.search(line):
+            self._prepared[prepares["thread"]] = (prepares["key"], set())
+        elif stranger := _STRANGER.search(line):
+            return Refusal(f"session {stranger['session']} has a certificate of no identity that this system knows: it may do nothing")
+        elif (link := _LINK.search(line)) and link["why"] != _GAVE_UP:
+            return Refusal(f"a connection was refused: {link['why']}")
+        return None
+
+    def _is_preparation(self, line: str, action: str, key: str) -> bool:
+        """Return whether Zenoh computes what a session may do with a key, before the session has done anything.
+
+        A thread reports each kind of message once then, directly after it has named the key.
+        """
+        if _CACHED in line or not (thread := _THREAD.search(line)):
+            return False
+        prepared, seen = self._prepared.get(thread[0], ("", set()))
+        if prepared != key or action in seen:
+            self._prepared.pop(thread[0], None)
+            return False
+        seen.add(action)
+        return True

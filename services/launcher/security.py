@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Security of a launched system: keys that are checked before the start, the access list of the router, and reports of what it refuses."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from services.common.access import access_list
+from services.common.identity import ROUTER, Identity
+from services.common.refusals import Refusal, RefusalLog
+from services.common.service import Service
+from services.common.session import NAMESPACE
+from services.launcher.scenario import Scenario
+
+LAUNCHER = "launcher"
+_PERIOD = 0.2  # s between two checks for refusals
+_SAY_AGAIN = 10.0  # s after which a refusal that goes on is reported again
+_MOST = 1000  # different refusals that are remembered
+
+
+class Security:
+    """The keys of one launch."""
+
+    def __init__(self, folder: Path, scenario: Scenario) -> None:
+        """Check the keys of all services; raises BadKeys, with a remedy, for the first that cannot be used."""
+        from services.common.certificates import SOON, KeyFolder  # 0.1 s, which a launch without keys does not wait for
+
+        keys = KeyFolder(folder.resolve())
+        keys.require([ROUTER, LAUNCHER, *(part.who for part in scenario.parts)])
+        issued = keys.issued()
+        self.folder = keys.path
+        self.router = Identity(keys.path, ROUTER)
+        clients = next((part.config.clients for part in scenario.parts if hasattr(part.config, "clients")), "")
+        self.access = access_list({one.name: one.party for one in issued if one.party is not None}, NAMESPACE, clients)
+        self.expiring = [f"{one.name} on {one.until:%Y-%m-%d}" for one in issued if one.days_left() < SOON]
+
+    def identity(self, who: str) -> Identity:
+        """Return the identity of a service."""
+        return Identity(self.folder, who)
+
+
+class Refusals:
+    """Reports what the router refuses as events, each once in ten seconds however often it happens."""
+
+    def __init__(self, service: Service, log: RefusalLog) -> None:
+        self._service, self._log = service, log
+        self._said: dict[Refusal, float] = {}  # monotonic time of the last report
+        self._unsaid: dict[Refusal, int] = {}
+        self._check()
+
+    def _check(self) -> None:
+        now = time.monotonic()
+        for refusal, times in self._log.take().items():
+            self._service.bus.rejected["access"] += times
+            if refusal in self._unsaid or len(self._unsaid) < _MOST:
+                self._unsaid[refusal] = self._unsaid.get(refusal, 0) + times
+        for refusal in [one for one in self._unsaid if now - self._said.get(one, -_SAY_AGAIN) >= _SAY_AGAIN]:
+            times = self._unsaid.pop(refusal)
+            if len(self._said) >= _MOST:
+                self._said.clear()
+            self._said[refusal] = now
+            self._service.bus.event("warning", "access", refusal.text, times=times)
+        self._service.inbox.at(now + _PERIOD, self._check)
