@@ -13,8 +13,10 @@ _HISTORY = "@adv"  # chunk of the keys by which Zenoh's advanced publishers and 
 _ALL = ("put", "delete", "declare_subscriber", "declare_queryable", "query", "reply", "liveliness_token")
 _TO_CLIENTS = [*_ALL, "liveliness_query", "declare_liveliness_subscriber"]
 
-STANDS_FOR: Mapping[Party, Party] = {"port_filter": "robot_sim"}
-"""In the namespace of its clients the filter has the place of the robot."""
+FILTER: Party = "port_filter"  # in the namespace of its clients it has the place of ROBOT
+ROBOT: Party = "robot_sim"
+OPERATOR: Party = "operator"
+_SOCKET = "unixsock-stream"  # the protocol of a socket in the folder of keys, which only the user of the system reaches
 
 
 def access_list(identities: Mapping[str, Party], namespace: str, clients: str = "") -> dict[str, object]:
@@ -25,22 +27,21 @@ def access_list(identities: Mapping[str, Party], namespace: str, clients: str = 
         namespace: prefix of all keys of the robot.
         clients: prefix of the keys of the filtered robot; empty if there is none.
     """
-    rules: list[dict[str, object]] = [_rule("to all", "egress", _TO_CLIENTS, ("**", f"**/{_HISTORY}/**"))]
-    policies, subjects = [], []
-    for name, party in identities.items():
+    rules = [_rule("to all", "egress", _TO_CLIENTS, ("**", f"**/{_HISTORY}/**"))]
+    subjects: list[dict[str, object]] = []
+    policies: list[dict[str, object]] = []
+    shown: list[tuple[dict[str, object], str, Party]] = [({"link_protocols": [_SOCKET]}, OPERATOR, OPERATOR)]
+    shown += [({"cert_common_names": [name]}, name, party) for name, party in identities.items()]
+    for number, (subject, name, party) in enumerate(shown):
         allowed = _ingress(rights_of(name, party), namespace)
         if clients:
-            stands_for = STANDS_FOR.get(party, party)
-            rights = rights_of(stands_for if stands_for != party else name, stands_for)
-            allowed = [
-                (messages, (*mine, *theirs)) for (messages, mine), (_, theirs) in zip(allowed, _ingress(rights, clients), strict=True)
-            ]
-            if stands_for != party:
-                allowed.append((["liveliness_token"], (f"{clients}/alive/{ROUTER}/*",)))
-        own = [_rule(f"{name} {number}", "ingress", messages, keys) for number, (messages, keys) in enumerate(allowed) if keys]
+            allowed += _ingress(rights_of(name, party), clients)
+        if clients and party == FILTER:
+            allowed += [*_ingress(rights_of(ROBOT, ROBOT), clients), (["liveliness_token"], (f"{clients}/alive/{ROUTER}/*",))]
+        own = [_rule(f"{number}.{place}", "ingress", messages, keys) for place, (messages, keys) in enumerate(allowed) if keys]
         rules += own
-        subjects.append({"id": name, "cert_common_names": [name]})
-        policies.append({"subjects": [name], "rules": ["to all", *(rule["id"] for rule in own)]})
+        subjects.append({"id": str(number), **subject})
+        policies.append({"subjects": [str(number)], "rules": [rule["id"] for rule in (rules[0], *own)]})
     return {"enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies}
 
 

@@ -16,6 +16,7 @@ KEYS, IDENTITY = "MOBEE_KEYS", "MOBEE_IDENTITY"
 OPERATOR = "operator"  # the identity of the commands at a terminal, unless another is named
 ROUTER = "router"  # the only identity that a process may listen with
 AUTHORITY = "ca"
+LONGEST_SOCKET = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
 _SECURED, _PLAIN = "tls/", "tcp/"
 
 
@@ -54,6 +55,20 @@ class Identity:
     def authority(self) -> Path:
         """The certificate of the authority, by which others are checked."""
         return self.folder / f"{AUTHORITY}.crt"
+
+    def socket(self, endpoint: str) -> str:
+        """Return the address, besides `endpoint`, at which a secured router listens for the commands of its user; empty if it has none.
+
+        Only who may read the keys reaches it, and no connection of others is handled before theirs.
+        """
+        path = self.folder / f"{endpoint.rpartition(':')[2]}.sock"
+        return f"unixsock-stream/{path}" if os.name == "posix" and len(os.fsencode(path)) <= LONGEST_SOCKET else ""
+
+    def endpoints(self, endpoint: str) -> list[str]:
+        """Return the addresses at which this identity reaches the secured router that listens at `endpoint`, the best first."""
+        socket = self.socket(endpoint) if self.name == OPERATOR and is_local(endpoint) else ""
+        here = socket and Path(socket.partition("/")[2]).exists()
+        return [socket, secured(endpoint)] if here else [secured(endpoint)]
 
     def require(self) -> None:
         """Raise BadKeys if a file is missing, or if others may read the private key."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a secured router refuses: connections without a valid certificate, and messages that the access list does not allow.
 
-Zenoh reports these in its log alone, on the standard output of the process.  There the log goes to a pipe, which is read several times a
-second; what the program itself prints still goes to the standard output.
+Zenoh reports these in its log alone, on the standard output of the process.  There the log goes to a pipe, which a thread reads several
+times a second; what the program itself prints still goes to the standard output.
 """
 
 from __future__ import annotations
@@ -10,19 +10,27 @@ from __future__ import annotations
 import os
 import re
 import sys
+import threading
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import zenoh
 
+from services.common.identity import OPERATOR
+
 LEVELS = "zenoh::net::routing::interceptor::access_control=trace,zenoh_link_tls=warn"
 _LOG_LEVELS, _NO_COLOUR = "RUST_LOG", "NO_COLOR"  # environment variables that Zenoh reads
 _PIPE_SIZE = 1 << 20  # bytes: the log of half a second; if nobody reads it, Zenoh drops lines instead of waiting
-_CHUNK = 1 << 16
+_CHUNK = 1 << 16  # bytes
+_MANY_CHUNKS = _PIPE_SIZE // _CHUNK // 8  # in one reading
+_PERIOD, _SHORT_PERIOD = 0.1, 0.002  # s between two readings
+_MOST_CHUNKS = 2 * _PIPE_SIZE // _CHUNK  # in one reading
+_MOST_NAMES = 1000
 
 _DENIED = re.compile(
-    r"(?P<session>[0-9a-f]+)(?: on \S*CertCommonName\((?P<name>[^)]*)\)\S*)? is unauthorized to "
+    r"(?P<session>[0-9a-f]+)(?: on \S*?(?:CertCommonName\((?P<name>[^)]*)\)|(?P<socket>UnixsockStream))\S*)? is unauthorized to "
     r"(?P<action>[^(]+) \(ingress\) on (?P<key>\S+)"
 )
 _CACHED = "Using cached result"
@@ -65,9 +73,9 @@ class RefusalLog:
     _reader: int
     _rest: bytes = b""
     _names: dict[str, str] = field(default_factory=dict)  # of identities, by the id of their session
-    _prepared: dict[str, tuple[str, set[str]]] = field(
-        default_factory=dict
-    )  # by thread: the key whose permissions it computes, which of them
+    _found: Counter[Refusal] = field(default_factory=Counter)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _prepared: dict[str, tuple[str, set[str]]] = field(default_factory=dict)  # by thread: a key, and for what it is prepared
 
     @classmethod
     def open(cls) -> RefusalLog:
@@ -91,33 +99,47 @@ class RefusalLog:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-        return cls(reader)
+        log = cls(reader)
+        threading.Thread(target=log._watch, name="refusals", daemon=True).start()
+        return log
 
     def take(self) -> Counter[Refusal]:
         """Return what was refused since the last call, and how often."""
-        found: Counter[Refusal] = Counter()
-        for line in self._lines():
-            if refusal := self._refusal(line):
-                found[refusal] += 1
+        with self._lock:
+            found, self._found = self._found, Counter()
         return found
 
-    def _lines(self) -> Iterator[str]:
-        """Yield the new lines that matter."""
-        while True:
+    def read(self) -> bool:
+        """Read what Zenoh has logged since the last call; return whether it is much, so that the next call should come soon."""
+        for chunks in range(_MOST_CHUNKS):
             try:
                 chunk = os.read(self._reader, _CHUNK)
             except BlockingIOError:
-                return
-            whole, _, self._rest = (self._rest + chunk).rpartition(b"\n")
-            if any(word in whole for word in _MATTERS):
-                lines = whole.split(b"\n")
-                yield from (line.decode(errors="replace") for line in lines if any(word in line for word in _MATTERS))
+                return chunks > _MANY_CHUNKS
+            for line in self._lines(chunk):
+                if refusal := self._refusal(line):
+                    with self._lock:
+                        self._found[refusal] += 1
+        return True
+
+    def _watch(self) -> None:
+        """Empty the pipe also while the main thread waits: for each line that does not fit Zenoh writes an error to standard error."""
+        while True:
+            time.sleep(_SHORT_PERIOD if self.read() else _PERIOD)
+
+    def _lines(self, chunk: bytes) -> Iterator[str]:
+        """Yield the lines that matter and end in the next chunk of the log."""
+        whole, _, self._rest = (self._rest + chunk).rpartition(b"\n")
+        if any(word in whole for word in _MATTERS):
+            yield from (line.decode(errors="replace") for line in whole.split(b"\n") if any(word in line for word in _MATTERS))
 
     def _refusal(self, line: str) -> Refusal | None:
         if denied := _DENIED.search(line):
             session, action, key = denied["session"], denied["action"].strip(), denied["key"]
-            if denied["name"]:
-                self._names[session] = denied["name"]
+            if name := denied["name"] or (denied["socket"] and OPERATOR):
+                self._names[session] = name
+                if len(self._names) > _MOST_NAMES:
+                    del self._names[next(iter(self._names))]
             if action.startswith("Undeclare") or self._is_preparation(line, action, key):
                 return None
             return Refusal.of_message(self._names.get(session, f"session {session}"), action, key)

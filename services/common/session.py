@@ -13,14 +13,13 @@ from contextlib import contextmanager, suppress
 
 import zenoh
 
-from services.common.identity import Identity, secured
+from services.common.identity import LONGEST_SOCKET, Identity, secured
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
 _MOST_CONNECTIONS = 10_000  # of a router
 LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: address at which a service connects to the router, instead of its endpoint
-_LONGEST_PATH = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
 
 _COMMON = {
     "scouting/multicast/enabled": False,
@@ -80,7 +79,7 @@ def local_endpoint() -> Iterator[str]:
     """
     with tempfile.TemporaryDirectory(prefix="mobee-") as folder:
         path = f"{folder}/bus"
-        yield f"unixsock-stream/{path}" if os.name == "posix" and len(path) <= _LONGEST_PATH else ""
+        yield f"unixsock-stream/{path}" if os.name == "posix" and len(path) <= LONGEST_SOCKET else ""
 
 
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
@@ -90,15 +89,15 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
     counts as dead.  If the environment names an identity, the connection is secured by it; raises BadKeys if that is not possible.
     """
     identity = Identity.of_environment()
+    place = endpoint if identity is None else secured(endpoint)
     settings: dict[str, object] = {
         "mode": "client",
         "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
     }
     if identity is not None:
         identity.require()
-        endpoint = secured(endpoint)
         settings |= identity.settings()
-    settings["connect/endpoints"] = [endpoint]
+    settings["connect/endpoints"] = [endpoint] if identity is None else identity.endpoints(endpoint)
     give_up = time.monotonic() + patience
     while True:
         try:
@@ -107,7 +106,7 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
             if time.monotonic() >= give_up:
                 secure = "its keys with --keys, if it is secured" if identity is None else f"other keys than {identity.folder} with --keys"
                 raise BusUnreachable(
-                    f"no router at {endpoint} within {patience:g} s ({_reason(error)}). Is the system up? Start it with `mobee launch`, "
+                    f"no router at {place} within {patience:g} s ({_reason(error)}). Is the system up? Start it with `mobee launch`, "
                     f"or name its endpoint with --endpoint, or {secure}."
                 ) from None
             time.sleep(0.1)
@@ -129,7 +128,8 @@ def open_router(
         "transport/unicast/max_sessions": _MOST_CONNECTIONS,
     }
     if identity is not None:
-        settings |= {**identity.settings(), "access_control": access}
+        listens = [endpoint, *filter(None, [identity.socket(endpoint)])]
+        settings |= {**identity.settings(), "access_control": access, "listen/endpoints": listens}
     if local_endpoint:
         settings |= _NOT_HELD_UP
     _allow_many_descriptors()

@@ -17,6 +17,7 @@ LAUNCHER = "launcher"
 _PERIOD = 0.2  # s between two checks for refusals
 _SAY_AGAIN = 10.0  # s after which a refusal that goes on is reported again
 _MOST = 1000  # different refusals that are remembered
+_AT_ONCE = 4  # reports of one check: who tries a new key each time must not fill the log
 
 
 class Security:
@@ -55,7 +56,8 @@ class Refusals:
             self._service.bus.rejected["access"] += times
             if refusal in self._unsaid or len(self._unsaid) < _MOST:
                 self._unsaid[refusal] = self._unsaid.get(refusal, 0) + times
-        for refusal in [one for one in self._unsaid if now - self._said.get(one, -_SAY_AGAIN) >= _SAY_AGAIN]:
+        due = [one for one in self._unsaid if now - self._said.get(one, -_SAY_AGAIN) >= _SAY_AGAIN]
+        for refusal in due[:_AT_ONCE]:
             times = self._unsaid.pop(refusal)
             if len(self._said) >= _MOST:
                 self._said.clear()

@@ -10,12 +10,15 @@ import json
 import logging
 import os
 import re
+import socket
+import ssl
 import stat
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -351,15 +354,42 @@ def test_every_identity_may_stop_the_robot_and_a_person_releases_it(secured: Sec
     until(lambda: all(seen[-1].gate == "armed" for seen in states.values()), 20.0, "the robot is armed again")
 
 
+def fail_handshakes(port: int, over: threading.Event) -> None:
+    """Connect again and again without a certificate."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    while not over.is_set():
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0) as plain, context.wrap_socket(plain) as link:
+            link.recv(1)
+
+
+def test_strangers_who_connect_again_and_again_do_not_keep_the_operator_out(secured: Secured) -> None:
+    port, over = int(secured.system.endpoint.rpartition(":")[2]), threading.Event()
+    strangers = [threading.Thread(target=fail_handshakes, args=(port, over)) for _ in range(20)]
+    for stranger in strangers:
+        stranger.start()
+    try:
+        time.sleep(1.0)
+        with acting_as(Identity(secured.keys, "operator")), open_client(secured.system.endpoint, patience=0.0) as session:
+            assert set(secured.pids) <= set(alive(session))
+        assert secured.watcher.pid("model") == secured.pids["model"]  # who is connected stays connected
+    finally:
+        over.set()
+        for stranger in strangers:
+            stranger.join()
+
+
 # Another user of the same computer
 
 
 def test_another_user_of_the_computer_reads_neither_keys_nor_runs(secured: Secured) -> None:
-    private = [secured.keys, *secured.keys.iterdir(), secured.system.run_dir]
+    private = [secured.keys, *secured.keys.glob("*.key"), *secured.keys.glob("*.crt"), secured.system.run_dir]
     assert all(stat.S_IMODE(path.stat().st_mode) & 0o077 == 0 for path in private)
     if os.geteuid() == 0:
         for path in (secured.keys / "operator.key", secured.system.run_dir / "scenario.toml"):
             assert subprocess.run(["cat", str(path)], user=UNKNOWN, group=UNKNOWN, capture_output=True).returncode != 0
+        assert list(secured.keys.glob("*.sock"))
+        assert subprocess.run(["ls", str(secured.keys)], user=UNKNOWN, group=UNKNOWN, capture_output=True).returncode != 0
 
 
 # At the end of all of it

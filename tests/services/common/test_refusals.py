@@ -26,6 +26,7 @@ def reads() -> Callable[..., dict[str, int]]:
 
     def read(*lines: str) -> dict[str, int]:
         os.write(writer, "".join(f"{line}\n" for line in lines).encode())
+        log.read()
         return {refusal.text: times for refusal, times in log.take().items()}
 
     return read
