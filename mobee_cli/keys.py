@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -78,14 +79,15 @@ def _new(folder: Path, arguments: argparse.Namespace) -> int:
     keys = KeyFolder.new(folder, identities, arguments.days)
     given = "" if folder == default_folder() else f" --keys {folder}"
     print(f"made {len(keys.issued())} identities in {folder}, which only you can read:")
-    print(f"  services: {', '.join(SERVICES)}, router")
-    print(f"  agents:   {', '.join(arguments.parts)}")
-    print(f"  persons:  {', '.join(PERSONS)}")
-    print(f"They are valid for {arguments.days} days: `mobee keys add NAME{given}` renews one.")
-    print(f"The authority is valid for {AUTHORITY_DAYS // 365} years.")
+    for kind, listed in (("services", [*SERVICES, ROUTER]), ("agents", arguments.parts), ("persons", PERSONS)):
+        print(textwrap.fill(", ".join(listed), 80, initial_indent=f"  {kind + ':':<10}", subsequent_indent=" " * 12))
+    print(f"They are valid for {arguments.days} days, and the authority for {AUTHORITY_DAYS // 365} years. To renew one:")
+    print(f"  mobee keys add NAME{given}")
     print("Keep ca.key: who has it can make every identity. To another host take ca.crt,")
     print("and NAME.crt and NAME.key of what runs there, nothing else.")
-    print(f"Next: mobee launch --secure{given}, then {KEYS}={folder} mobee status")
+    print("Next:")
+    print(f"  mobee launch --secure{given}")
+    print(f"  export {KEYS}={folder}   # then mobee status, estop, stop")
     return OK
 
 

@@ -15,8 +15,9 @@ def test_keys_are_made_listed_added_and_renewed(tmp_path: Path, capsys: pytest.C
     folder = tmp_path / "keys"
     assert main(["keys", "new", str(folder), "--parts", "arm", "--days", "100"]) == 0
     said = capsys.readouterr().out
-    assert f"Next: mobee launch --secure --keys {folder}" in said
+    assert f"\n  mobee launch --secure --keys {folder}\n" in said
     assert "valid for 100 days" in said
+    assert all(len(line) <= 80 or str(folder) in line for line in said.splitlines())
     assert main(["keys", "add", "--keys", str(folder), "tool", "robot_sim", "--days", "10"]) == 0
     assert capsys.readouterr().out.startswith("made tool (client) in")
     assert main(["keys", "add", "--keys", str(folder), "mine", "--as", "driver"]) == 0
