@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -179,6 +179,22 @@ def test_the_authority_and_one_identity_are_enough_on_another_host(secured: Secu
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment)
     assert done.returncode == 0, done.stderr
     assert {"clock", "commands", "left_arm/state"} <= {line.split()[0] for line in done.stdout.splitlines()}
+
+
+@pytest.mark.parametrize(("name", "is_router"), [("router", True), ("controller", False)])
+def test_only_the_router_may_listen(secured: Secured, free_port: int, name: str, is_router: bool) -> None:
+    config, identity = zenoh.Config(), Identity(secured.keys, name)
+    shown = {"listen_certificate": str(identity.certificate), "listen_private_key": str(identity.key)}
+    for path, value in {
+        "mode": "router",
+        "listen/endpoints": [f"tls/127.0.0.1:{free_port}"],
+        "scouting/multicast/enabled": False,
+        "transport/link/tls": {"root_ca_certificate": str(identity.authority), "enable_mtls": True, **shown},
+    }.items():
+        config.insert_json5(path, json.dumps(value))
+    connects = nullcontext() if is_router else pytest.raises(BusUnreachable)
+    with zenoh.open(config), acting_as(Identity(secured.keys, "observer")), connects:
+        open_client(f"tls/127.0.0.1:{free_port}", patience=0.0).close()
 
 
 # Messages under another name (S12)
