@@ -65,6 +65,9 @@ MAKERS = ((keys.drive, ("p",)), (keys.goal, ("p",)), (keys.sim, ()), (keys.world
 
 
 def service_of(path: Path) -> str:
+    """Return the party whose code a file is; the operator reads all streams, so the readers of `found` are services alone."""
+    if path.is_relative_to(ROOT / "mobee_cli"):
+        return "operator"
     folder = path.relative_to(ROOT / "services").parts[0]
     if folder == "common":
         return SHARED.get(path.name, "")
@@ -79,9 +82,9 @@ def calls(tree: ast.AST) -> Iterator[tuple[str, list[ast.expr]]]:
 
 @cache
 def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
-    """Writers and readers of each message by the code of the services."""
+    """Writers and readers of each message by the code of services and commands."""
     writers, readers = defaultdict(set), defaultdict(set)
-    for path in (ROOT / "services").rglob("*.py"):
+    for path in (path for folder in ("services", "mobee_cli") for path in (ROOT / folder).rglob("*.py")):
         service, tree = service_of(path), ast.parse(path.read_text())
         modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         imports = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module == "bus_schema.messages")
@@ -90,9 +93,9 @@ def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
             name = aliases.get(arguments[0].id) if arguments and isinstance(arguments[0], ast.Name) else None
             if name and service and method == "publisher":
                 writers[name].add(service)
-            elif name and service and method in ("on_newest", "on_each", "latest"):
+            elif name and service not in ("", "operator") and method in ("on_newest", "on_each", "latest"):
                 readers[name].add(service)
-            if service and method in IMPLIED and (method != "Body" or "services.common.body" in modules):
+            if service not in ("", "operator") and method in IMPLIED and (method != "Body" or "services.common.body" in modules):
                 readers[IMPLIED[method]].add(service)
     return writers, readers
 

@@ -18,7 +18,6 @@ from functools import cache
 from typing import Any
 
 import msgspec
-import zenoh
 from msgspec import Struct
 from msgspec.inspect import (
     BoolType,
@@ -43,6 +42,7 @@ from bus_schema.page import streams
 from bus_schema.rpc import CALLS
 from services.common.observe import Received, listen
 from services.common.session import open_client
+from services.common.tap import RawPublisher
 
 INVALID = 0.03  # share of values that are not valid
 CHANGED = 0.05  # share of messages of which a field or a byte is changed
@@ -181,6 +181,7 @@ def send(endpoint: str, seed: int, count: int, parts: dict[str, int]) -> Counter
     drawer, draw, sent = Drawer(seed, parts), random.Random(seed), Counter[str]()
     with open_client(endpoint) as session:
         liveliness: Any = session.liveliness()
+        publisher = RawPublisher(session)
 
         def note(received: Received) -> None:
             with suppress(Refused):  # a drawn one
@@ -198,7 +199,7 @@ def send(endpoint: str, seed: int, count: int, parts: dict[str, int]) -> Counter
             if drawn.call:
                 session.get(drawn.key, lambda _: None, payload=drawn.payload, encoding=drawn.encoding, timeout=TIMEOUT)
             else:
-                session.put(drawn.key, drawn.payload, encoding=drawn.encoding, congestion_control=zenoh.CongestionControl.BLOCK)
+                publisher.put(drawn.key, drawn.encoding, drawn.payload)
             sent["calls" if drawn.call else "messages"] += 1
     return sent
 
