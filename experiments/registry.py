@@ -13,6 +13,7 @@ from mobee.errors import UnknownName
 EXPERIMENTS = {
     "babbling": "experiments.claims.ch4_reflex.babbling",
     "changed-outcomes": "experiments.claims.ch7_learning.changed_outcomes",
+    "changed-worlds": "experiments.claims.ch8_reaching.changed_worlds",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "constraint-discovery": "experiments.claims.ch7_learning.constraint_discovery",
     "constraint-violations": "experiments.claims.ch5_control.constraint_violations",

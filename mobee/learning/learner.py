@@ -32,6 +32,7 @@ class CuriousSettings(Settings):
         initial: which outcomes of an action are imagined before it is tried, "50-50" or "60-40", see `TransitionModel`.
         divergence: the reward of an observation: "kail", "kl", a function, or `module:name` of one, see `TransitionModel`.
         forgetting: factor of the counts of a state-action before each new observation of it; 1 forgets nothing.
+        detector: "run_length": outcomes from before a detected change of the world are forgotten, see `TransitionModel`; "none": all count.
         tolerance: at which a plan has converged, see `value_iteration`.
         relative: whether the tolerance is in units of the largest reward, and each plan starts from the values of the one before.
             False, with tolerance=1e-3: Algorithm 7 as published.
@@ -46,6 +47,7 @@ class CuriousSettings(Settings):
     initial: Literal["50-50", "60-40"] = "50-50"
     divergence: str | Divergence = "kail"
     forgetting: Annotated[float, Range(gt=0, le=1)] = 1.0
+    detector: Literal["none", "run_length"] = "none"
     tolerance: Annotated[float, Range(gt=0)] = 0.01
     relative: bool = True
     beliefs: Literal["counts", "debiased"] = "counts"
@@ -124,7 +126,7 @@ class CuriousLearner:
         self.space, self.part = space, space.part
         self.explorer, self._score = named("explorer", settings.explorer, EXPLORERS)
         self.seed, self.discount = settings.seed, settings.discount
-        self.model = TransitionModel(space, settings.initial, settings.divergence, settings.forgetting)
+        self.model = TransitionModel(space, settings.initial, settings.divergence, settings.forgetting, settings.detector)
         self.beliefs: OutcomeModel = self.model.debiased() if settings.beliefs == "debiased" else self.model
         """The outcome model that plans are made with."""
         self.transitions = 0
@@ -147,6 +149,8 @@ class CuriousLearner:
             "goal": None if self._external is None else self._external.settings,
         }
         del record["goal_weight"]  # recorded with the goal
+        if self._settings.detector == "none":  # as in records of earlier versions
+            del record["detector"]
         return record
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:

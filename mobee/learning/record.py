@@ -48,7 +48,7 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
 
 def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:
     """Return a model without observations, with the settings of a `CuriousLearner`."""
-    return TransitionModel(space, **{key: settings[key] for key in ("initial", "divergence", "forgetting") if key in settings})
+    return TransitionModel(space, **{key: settings[key] for key in ("initial", "divergence", "forgetting", "detector") if key in settings})
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import NO_ACTION
+from mobee.learning.runs import OutcomeRuns
 from mobee.learning.space import Space
 from mobee.learning.value_iteration import OutcomeModel, Tabled
 from mobee.settings import named
@@ -126,6 +127,7 @@ def _core() -> Any:
 
 
 INITIAL = {"50-50": (2.0, 2.0), "60-40": (2.0, 3.0)}  # imagined counts of staying and of reaching the goal: Algorithm 8 and table 7.1
+DETECTORS = "none", "run_length"
 NEW_BIN = 1.0  # imagined count of the bins beyond these two: Algorithm 6
 
 Divergence = Callable[[Array, Array], float]
@@ -147,14 +149,28 @@ class TransitionModel(Tabled):
             6.4.2: over all states, each imagined once), a function of the distributions over the bins after and before the
             observation, or `module:name` of one, see `Divergence`.  The probabilities are the same with all.
         forgetting: in (0, 1]; the real counts of a state-action are multiplied by it before each of its observations.
+        detector: of changed outcomes, "none" or "run_length", by which the real counts are those since the last change, see `OutcomeRuns`.
 
     Raises:
         InvalidValue, UnknownName: with what is valid.
     """
 
-    def __init__(self, space: Space, initial: str = "50-50", divergence: str | Divergence = "kail", forgetting: float = 1.0) -> None:
+    def __init__(
+        self,
+        space: Space,
+        initial: str = "50-50",
+        divergence: str | Divergence = "kail",
+        forgetting: float = 1.0,
+        detector: str = "none",
+    ) -> None:
         if initial not in INITIAL:
             raise UnknownName("initial", initial, INITIAL)
+        if detector not in DETECTORS:
+            raise UnknownName("detector", detector, DETECTORS)
+        if detector != "none" and forgetting != 1.0:
+            raise InvalidValue(
+                f"detector={detector!r} with forgetting={forgetting!r}: it determines what is forgotten; leave forgetting at 1."
+            )
         name, function = named("divergence", divergence, DIVERGENCES)
         if not 0.0 < forgetting <= 1.0:
             raise InvalidValue(f"forgetting={forgetting!r}: valid are 0 (exclusive) to 1, which forgets nothing.")
@@ -179,6 +195,7 @@ class TransitionModel(Tabled):
         self._totals: Array = np.where(exists, float(len(space)) if dense else stay + goal, 0.0)
         self._debiased: dict[tuple[float, float], DebiasedCounts] = {}
         self._counted: OutcomeCounts | None = None
+        self._runs = None if detector == "none" else OutcomeRuns(space)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_counted": None, "_table": None}  # a copy has arrays of its own
@@ -239,6 +256,8 @@ class TransitionModel(Tabled):
     def gain(self, state: int, action: int, outcome: int) -> float:
         """Return the reward that observing this outcome would give now, in nats; changes nothing."""
         self._check(state, action, outcome)
+        if self._runs is not None:
+            return self._gain_since_change(int(state), int(action), int(outcome))
         if self._function is not None:
             return self._own_gain(int(state), int(action), int(outcome))
         counted = self._counted or self._count()
@@ -251,6 +270,8 @@ class TransitionModel(Tabled):
         Raises InvalidValue for a state or action that the space does not have.
         """
         self._check(state, action, outcome)
+        if self._runs is not None:
+            return self._observe_since_change(int(state), int(action), int(outcome))
         observed, counted = (int(state), int(action), int(outcome)), self._counted or self._count()
         own = None if self._function is None else self._own_gain(*observed)
         reward: float = _core().observe(counted.at, *observed)
@@ -263,6 +284,57 @@ class TransitionModel(Tabled):
         if own is not None:
             reward = self._reward[state, action] = own
         return reward
+
+    def _gain_since_change(self, state: int, action: int, outcome: int) -> float:
+        """Return the reward of an observation: the change of the belief, in which earlier outcomes may become void."""
+        assert self._runs is not None
+        chosen, bins = self._bin(state, action, outcome), int(self._bins[state, action])
+        bins = max(bins, chosen + 1)
+        imagined = np.append(self._imagined, NEW_BIN)[:bins]
+        before, after = self._runs.counts(state, action, bins) + imagined, self._runs.following(state, action, chosen, bins) + imagined
+        if self._function is not None:
+            return self._valued(after, before)
+        if self.divergence == "kl":  # all other states have the same count, 1
+            others = len(self.space) - bins
+            before, after = (np.append(counts - imagined + 1.0, others) for counts in (before, after))
+        return max(0.0, kl_divergence(after, before))
+
+    def _observe_since_change(self, state: int, action: int, outcome: int) -> float:
+        """Count one transition, and forget the outcomes before a change; the rewards of suspect neighbours rise."""
+        assert self._runs is not None
+        reward, chosen = self._gain_since_change(state, action, outcome), self._bin(state, action, outcome)
+        if chosen == self._outcomes.shape[2]:
+            self._widen()
+        self._outcomes[state, action, chosen] = outcome
+        self._bins[state, action] = max(self._bins[state, action], chosen + 1)
+        suspect = self._runs.observe(state, action, chosen, int(self._bins[state, action]))
+        self._tries[state, action] += 1
+        self._reward[state, action] = reward
+        self._recount(state, action)
+        for near in suspect:
+            self._recount(*near)
+            likely = int(self._outcomes[near][self._counts[near].argmax()])
+            self._reward[near] = max(self._reward[near], self._gain_since_change(*near, likely))
+        return reward
+
+    def _recount(self, state: int, action: int) -> None:
+        """Write the counts of the present run of a state-action into the tables."""
+        assert self._runs is not None
+        used = int(self._bins[state, action])
+        real = self._runs.counts(state, action, used)
+        counts = real + self._imagined[:used]
+        self._counts[state, action, :used] = counts
+        self._probabilities[state, action, :used] = counts / counts.sum()
+        self._weight[state, action] = real.sum()
+        self._totals[state, action] = real.sum() + len(self.space) if self.divergence == "kl" else counts.sum()
+        for beliefs in self._debiased.values():
+            beliefs.update(self._counted or self._count(), state, action)
+
+    def _bin(self, state: int, action: int, outcome: int) -> int:
+        """Return the bin of an outcome; for a new outcome, the next free bin."""
+        used = int(self._bins[state, action])
+        same = np.flatnonzero(self._outcomes[state, action, :used] == outcome)
+        return int(same[0]) if len(same) else used
 
     def _own_gain(self, state: int, action: int, outcome: int) -> float:
         """Return the reward of an observation by the user's divergence function, for the counts before and after it (Algorithm 6)."""

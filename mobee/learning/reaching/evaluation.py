@@ -119,7 +119,7 @@ class _Trial:
             outcome, following = move(agent.plant, agent.space, self.state, action)
             found.duration[at] += outcome.duration
             failed = has_failed(values, self.state, following)
-            self.failures.add(self.state, action, position, agent.penalty if failed else 0.0)
+            self.failures.add(self.state, action, position, agent.penalty if failed else 0.0, outcome.touched)
             self.state = following
             if failed:
                 found.failures[at] += 1

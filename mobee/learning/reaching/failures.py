@@ -15,12 +15,22 @@ from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.reaching.histories import Histories, forget
 from mobee.learning.reaching.reaches import Reaches
 from mobee.learning.space import Space
+from mobee.reach import TARGET
 
 LENGTH_SCALE = 0.08  # m, of vectors from hand to target
 JOINT_SCALE = 0.4  # of the joints, in units of the spread of a joint's samples
 PRIOR_WEIGHT = 0.5  # of the overall failure rate, in transitions
 MAX_COST = 0.4  # reward lost by a transition that is certain to fail by its similar ones
 MAX_CACHED = 256  # targets whose sums are in memory
+
+
+def midpoints(space: Space, reaches: Reaches) -> Array:
+    """Return the midpoint of each transition, shape (S A, 3 + d): marker, then joints, in units of the scales above."""
+    goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
+    scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
+    hands, joints = ((one[:, None] + one[goals]) / 2.0 for one in (reaches.hands / LENGTH_SCALE, scaled))
+    middles = np.concatenate([hands, joints], axis=2)
+    return np.ascontiguousarray(middles.reshape(goals.size, middles.shape[2]))
 
 
 class AlikeFailures:
@@ -37,20 +47,15 @@ class AlikeFailures:
 
     def __init__(self, space: Space, reaches: Reaches) -> None:
         self._shape = space.goals.shape
-        goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
-        scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
-        hands, joints = ((one[:, None] + one[goals]) / 2.0 for one in (reaches.hands / LENGTH_SCALE, scaled))
-        middles = np.concatenate([-hands, joints], axis=2)
-        self._middles: Array = np.ascontiguousarray(
-            middles.reshape(goals.size, middles.shape[2])
-        )  # midpoints of the transitions, relative to the hand
+        self._middles = midpoints(space, reaches)
+        self._middles[:, :3] *= -1.0  # the origin of the root frame, relative to the hand
         self._events = np.empty((64, self._middles.shape[1] + 1))  # midpoint with the vector from hand to target, and whether it failed
         self._used, self._failed = 0, 0
         self._own: dict[bytes, dict[int, tuple[float, int]]] = {}  # by target and transition: sum and number of rewards
         self._sums: dict[bytes, tuple[int, Array]] = {}  # by target: events in them, failures and weights (2, S A)
 
-    def add(self, state: int, action: int, target: Array, reward: float) -> None:
-        """Record the reward of a transition made while a target (3,) m was presented."""
+    def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
+        """Record the reward of a transition made while a target (3,) m was presented; `touched` is not used."""
         transition, tried = state * self._shape[1] + action, self._own.setdefault(target.tobytes(), {})
         total, count = tried.get(transition, (0.0, 0))
         tried[transition] = total + reward, count + 1
@@ -121,8 +126,8 @@ class Failures:
         self._shape = states, actions
         self._histories = Histories(states * actions, scale, NEAR_DISTANCE if kind == "local" else np.inf)
 
-    def add(self, state: int, action: int, target: Array, reward: float) -> None:
-        """Append the reward of a transition made while a target (3,) m was presented."""
+    def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
+        """Append the reward of a transition made while a target (3,) m was presented; `touched` is not used."""
         self._histories.add(state * self._shape[1] + action, target, reward)
 
     def rewards(self, target: Array) -> Array:
@@ -139,6 +144,92 @@ class Failures:
 def has_failed(values: Array, state: int, following: int) -> bool:
     """Return whether a transition failed: it led to no state of higher value, by the values (S,) of its plan (thesis 8.1)."""
     return bool(values[following] <= values[state])
+
+
+class FailuresSinceChange:
+    """Failures as before, and, after a change of the world, transitions that the world blocks whatever the target is.
+
+    Failures in which the target was touched are those of the target.  Any other failure since the change counts for all targets: with the
+    average of its transition's rewards and one of 0, and, for transitions that were not tried since, as in `AlikeFailures`, but by the
+    place of the hand in the root frame.
+
+    Args:
+        space: states and transitions.
+        reaches: the marker's position in each state.
+        usual: the memory without changes.
+    """
+
+    def __init__(self, space: Space, reaches: Reaches, usual: Failures | AlikeFailures) -> None:
+        self._usual, self._shape, self._middles = usual, space.goals.shape, midpoints(space, reaches)
+        self._since: list[tuple[int, float]] = []  # transitions that touched no target, and their rewards, since the last change
+        self._changed = False
+        self._clear()
+
+    def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
+        """Record the reward of a transition made while a target (3,) m was presented; `touched`: objects in contact at its end."""
+        self._usual.add(state, action, target, reward)
+        if not by_target(touched):
+            self._since.append((state * self._shape[1] + action, reward))
+            if self._changed:
+                self._learn(*self._since[-1])
+
+    def change(self, transitions: int) -> None:
+        """Report a change before the last `transitions` transitions that touched no target."""
+        self._since = self._since[len(self._since) - transitions :]
+        self._changed = True
+        self._clear()
+        for one in self._since:
+            self._learn(*one)
+
+    def blocked(self, state: int, action: int) -> float:
+        """Return the probability that the changed world blocks a transition; 0 before the first change."""
+        if not self._changed:
+            return 0.0
+        transition = state * self._shape[1] + action
+        _, count, failed = self._own.get(transition, (0.0, 0, 0))
+        return float((failed + self._alike()[transition]) / (count + 1.0))
+
+    def rewards(self, target: Array) -> Array:
+        """Return the expected reward of each transition, shape (S, A), at most 0."""
+        usual = self._usual.rewards(target)
+        if not self._changed:
+            return usual
+        rate = self._failed / (len(self._since) + 1.0)
+        worth: Array = np.maximum(self._alike() - rate, 0.0) * (-MAX_COST / (1.0 - rate))
+        if self._own:
+            sums = np.array(list(self._own.values()))
+            worth[list(self._own)] = sums[:, 0] / (1.0 + sums[:, 1])
+        return np.minimum(usual, worth.reshape(self._shape))
+
+    def copy(self) -> FailuresSinceChange:
+        """Return an independent copy."""
+        other = object.__new__(FailuresSinceChange)
+        other.__dict__.update(self.__dict__)
+        other._usual, other._since = self._usual.copy(), self._since.copy()
+        other._own, other._sums = self._own.copy(), self._sums.copy()
+        return other
+
+    def _clear(self) -> None:
+        self._own: dict[int, tuple[float, int, int]] = {}  # by transition: sum and number of rewards, number of failures
+        self._sums = np.zeros((2, len(self._middles)))  # failures of similar transitions, and all of them
+        self._failed = 0
+
+    def _learn(self, transition: int, reward: float) -> None:
+        total, count, failed = self._own.get(transition, (0.0, 0, 0))
+        self._own[transition] = total + reward, count + 1, failed + (reward < 0.0)
+        self._failed += reward < 0.0
+        _core().gaussian_sums(self._middles, np.append(self._middles[transition], float(reward < 0.0))[None], self._sums)
+
+    def _alike(self) -> Array:
+        """Return the rate of failures of similar transitions, shape (S A,)."""
+        (failed, weight), rate = self._sums, self._failed / (len(self._since) + 1.0)
+        alike: Array = (failed + PRIOR_WEIGHT * rate) / (weight + PRIOR_WEIGHT)
+        return alike
+
+
+def by_target(touched: tuple[str, ...]) -> bool:
+    """Return whether a transition that touched these objects of the world may have failed because of the target."""
+    return TARGET in touched
 
 
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:

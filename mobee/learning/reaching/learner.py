@@ -11,7 +11,8 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import Draws, choose
-from mobee.learning.reaching.failures import failures_of, has_failed
+from mobee.learning.reaching.changes import DETECTORS, NONE, DetectorOf, WorldChanges
+from mobee.learning.reaching.failures import AlikeFailures, Failures, FailuresSinceChange, failures_of, has_failed
 from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, PredictorOf, Reaches, RewardPredictor
 from mobee.learning.reaching.reaches import SCALE
@@ -35,6 +36,8 @@ class ReachSettings(Settings):
             the thesis'), a class or function that makes one, see `StrategyOf`, or `module:name` of one.
         failures: how failed transitions are remembered: "spread" over all targets, as published, "local" to nearby targets, or "alike",
             as evidence about similar transitions.
+        detector: of changes of the world, after which failed transitions count for all targets, see `FailuresSinceChange`: a name in
+            `changes.DETECTORS`, a class or function that makes one, see `changes.DetectorOf`, or `module:name` of one.
         discount: factor of future rewards in plans.
         scale: m, unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
         penalty: reward of a failed transition, below 0.
@@ -45,6 +48,7 @@ class ReachSettings(Settings):
     predictor: str | RewardPredictor | PredictorOf = "weighted"
     strategy: str | StrategyOf = "intrinsic"
     failures: Literal["spread", "local", "alike"] = "spread"
+    detector: str | DetectorOf = NONE
     discount: Annotated[float, Range(ge=0, lt=1)] = 0.9
     scale: Annotated[float, Range(gt=0)] = SCALE
     penalty: Annotated[float, Range(lt=0)] = -10.0
@@ -77,7 +81,7 @@ class ReachLearner:
         self.space, self.part, self.reaches, self.model = space, space.part, reaches, model
         self._strategy_name, make_strategy = named("strategy", settings.strategy, STRATEGIES)
         self.predictor = made_predictor(settings.predictor, reaches)
-        self.failures = failures_of(space, reaches, settings.failures)
+        self.failures: Failures | AlikeFailures | FailuresSinceChange = failures_of(space, reaches, settings.failures)
         """Rewards of transitions, learned from failures."""
         self.problems = Problems()
         """The targets so far."""
@@ -88,6 +92,14 @@ class ReachLearner:
         if beliefs is None:
             beliefs = (TransitionModel(space) if model is None else model).debiased()
         self.planning = ReachPlanning(space, beliefs, settings.discount)
+        self.changes: WorldChanges | None = None
+        """Detects changes of the world; None if there is no detector."""
+        self._detector_name = NONE
+        if settings.detector != NONE:
+            self._detector_name, make_detector = named("detector", settings.detector, DETECTORS)
+            assert make_detector is not None  # only NONE has none
+            self.failures = FailuresSinceChange(space, reaches, self.failures)
+            self.changes = WorldChanges(make_detector(), self.planning, self.predictor, self.failures)
         self.discount, self.penalty, self.limit, self.seed = settings.discount, settings.penalty, settings.limit, settings.seed
         self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), settings.failures
         self._draws, self._draws_of_try, self._draws_of_problem = (
@@ -110,7 +122,7 @@ class ReachLearner:
             "limit": self.limit,
             "seed": self.seed,
             "learns the model": self.model is not None,
-        }
+        } | ({} if self.changes is None else {"detector": self._detector_name})
 
     @property
     def under_way(self) -> int | None:
@@ -152,11 +164,14 @@ class ReachLearner:
         """Learn from a step of the problem-try under way."""
         self._made.append(step)
         self.steps = step.n
+        expected = None if self.changes is None else self.changes.probabilities(step, self._target, self._goal(step))
         if step.a == REACH:
             self.predictor.add(step.s, self._target, step.reward, step.expected)
             self._strategy.add(step.s, self._target, step.reward, step.expected)
         else:
             self._observe_transition(step)
+        if self.changes is not None and expected is not None and self.changes.observe(step, self._target, expected):
+            self._plan = None
         if step.a == REACH or len(self._made) >= self.limit:
             self._end()
 
@@ -184,10 +199,14 @@ class ReachLearner:
             raise InvalidValue("no problem-try is under way: begin one first.")
         return self.problems.targets[self._problem].position
 
+    def _goal(self, step: Step) -> int:
+        """Return the state that a step should reach: that of its transition, or its own for a reach."""
+        return step.s if step.a == REACH else self.space.goal(step.s, step.a)
+
     def _observe_transition(self, step: Step) -> None:
         """Learn from a transition; with a model, a failure without contact is attributed to the model, not to the target (thesis 9.4.1)."""
-        if self.model is None or step.touched or not step.failed:
-            self.failures.add(step.s, step.a, self._target, step.reward)
+        if self.model is None or self.changes is not None or step.touched or not step.failed:
+            self.failures.add(step.s, step.a, self._target, step.reward, step.touched)
         if self.model is not None and not step.touched:
             self.model.observe(step.s, step.a, step.s_next)
             self.planning.refresh()

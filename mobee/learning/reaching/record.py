@@ -8,6 +8,7 @@ from typing import Any
 
 from mobee.arrays import Array
 from mobee.errors import MobeeError, UnknownName
+from mobee.learning.reaching.changes import NONE
 from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches, RewardPredictor
 from mobee.learning.reaching.reach_agent import ReachAgent
@@ -50,6 +51,7 @@ def load_reaches(
         predictor=_predictor(file, learner["predictor"], reaches),
         strategy="greedy",
         scale=scale,
+        detector=learner.get("detector", NONE),
         **{name: learner[name] for name in ("failures", "discount", "penalty", "limit", "seed")},
     )
     agent = ReachAgent(

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How long the outcomes of each action have been as they are now, and the outcomes to forget: a posterior over run lengths.
+
+Bayesian online change point detection (Adams and MacKay 2007) for outcomes that are counted.  The hazard, the probability of a change
+before a try, is not a setting: it is one of `HAZARDS`, equally likely at first, and the outcomes of all actions inform about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.learning.space import Space
+
+HAZARDS = np.array([1e-1, 1e-2, 1e-3, 1e-4])
+STAY, GOAL, OTHER = 0.1, 0.3, 0.1  # counts imagined after a change: the first two are those of `TransitionModel.debiased`
+NEGLIGIBLE = 1e-3  # probability below which a run is dropped
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """The runs that may be the present one of an action, the longest first.
+
+    `weight`: (R, H) probability of each run given the hazard.  `counts`: (R, B) outcomes since the run began.  `suspected`: how certain
+    the change of a neighbour was that made this action suspect, 0 if it was tried since.
+    """
+
+    weight: Array
+    counts: Array
+    suspected: float = 0.0
+
+
+class OutcomeRuns:
+    """The runs of all actions of a space.
+
+    If the outcomes of an action have changed, those of its neighbours, the actions to the same goal and the one back from it, may have
+    changed too.  The share of neighbours for which this is true is learned; with that probability their runs end.
+
+    Args:
+        space: states and actions.
+    """
+
+    def __init__(self, space: Space) -> None:
+        self._goals = space.goals
+        self._hazard: Array = np.full(len(HAZARDS), 1.0 / len(HAZARDS))
+        self._shared, self._unshared = 1.0, 1.0  # Beta distribution of the share of neighbours
+        self._runs: dict[tuple[int, int], Runs] = {}
+
+    def counts(self, state: int, action: int, bins: int) -> Array:
+        """Return the expected number of each of the action's outcomes in its present run, shape (bins,)."""
+        runs = self._of(state, action, bins)
+        return self._expected(runs, self._hazard)
+
+    def following(self, state: int, action: int, chosen: int, bins: int) -> Array:
+        """Return what `counts` will be after an outcome in the bin `chosen`; changes nothing."""
+        runs, evidence = self._after(self._of(state, action, bins), chosen)
+        return self._expected(runs, self._informed(evidence))
+
+    def observe(self, state: int, action: int, chosen: int, bins: int) -> list[tuple[int, int]]:
+        """Add an outcome, in the bin `chosen` of `bins`; returns the neighbours that are suspect now, whose counts have changed too."""
+        before = self._of(state, action, bins)
+        after, evidence = self._after(before, chosen)
+        was_changed = self._changed(before)
+        self._hazard = self._informed(evidence)
+        changed = self._changed(after)
+        self._shared += before.suspected * changed
+        self._unshared += before.suspected * (1.0 - changed)
+        kept = after.weight @ self._hazard >= NEGLIGIBLE
+        weight = after.weight[kept]
+        self._runs[state, action] = Runs(weight / weight.sum(axis=0), after.counts[kept])
+        rise = changed - was_changed
+        return self._suspect(state, action, rise) if rise > NEGLIGIBLE else []
+
+    def _of(self, state: int, action: int, bins: int) -> Runs:
+        known = self._runs.get((state, action))
+        if known is None:
+            return Runs(np.ones((1, len(HAZARDS))), np.zeros((1, bins)))
+        if known.counts.shape[1] < bins:
+            wider = np.pad(known.counts, [(0, 0), (0, bins - known.counts.shape[1])])
+            return Runs(known.weight, wider, known.suspected)
+        return known
+
+    def _after(self, runs: Runs, chosen: int) -> tuple[Runs, Array]:
+        """Return the runs after one more outcome, and its probability given each hazard, (H,) up to a common factor."""
+        prior = (STAY, GOAL)[chosen] if chosen < 2 else OTHER
+        total = STAY + GOAL + OTHER
+        likely = (runs.counts[:, chosen] + prior) / (runs.counts.sum(axis=1) + total)
+        weight = np.vstack([runs.weight * likely[:, None] * (1.0 - HAZARDS), HAZARDS * (prior / total)])
+        counts = np.vstack([runs.counts, np.zeros(runs.counts.shape[1])])
+        counts[:, chosen] += 1.0
+        evidence: Array = weight.sum(axis=0)
+        return Runs(weight / evidence, counts), evidence
+
+    def _informed(self, evidence: Array) -> Array:
+        """Return the probabilities of the hazards, (H,), after an outcome with this evidence."""
+        hazard: Array = self._hazard * evidence / (self._hazard @ evidence)
+        return hazard
+
+    def _expected(self, runs: Runs, hazard: Array) -> Array:
+        expected: Array = (runs.weight @ hazard) @ runs.counts
+        return expected
+
+    def _changed(self, runs: Runs) -> float:
+        """Return the probability that the longest run is over."""
+        return float((runs.weight[1:] @ self._hazard).sum())
+
+    def _suspect(self, state: int, action: int, rise: float) -> list[tuple[int, int]]:
+        """End the runs of the neighbours with the probability that they have changed too; returns those that had been tried."""
+        share, found = rise * self._shared / (self._shared + self._unshared), []
+        goal = int(self._goals[state, action])
+        back = [(goal, other) for other in np.flatnonzero(self._goals[goal] == state).tolist()]
+        for near in [*map(tuple, np.argwhere(self._goals == goal).tolist()), *back]:
+            known = self._runs.get(near)
+            if known is None or near == (state, action):
+                continue
+            weight = np.vstack([known.weight * (1.0 - share), np.full(len(HAZARDS), share)])
+            counts = np.vstack([known.counts, np.zeros(known.counts.shape[1])])
+            self._runs[near] = Runs(weight, counts, max(known.suspected, rise))
+            found.append(near)
+        return found

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mobee.learning.reaching.changes import RewardScale, RunLength
+from mobee.learning.reaching.failures import FailuresSinceChange, failures_of
+from mobee.learning.reaching.predictors import Reaches
+from mobee.learning.reaching.record import load_reaches
+from mobee.learning.reaching.store import ReachStore
+from mobee.reach import TARGET
+from tests.mobee.learning.reaching.toy import HANDS, PLACES, SPACE, TARGETS, agent, plant, world
+
+HERE, THERE = PLACES[0], PLACES[20]
+REACHES = Reaches(SPACE.samples, HANDS)
+
+
+def detections(contradictions: list[bool]) -> list[tuple[int, int | None]]:
+    """When a detector reports changes, and since how many outcomes, if some outcomes contradict what was learned."""
+    detector = RunLength()
+    found = [detector.add(0.001 if one else 0.95, 0.5) for one in contradictions]
+    return [(number, since) for number, since in enumerate(found) if since is not None]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.3])
+def test_a_constant_share_of_contradictions_is_no_change(share):
+    assert detections((np.random.default_rng(1).random(1500) < share).tolist()) == []
+
+
+def test_a_larger_share_is_a_change_and_is_reported_once_with_its_time():
+    rng = np.random.default_rng(2)
+    found = detections([*(rng.random(500) < 0.03), *(rng.random(300) < 0.4)])
+    assert len(found) == 1
+    number, since = found[0]
+    assert 500 <= number < 540 and abs(number + 1 - since - 500) <= 10
+
+
+def test_a_smaller_share_is_none():
+    rng = np.random.default_rng(3)
+    assert detections([*(rng.random(300) < 0.5), *(rng.random(500) < 0.02)]) == []
+
+
+def test_outcomes_that_inform_of_nothing_change_nothing():
+    detector = RunLength()
+    assert {detector.add(0.5, 0.5) for _ in range(1000)} == {None}
+
+
+def test_the_scale_of_rewards_comes_from_repeats():
+    scale, rng = RewardScale(), np.random.default_rng(0)
+    for _ in range(500):
+        scale.add(3, HERE, float(rng.normal(0.5, 0.2)))
+    assert scale.variance == pytest.approx(0.04, rel=0.2)
+    assert scale.repeated(3, HERE) and not scale.repeated(3, THERE)
+
+
+def test_failures_without_the_target_count_for_all_targets_after_a_change():
+    usual = failures_of(SPACE, REACHES, "alike")
+    failures = FailuresSinceChange(SPACE, REACHES, failures_of(SPACE, REACHES, "alike"))
+    for memory in (usual, failures):
+        memory.add(0, 0, HERE, -10.0, ())
+        memory.add(0, 1, HERE, -10.0, (TARGET,))
+        memory.add(0, 2, HERE, 0.0, ())
+    assert failures.rewards(THERE).tolist() == usual.rewards(THERE).tolist() and failures.blocked(0, 0) == 0.0
+    failures.change(2)
+    assert failures.rewards(THERE)[0, 0] == pytest.approx(-5.0) and failures.blocked(0, 0) > 0.5
+    assert failures.rewards(THERE)[0, 1] > -1.0  # the target HERE was the reason
+    assert failures.rewards(THERE)[0, 2] == pytest.approx(usual.rewards(THERE)[0, 2])
+    other = failures.copy()
+    other.add(0, 2, HERE, -10.0, ())
+    assert failures.rewards(THERE)[0, 2] > other.rewards(THERE)[0, 2]
+    failures.change(0)
+    assert failures.rewards(THERE).tolist() == usual.rewards(THERE).tolist()
+
+
+OPTIONS = {"predictor": "gp", "strategy": "ucb", "failures": "alike"}
+
+
+def shrunk(target):
+    """The toy's world after a change: half of the states reach nothing, and 15 % of the transitions are blocked for every target."""
+    missing, blocked = world(target)
+    return np.where(np.arange(81) % 2, missing, 0.3), np.maximum(blocked, 0.9 * (np.random.default_rng(5).random((81, 16)) < 0.15))
+
+
+def test_nothing_changes_without_a_detection():
+    one, other = agent(**OPTIONS), agent(detector="run_length", **OPTIONS)
+    for learner in (one, other):
+        learner.learn(TARGETS, 120)
+    assert other.changes is not None and other.changes.detected == []
+    assert [one.predictor.mean(place).tolist() for place in PLACES] == [other.predictor.mean(place).tolist() for place in PLACES]
+    assert one.evaluate(TARGETS).rewards.tolist() == other.evaluate(TARGETS).rewards.tolist()
+    assert "detector" not in one.settings and other.settings["detector"] == "run_length"
+
+
+def test_a_change_is_detected_and_a_resumed_agent_believes_the_same(tmp_path):
+    file = tmp_path / "run.sqlite"
+    with ReachStore(file, SPACE.part) as store:
+        learner = agent(store=store, detector="run_length", **OPTIONS)
+        learner.learn(TARGETS, 150)
+        learner.plant._world = shrunk
+        learner.plant._seen.clear()
+        before = learner.steps
+        learner.learn(TARGETS, 60)
+    assert learner.changes is not None and len(learner.changes.detected) >= 1
+    assert all(step > before for step in learner.changes.detected)
+    with ReachStore(file, SPACE.part) as store:
+        again = agent(store=store, detector="run_length", **OPTIONS)
+    loaded = load_reaches(file, plant(), hands=HANDS)
+    for other in (again, loaded):
+        assert other.changes is not None and other.changes.detected == learner.changes.detected
+        for place in PLACES[::5]:
+            assert other.predictor.mean(place).tolist() == learner.predictor.mean(place).tolist()
+            assert other.failures.rewards(place).tolist() == learner.failures.rewards(place).tolist()
