@@ -12,6 +12,7 @@ from mobee.errors import UnknownName
 
 EXPERIMENTS = {
     "babbling": "experiments.claims.ch4_reflex.babbling",
+    "changed-actions": "experiments.claims.ch7_learning.changed_actions",
     "changed-outcomes": "experiments.claims.ch7_learning.changed_outcomes",
     "changed-worlds": "experiments.claims.ch8_reaching.changed_worlds",
     "chapter7": "experiments.claims.ch7_learning.chapter7",

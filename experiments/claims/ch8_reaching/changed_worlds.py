@@ -121,7 +121,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     settings = {"tries": TRIES // share, "checkpoints": [n // share for n in CHECKPOINTS]}
     found = [Condition(f"{name}{change}", settings | {"change": change, "ball": -1}) for change in CHANGES if change != "ball"]
     for ball in range(1 if quick else len(BALLS)):
-        found.append(Condition(f"{name}ball{ball}", settings | {"change": "ball", "ball": ball}, seeds=(seeds[ball % len(seeds)],)))
+        found.append(Condition(f"{name}ball{ball}", settings | {"change": "ball", "ball": ball}, 1.1, seeds=(seeds[ball % len(seeds)],)))
     return found
 
 

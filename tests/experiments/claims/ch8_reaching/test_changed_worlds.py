@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.claims.ch8_reaching.changed_worlds import (
+    BALLS,
+    CHANGES,
+    CHECKPOINTS,
+    CLAIMS,
+    DETECTORS,
+    OURS,
+    RADIUS,
+    TURN,
+    WITHOUT,
+    FixedRate,
+    LikelihoodRatio,
+    plant_of,
+    targets,
+)
+from experiments.kit.experiment import judged
+from experiments.kit.reaching.arm import JudgedPlant
+
+
+def test_the_balls_are_away_from_targets_and_robot():
+    places = np.array([target.position for target in targets()])
+    assert len(set(BALLS)) == 20
+    assert min(np.linalg.norm(places - ball, axis=1).min() for ball in BALLS) >= 0.12
+    plant = plant_of("ball", 0, 0)
+    assert plant.model.world.objects["ball"].position == pytest.approx(BALLS[0])
+    assert not len(plant.model.evaluate(plant.robot.home).contacts) and RADIUS == 0.1
+
+
+def test_the_other_changes_raise_the_table_and_turn_the_joints():
+    top = [plant_of(change, -1, 0).model.world.objects["table"].position[2] for change in ("nothing", "table")]
+    assert top[1] - top[0] == pytest.approx(0.08)
+    plant = plant_of("turn", -1, 0)
+    assert isinstance(plant, JudgedPlant) and np.count_nonzero(np.abs(plant.errors.turns) == TURN) == 4
+
+
+def test_the_likelihood_ratio_reports_a_larger_share_once():
+    detector, rng = LikelihoodRatio(), np.random.default_rng(2)
+    found = [detector.add(0.001 if one else 0.95, 0.5) for one in [*(rng.random(400) < 0.03), *(rng.random(200) < 0.4)]]
+    numbers = [number for number, since in enumerate(found) if since is not None]
+    assert len(numbers) == 1 and 400 <= numbers[0] < 440 and abs(numbers[0] + 1 - found[numbers[0]] - 400) <= 10
+
+
+def test_a_fixed_rate_reports_a_change_after_every_hundred_outcomes():
+    detector = FixedRate()
+    assert [number for number in range(1, 301) if detector.add(1.0, 1.0) is not None] == [100, 200, 300]
+
+
+def runs(score, failed, false=0):
+    """Five equal runs of each learner: the last score over the oracle's and failures, for those with a detector."""
+    ours, plain = np.full(len(CHECKPOINTS), score), np.ones(len(CHECKPOINTS))
+    found = {}
+    for change in CHANGES:
+        for name in DETECTORS:
+            found[change, name] = [
+                {
+                    "score": 6.0 * (plain if change == "nothing" and name == WITHOUT else ours),
+                    "failures": np.full(len(CHECKPOINTS), failed),
+                    "oracle": 6.0,
+                    "false": false if name == OURS else 0,
+                    "detected": np.inf,
+                }
+            ] * 5
+    return found
+
+
+def test_claims_are_judged_by_scores_failures_and_the_unchanged_world():
+    good, bad = (judged(CLAIMS, runs(*numbers)) for numbers in ((0.999, 1.0), (0.9, 3.0, 1)))
+    assert [claim["verdict"] for claim in good] == ["met"] * len(CLAIMS)
+    assert [claim["verdict"] for claim in bad] == ["not met"] * len(CLAIMS)
+    assert "0 changes detected in 5 runs" in good[-1]["ours"] and "5 changes detected" in bad[-1]["ours"]
