@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from bus_schema.messages import Camera, Clock, Image, Truth
+from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from services.common.body import Body
 from services.common.rate import Percentiles
 from services.common.service import Service, run_node
 from services.robot_sim.config import RendererConfig
-from services.robot_sim.renderer_scene import Scene
 
 
 class RendererNode:

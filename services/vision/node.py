@@ -10,10 +10,10 @@ import numpy as np
 from bus_schema.messages import Camera, Geometry, Image, WorldObject
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
+from mobee.vision.ball import Frame, Sighting, find_balls, locate
 from services.common.cameras import STEREO, frame_at_capture
 from services.common.rate import Percentiles
 from services.common.service import Service
-from services.vision.ball import Frame, Sighting, find_balls, locate
 from services.vision.config import Config
 
 BALL = "ball"

@@ -12,10 +12,10 @@ import pytest
 
 from bus_schema.messages import Camera, Image
 from mobee import World, box, cylinder, load_world, sphere
+from mobee.rendering.scene import BACKGROUND, Scene
 from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.load import load_robot
 from services.common.cameras import frame_at_capture
-from services.robot_sim.renderer_scene import BACKGROUND, Scene
 from tests.services.harness import wait_for
 from tests.services.robots import seer
 from tests.services.stage import LOOKING_DOWN, Stage, posture

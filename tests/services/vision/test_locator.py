@@ -28,11 +28,11 @@ from bus_schema.messages import (
     WorldObject,
 )
 from mobee import World, load_world, sphere
+from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
+from mobee.vision.ball import Fix, Sighting, find_balls, locate, triangulate
 from services.common.cameras import frame_at_capture
-from services.robot_sim.renderer_scene import Scene
-from services.vision.ball import Fix, Sighting, find_balls, locate, triangulate
 from tests.services.stage import LOOKING_DOWN, TICK, Stage, matched, posture
 
 ROBOT = load_robot("icub")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from services.vision.regions import border, boxes, label, without_holes
+from mobee.vision.regions import border, boxes, label, without_holes
 
 
 @pytest.mark.parametrize("seed", range(300))

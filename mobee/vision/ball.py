@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array
-from services.vision.regions import border, boxes, label, without_holes
+from mobee.vision.lens import Lens
+from mobee.vision.regions import border, boxes, label, without_holes
 
 Picture = NDArray[np.uint8]
 
@@ -38,8 +39,10 @@ class Sighting:
         return radius / math.sin(self.half_angle)
 
 
-def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
+def find_balls(picture: Picture, intrinsics: Array, distortion: Sequence[float] = ()) -> list[Sighting]:
     """Find every round red object in a picture (height, width, 3) of bytes red, green, blue; the largest first.
+
+    `intrinsics`: the camera's matrix (3, 3), px; `distortion`: k1 k2 p1 p2 of its lens, see `Lens`, or none.
 
     A sphere's outline is an ellipse that is not centred on its centre, but its rays form a circular cone about the
     ray to its centre. The cone is fitted, so perspective causes no bias.  Points where another object hides the ball are left out.
@@ -49,7 +52,7 @@ def find_balls(picture: Picture, intrinsics: Array) -> list[Sighting]:
     for edge, area in _red_blobs(picture):
         inner = (edge > 0).all(axis=1) & (edge < (width - 1, height - 1)).all(axis=1)
         if area >= MIN_AREA and inner.sum() >= 12:
-            sighting = _fit(_rays(edge[inner], intrinsics), float(intrinsics[0, 0]))
+            sighting = _fit(_rays(edge[inner], intrinsics, distortion), float(intrinsics[0, 0]))
             if sighting is not None:
                 found.append(sighting)
     return sorted(found, key=lambda s: -s.half_angle)
@@ -85,8 +88,10 @@ def _red_pixels(picture: Picture) -> NDArray[np.bool_]:
     return np.asarray(is_red, dtype=np.bool_)
 
 
-def _rays(points: Array, intrinsics: Array) -> Array:
+def _rays(points: Array, intrinsics: Array, distortion: Sequence[float]) -> Array:
     """Return unit vectors (m, 3) from the camera through pixels (m, 2)."""
+    if len(distortion):
+        return Lens.of_matrix(intrinsics, np.asarray(distortion)).unproject(points)
     homogeneous = np.column_stack([points, np.ones(len(points))])
     rays = np.linalg.solve(intrinsics, homogeneous.T).T
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True), dtype=np.float64)

@@ -3,19 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.arrays import Array
+from mobee._core.rays import cast
+from mobee.arrays import Array, Ints
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion
 from mobee.model.world import World, WorldObject
 from mobee.rendering.camera import Camera as View
-from mobee.rendering.camera import Raster, eye_camera
-from mobee.rendering.link_solids import link_solids
-from mobee.rendering.solid import Color, Solid
+from mobee.rendering.camera import Floats, Raster, eye_camera
+from mobee.rendering.link_solids import LinkSolid, link_solids
+from mobee.rendering.solid import Color, Solid, packed
 from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.robot import Robot
 from mobee.robot.visual import Camera
@@ -32,12 +33,20 @@ class Scene:
     """Mirrors the robot's links and the world's objects, and draws what a camera sees of them."""
 
     def __init__(
-        self, robot: Robot, world: World, cameras: Mapping[str, Camera] | None = None, width: int = 320, height: int = 240
+        self,
+        robot: Robot,
+        world: World,
+        cameras: Mapping[str, Camera] | None = None,
+        width: int = 320,
+        height: int = 240,
+        worn: Sequence[LinkSolid] = (),
+        around: Sequence[Solid] = (),
     ) -> None:
-        """`cameras`: by name; None: those of the robot."""
+        """`cameras`: by name; None: those of the robot.  `worn`: drawn on links beside the robot; `around`: drawn where they are."""
         self._robot, self._size = robot, (width, height)
         self.cameras = dict(cameras_of(robot) if cameras is None else cameras)
-        self._link_solids = link_solids(robot)
+        self._link_solids = (*link_solids(robot), *worn)
+        self._around = list(around)
         self._objects = {item.name: _object_solid(item) for item in world.objects.values()}
         self._transforms = link_transforms(robot, robot.home)
 
@@ -56,15 +65,37 @@ class Scene:
         if name in self._objects:
             self._objects[name] = replace(self._objects[name], position=position, rotation=matrix_from_quaternion(quaternion))
 
+    @property
+    def transforms(self) -> Array:
+        """The transforms of the links (L, 4, 4), from link_transforms."""
+        return self._transforms
+
     def draw(self, name: str) -> Picture:
         """Return the picture of a camera: (height, width, 3) bytes, red, green, blue."""
-        hidden = self.cameras[name].hidden
-        robot = [one.at(self._transforms) for one in self._link_solids if one.link not in hidden]
-        seen = Raster(self._view(name), [*robot, *self._objects.values()])
+        seen = Raster(self._view(name), self._solids(self.cameras[name].hidden))
         brightness = AMBIENT + DIFFUSE * np.maximum(seen.normal @ LIGHT, 0.0)
         picture: Picture = np.minimum(255.0 * seen.color * brightness[..., None], 255.0).astype(np.uint8)
         picture[np.isinf(seen.depth)] = BACKGROUND
         return picture
+
+    def light(self, view: View, hidden: frozenset[int], pixels: Ints) -> Floats:
+        """Return the brightness (K, 3) of red, green and blue in some pixels of a view, 0 to 255, without the `hidden` links.
+
+        `pixels`: (K,), row * width + column.
+        """
+        solids = self._solids(hidden)
+        packs = packed(solids)
+        _, which, normal = cast(packs.volumes, packs.surfaces, view.rays())
+        colors = np.array([*(solids[number].color for number in packs.numbers), (0.0, 0.0, 0.0)], np.float32)  # the last is of nothing
+        seen = which.ravel()[pixels]
+        brightness = AMBIENT + DIFFUSE * np.maximum(normal.reshape(-1, 3)[pixels] @ LIGHT, 0.0)
+        found: Floats = np.minimum(255.0 * colors[seen] * brightness[:, None], 255.0)
+        found[seen < 0] = BACKGROUND
+        return found
+
+    def _solids(self, hidden: frozenset[int]) -> list[Solid]:
+        robot = [one.at(self._transforms) for one in self._link_solids if one.link not in hidden]
+        return [*robot, *self._objects.values(), *self._around]
 
     def _view(self, name: str) -> View:
         camera = self.cameras[name]

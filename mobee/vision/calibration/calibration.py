@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The result of a calibration, and its file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
+from mobee.robot.visual import Camera
+from mobee.robot.writing import write_whole
+from mobee.vision.imperfections import CameraErrors
+from mobee.vision.lens import Lens
+from mobee.vision.rig import Rig
+from mobee.vision.tag import Tag
+
+FORMAT = "mobee calibration 1"
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How far the tag is from where parameters put it: corners in the pictures [px], and its middle in space [m], median and 95 %."""
+
+    pixels_median: float
+    pixels_95: float
+    metres_median: float
+    metres_95: float
+
+    @classmethod
+    def of(cls, pixels: Array, metres: Array) -> Quality:
+        """Return the quantiles of distances (K,) px and (N,) m; NaN if there are none."""
+        found = [np.quantile(one, share) if len(one) else np.nan for one in (pixels, metres) for share in (0.5, 0.95)]
+        return cls(*(float(value) for value in found))
+
+
+@dataclass(frozen=True, slots=True)
+class Unobservable:
+    """A direction of the parameters about which the pictures say almost nothing.
+
+    `information`: its singular value, in prior deviations; 0: nothing at all.  `weights`: of the parameters in it, by name.
+    """
+
+    information: float
+    weights: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """By how much cameras and encoders of a robot differ from its model, and how well this is known.
+
+    `x`: the parameters (P,), in the order of `names`; m, rad and s.  `covariance` (P, P).  `before`: the standard deviations (P,) without a
+    calibration.  `misfit`: mean squared residual in standard deviations; 1 if noise and model are as assumed.
+    """
+
+    robot: str
+    cameras: tuple[str, ...]
+    lens: Lens
+    tag: Tag
+    pictures: int
+    names: tuple[str, ...]
+    x: Array
+    covariance: Array
+    prior: Array
+    misfit: float
+    uncalibrated: Quality
+    calibrated: Quality
+    unobservable: tuple[Unobservable, ...]
+
+    @property
+    def deviations(self) -> Array:
+        """The standard deviations (P,) of the parameters."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def rig(self, robot: Robot, cameras: Mapping[str, Camera]) -> Rig:
+        """Return the rig to which the parameters belong; raises InvalidValue if robot or cameras are others than those calibrated."""
+        if robot.name != self.robot or not set(self.cameras) <= set(cameras):
+            raise InvalidValue(
+                f"the calibration is of {self.robot!r} with the cameras {', '.join(self.cameras)}; this is {robot.name!r} with "
+                f"{', '.join(cameras) or 'none'}. Calibrate this robot: mobee calibrate"
+            )
+        rig = Rig(robot, {name: cameras[name] for name in self.cameras}, self.lens, self.tag)
+        if rig.names != self.names:
+            raise InvalidValue(f"the calibration has the parameters {', '.join(self.names)}; this robot has {', '.join(rig.names)}")
+        return rig
+
+    def errors(self, robot: Robot, cameras: Mapping[str, Camera]) -> CameraErrors:
+        """Return the parameters as errors of cameras; raises InvalidValue as `rig` does."""
+        return self.rig(robot, cameras).errors(self.x)
+
+    def save(self, path: Path) -> Path:
+        """Write the calibration as JSON, and return its path; raises OSError."""
+        plain = {
+            "format": FORMAT,
+            "units": "m, rad, s",
+            "robot": self.robot,
+            "cameras": list(self.cameras),
+            "lens": list(self.lens.numbers),
+            "tag": asdict(self.tag),
+            "pictures": self.pictures,
+            "parameters": {
+                name: {"value": float(value), "deviation": float(deviation), "prior": float(prior)}
+                for name, value, deviation, prior in zip(self.names, self.x, self.deviations, self.prior, strict=True)
+            },
+            "misfit": self.misfit,
+            "uncalibrated": asdict(self.uncalibrated),
+            "calibrated": asdict(self.calibrated),
+            "unobservable": [{"information": one.information, "weights": dict(one.weights)} for one in self.unobservable],
+            "covariance": self.covariance.tolist(),
+        }
+        return write_whole(path, (json.dumps(plain, indent=1) + "\n").encode())
+
+
+def load_calibration(path: Path | str) -> Calibration:
+    """Read the file of a calibration; raises InvalidValue for a file that is none."""
+    try:
+        plain: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidValue(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise InvalidValue(f"{path}: not JSON: {error}. `mobee calibrate --save FILE` writes such a file.") from None
+    if not isinstance(plain, dict) or plain.get("format") != FORMAT:
+        raise InvalidValue(f"{path}: not a file of `mobee calibrate`: its format must be {FORMAT!r}")
+    try:
+        return _read(plain)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidValue(f"{path}: a damaged calibration: {type(error).__name__}: {error}. Calibrate again: mobee calibrate") from None
+
+
+def _read(plain: Mapping[str, Any]) -> Calibration:
+    parameters = plain["parameters"]
+    x, prior = (np.array([one[field] for one in parameters.values()], dtype=np.float64) for field in ("value", "prior"))
+    covariance = np.array(plain["covariance"], dtype=np.float64)
+    if covariance.shape != (len(x), len(x)) or not (np.isfinite(x).all() and np.isfinite(covariance).all()):
+        raise ValueError(f"{len(x)} parameters with a covariance of shape {covariance.shape}; all must be finite")
+    return Calibration(
+        robot=str(plain["robot"]),
+        cameras=tuple(plain["cameras"]),
+        lens=Lens(*plain["lens"]),
+        tag=Tag(**plain["tag"]),
+        pictures=int(plain["pictures"]),
+        names=tuple(parameters),
+        x=x,
+        covariance=covariance,
+        prior=prior,
+        misfit=float(plain["misfit"]),
+        uncalibrated=Quality(**plain["uncalibrated"]),
+        calibrated=Quality(**plain["calibrated"]),
+        unobservable=tuple(Unobservable(float(one["information"]), dict(one["weights"])) for one in plain["unobservable"]),
+    )

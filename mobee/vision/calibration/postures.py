@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chooses postures in which a robot sees the tag on its palm: within reach, without contact, well spread in the pictures of all cameras."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.model.model import Model
+from mobee.vision.imperfections import CameraSettings
+from mobee.vision.mount import camera_frames, into
+from mobee.vision.rig import Rig
+
+BATCH, FIRST, NEXT = 4_000, 60, 14  # postures drawn at once; how often at most until one fits; and how often about those that fit
+FOUNDERS = 4  # random postures that fit, about which others are drawn
+NEAR = 0.12  # of a motor's range: standard deviation of postures about one that fits
+NEAREST, FARTHEST = 0.20, 0.45  # m, of the tag from a camera
+FACING = 0.70  # cosine: the tag is turned to a camera by at least this much
+BORDER = 30.0  # px of the picture's border in which the tag is not shown, since the cameras may be turned a little
+LIMIT = 0.04  # share of a motor's range that is left free at its limits
+
+
+def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str, count: int, seed: int) -> Array:
+    """Return postures (count, n) rad of head and one arm, the other motors at home, in an order in which neighbours are near.
+
+    They are drawn at random within the limits; of those that fit, each next one is the farthest from those already chosen, by its places
+    in the pictures, its distance, its angle and its head.
+
+    Raises InvalidValue if too few are found.
+    """
+    rng = np.random.default_rng([seed, 0x706F7365])
+    free: Ints = np.array([*rig.head, *range(*rig.robot.part(part).slice.indices(len(rig.robot.motors)))], dtype=np.intp)
+    free = free[_moves(rig, free)]
+    kept, seen = _search(rig, model, settings, free, rng)
+    if len(kept) < count:
+        raise InvalidValue(
+            f"only {len(kept)} of the postures of {part} that were tried show the tag to all cameras without contact, and {count} were "
+            "asked for. Ask for fewer, or move the objects in the way."
+        )
+    chosen = _spread(seen, count)
+    found: Array = kept[chosen[_in_order(kept[chosen][:, free])]]
+    return found
+
+
+def _search(rig: Rig, model: Model, settings: CameraSettings, free: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Return postures (K, n) that fit, and numbers (K, f) by which they are told apart: random ones first, then others about them."""
+    home, low, span = rig.robot.home, rig.robot.limits[free, 0], np.ptp(rig.robot.limits[free], axis=1)
+    kept, seen, later = np.empty((0, len(home))), list[Array](), 0
+    for _ in range(FIRST + NEXT):
+        shares = rng.uniform(LIMIT, 1.0 - LIMIT, (BATCH, len(free)))
+        if len(kept) >= FOUNDERS:
+            about = (kept[rng.integers(len(kept), size=BATCH)][:, free] - low) / span
+            shares = np.clip(about + NEAR * rng.standard_normal(shares.shape), LIMIT, 1.0 - LIMIT)
+            later += 1
+        drawn = np.repeat(home[None], BATCH, axis=0)
+        drawn[:, free] = low + shares * span
+        fits, features = _fitting(rig, model, settings, drawn)
+        kept = np.concatenate([kept, drawn[fits]])
+        seen.append(features)
+        if later == NEXT:
+            break
+    return kept, np.concatenate(seen)
+
+
+def _moves(rig: Rig, free: Ints) -> NDArray[np.bool_]:
+    """Return which of the motors move a camera or the tag."""
+    assert rig.tag is not None
+    robot, matrix = rig.robot, rig.robot.coupling[0]
+    moving = set[int]()
+    for link in (rig.tag.frame(robot)[0], *(camera.link for camera in rig.cameras.values())):
+        while link > 0:
+            moving |= set(np.flatnonzero(matrix[link - 1]).tolist())
+            link = robot.joints[link - 1].parent
+    return np.array([motor in moving for motor in free])
+
+
+def _fitting(rig: Rig, model: Model, settings: CameraSettings, postures: Array) -> tuple[Ints, Array]:
+    """Return which postures (B, n) fit, and numbers (K, f) by which these are told apart."""
+    assert rig.tag is not None
+    robot = rig.robot
+    low, high = robot.limits[list(rig.head)].T
+    transforms = model.evaluate(postures).transforms
+    link, position, rotation = rig.tag.frame(robot)
+    hand = transforms[:, link, :3, :]
+    at, inwards = hand[..., :3] @ position + hand[..., 3], hand[..., :3] @ rotation[:, 2]
+    fits, features = np.ones(len(postures), bool), [(postures[:, list(rig.head)] - low) / (high - low)]
+    for camera in rig.cameras.values():
+        centre, axes = camera_frames(camera, transforms, np.zeros(6))
+        local = into(centre, axes, at)
+        distance = np.linalg.norm(local, axis=1)
+        facing = np.einsum("ki,ki->k", inwards, at - centre) / distance
+        pixels = rig.lens.project(local)
+        inside = ((pixels > BORDER) & (pixels < np.array([settings.width, settings.height]) - BORDER)).all(axis=1)
+        fits &= inside & (distance > NEAREST) & (distance < FARTHEST) & (facing > FACING) & ((local[:, :2] ** 2).sum(1) < local[:, 2] ** 2)
+        features += [pixels / settings.width, 4.0 * distance[:, None]]
+        features.append(2.0 * np.einsum("kji,kj->ki", axes, inwards)[:, :2])
+    which = np.flatnonzero(fits)
+    kept = which[model.evaluate(postures[which]).count == 0] if len(which) else which
+    kept = kept[[all((clause.a @ postures[k] + clause.b).max() > 0.0 for clause in robot.clauses) for k in kept]] if len(kept) else kept
+    return kept, np.concatenate(features, axis=1)[kept]
+
+
+def _spread(features: Array, count: int) -> Array:
+    """Return the indices (count,) of rows that are far from each other: each next one is the farthest from those before."""
+    scaled = features / np.maximum(features.std(axis=0), 1e-9)
+    chosen = [int(np.linalg.norm(scaled - scaled.mean(axis=0), axis=1).argmin())]
+    nearest = np.full(len(scaled), np.inf)
+    while len(chosen) < count:
+        nearest = np.minimum(nearest, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
+        chosen.append(int(nearest.argmax()))
+    return np.array(chosen, dtype=np.intp)
+
+
+def _in_order(postures: Array) -> Array:
+    """Return the order of postures (K, d) in which each next one is the nearest of the rest."""
+    left, order = set(range(1, len(postures))), [0]
+    while left:
+        rest = np.array(sorted(left))
+        order.append(int(rest[np.abs(postures[rest] - postures[order[-1]]).max(axis=1).argmin()]))
+        left.remove(order[-1])
+    return np.array(order, dtype=np.intp)

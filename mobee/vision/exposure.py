@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of imperfect cameras: distortion, motion blur, noise, and cameras that are not where the model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee.arrays import Array, Ints
+from mobee.rendering.camera import Camera as View
+from mobee.rendering.camera import Floats
+from mobee.rendering.scene import Picture, Scene
+from mobee.vision.imperfections import CameraErrors, CameraSettings
+from mobee.vision.mount import camera_frames
+
+NOISE_TABLE = 4_000_003  # numbers, at least those of the largest picture
+MARGIN = 2  # px around the part of the plane that the lens shows
+UPWARDS = np.array([[1.0], [-1.0], [1.0]])  # a camera's right, down and ahead as the right, up and ahead of a picture
+
+
+class Sensor:
+    """Develops brightness in the plane ahead of a camera into pictures as its lens and chip make them.
+
+    A pixel is the mean of `samples` samples, at different places within it and at different moments of the exposure.
+    """
+
+    def __init__(self, settings: CameraSettings) -> None:
+        self._settings = settings
+        width, height, lens = settings.width, settings.height, settings.lens
+        offsets = _spread(settings.samples)
+        columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+        pixels = np.stack([columns, rows], axis=-1).reshape(-1, 2)
+        focal, center = np.array([lens.fx, lens.fy]), np.array([lens.cx, lens.cy])
+        flat = [lens.undistort((pixels + offset - center) / focal) for offset in offsets]
+        self._scale = float(focal.max())
+        every = np.concatenate(flat)
+        low = np.nanmin(every, axis=0) - MARGIN / self._scale
+        size = np.ceil((np.nanmax(every, axis=0) - low) * self._scale).astype(int) + MARGIN
+        self._width, self._height = int(size[0]), int(size[1])
+        self._corners = [low - offset / self._scale for offset in offsets]  # of each sample's plane: left and top
+        self._index: list[Ints] = []
+        for corner, places in zip(self._corners, flat, strict=True):
+            at = np.floor((places - corner) * self._scale)
+            inside = np.isfinite(at).all(axis=1)
+            at = np.where(inside[:, None], at, 0.0).astype(np.intp).clip(0, size - 1)
+            self._index.append(at[:, 1] * self._width + at[:, 0])
+
+    def moments(self) -> Array:
+        """Return the times (samples,) s of the samples, from the middle of the exposure."""
+        count = self._settings.samples
+        return self._settings.exposure * ((np.arange(count) + 0.5) / count - 0.5)
+
+    def view(self, sample: int, position: Array, rotation: Array) -> View:
+        """Return the view of a sample of a camera at a position (3,) m with a rotation (3, 3), columns right, down, ahead."""
+        left, top = self._corners[sample]
+        return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
+
+    def pixels(self, sample: int) -> Ints:
+        """Return the pixels (height * width,) of a sample's view that the pixels of the picture show."""
+        return self._index[sample]
+
+    def develop(self, samples: Sequence[Floats], rng: np.random.Generator) -> Picture:
+        """Return the picture (height, width, 3), with noise, of the brightness of all samples, each (height * width, 3), 0 to 255."""
+        settings = self._settings
+        light = sum(samples[1:], samples[0])
+        electrons = light * np.float32(settings.full_well / settings.gain / 255.0 / len(samples))
+        deviation = np.sqrt(electrons + np.float32(settings.read_noise**2))  # of shot and read noise, both nearly normal
+        first = int(rng.integers(NOISE_TABLE - electrons.size))
+        electrons += deviation * _noise_table(NOISE_TABLE)[first : first + electrons.size].reshape(electrons.shape)
+        electrons *= np.float32(255.0 * settings.gain / settings.full_well)
+        picture: NDArray[np.uint8] = np.clip(electrons + 0.5, 0.0, 255.0).astype(np.uint8)
+        return picture.reshape(settings.height, settings.width, 3)
+
+
+@cache
+def _noise_table(size: int) -> Floats:
+    """Return standard normal numbers, from which each picture takes a piece: drawing them costs more than the rest of the picture."""
+    return np.random.default_rng(0x6E6F697365).standard_normal(size, dtype=np.float32)
+
+
+class Cameras:
+    """The imperfect cameras of one robot in a scene."""
+
+    def __init__(self, scene: Scene, settings: CameraSettings, errors: CameraErrors, seed: int) -> None:
+        """`seed`: of the noise in the pictures."""
+        self.settings, self.errors = settings, errors
+        self._scene = scene
+        self._sensor = Sensor(settings)
+        self._rng = np.random.default_rng([seed, 0x6E6F697365])
+
+    @property
+    def moments(self) -> Array:
+        """The times (samples,) s, from the middle of the exposure, for which `expose` takes the robot's postures."""
+        return self._sensor.moments()
+
+    def expose(self, name: str, postures: Sequence[Array]) -> Picture:
+        """Return the picture of a camera (height, width, 3), red, green, blue.
+
+        `postures`: the true positions of all motors, (n,) rad, at each of the `moments`; those of the head differ from the encoders
+        by `errors.encoders`, which this method adds.
+        """
+        camera, scene, views = self._scene.cameras[name], self._scene, []
+        for sample, q in enumerate(postures):
+            scene.pose(q + self.errors.encoders)
+            frame = camera_frames(camera, scene.transforms, self.errors.mounts[name])
+            views.append(scene.light(self._sensor.view(sample, *frame), camera.hidden, self._sensor.pixels(sample)))
+        return self._sensor.develop(views, self._rng)
+
+
+def _spread(count: int) -> Array:
+    """Return places (count, 2) within a pixel, from its middle, evenly spread (a Kronecker sequence)."""
+    if count == 1:
+        return np.zeros((1, 2))
+    steps = np.array([0.7548776662466927, 0.5698402909980532])  # powers of the inverse of the plastic number
+    spread = np.mod(0.5 + np.arange(count)[:, None] * steps, 1.0) - 0.5
+    found: Array = spread - spread.mean(axis=0)
+    return found

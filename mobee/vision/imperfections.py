@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is imperfect about real cameras: their settings, and the errors of one robot, drawn by a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+from mobee.settings import Range, Settings
+from mobee.vision.lens import DRAGONFLY, Lens
+
+HEAD = "head"
+"""The part whose encoders have offsets."""
+_STREAM = 0x65796573  # of random numbers, beside those of motors and encoders of the same seed
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSettings(Settings):
+    """Settings of imperfect cameras, all alike; the defaults are those of an iCub with Dragonfly cameras, as far as they are known.
+
+    The lens is published (see `DRAGONFLY`).  Exposure, noise, latency and jitter are assumed: typical values of such CCD cameras on
+    FireWire.  The tolerances (`mount_*`, `encoder_offset`, `tag_*`) bound what the kinematic model does not know; `camera_errors` draws
+    the errors of one robot within them.
+
+    Args:
+        width: columns of a picture.
+        height: rows of a picture.
+        lens: of every camera.
+        exposure: s, for which a picture collects light: motion within it is blurred.
+        samples: moments within the exposure at which the scene is drawn, each at another place within the pixels.
+        gain: factor on the signal; the pictures are exposed so that brightness stays, so a gain of 2 collects half of the light.
+        full_well: electrons of a white pixel at gain 1; their number has shot noise.
+        read_noise: standard deviation of the readout, electrons.
+        latency: s from the middle of the exposure to the arrival of the picture, as the driver assumes it when it computes the stamp.
+        latency_error: s, bound of the difference of the true latency from the assumed one.
+        jitter: standard deviation of the latency from picture to picture, s.
+        mount_position: m, bound of a camera's distance from where the model has it.
+        mount_rotation: degrees, bound of a camera's angle to the orientation that the model has.
+        encoder_offset: degrees, bound of the offset of each of the head's encoders.
+        tag_position: m, bound of the distance of the palm's tag from where the model has it.
+        tag_rotation: degrees, bound of its angle.
+    """
+
+    width: Annotated[int, Range(ge=16, le=1280)] = 320
+    height: Annotated[int, Range(ge=16, le=1024)] = 240
+    lens: Lens = DRAGONFLY
+    exposure: Annotated[float, Range(ge=0.0, le=0.1)] = 0.010
+    samples: Annotated[int, Range(ge=1, le=16)] = 4
+    gain: Annotated[float, Range(gt=0.0, le=16.0)] = 2.0
+    full_well: Annotated[float, Range(gt=0.0)] = 15_000.0
+    read_noise: Annotated[float, Range(ge=0.0)] = 40.0
+    latency: Annotated[float, Range(ge=0.0, le=1.0)] = 0.040
+    latency_error: Annotated[float, Range(ge=0.0, le=0.5)] = 0.015
+    jitter: Annotated[float, Range(ge=0.0, le=0.1)] = 0.001
+    mount_position: Annotated[float, Range(ge=0.0, le=0.1)] = 0.02
+    mount_rotation: Annotated[float, Range(ge=0.0, le=20.0)] = 2.0
+    encoder_offset: Annotated[float, Range(ge=0.0, le=10.0)] = 1.0
+    tag_position: Annotated[float, Range(ge=0.0, le=0.05)] = 0.005
+    tag_rotation: Annotated[float, Range(ge=0.0, le=20.0)] = 2.0
+
+    @property
+    def deviations(self) -> Mapping[str, float]:
+        """The standard deviations of drawn errors along each axis, by kind: what a calibration knows before it sees anything."""
+        ball = 1.0 / np.sqrt(5.0)  # of a coordinate of a point that is uniform in a ball, over the ball's radius
+        return {
+            "position": self.mount_position * ball,
+            "rotation": float(np.deg2rad(self.mount_rotation)) * ball,
+            "encoder": float(np.deg2rad(self.encoder_offset)) / np.sqrt(3.0),
+            "latency": self.latency_error / np.sqrt(3.0),
+            "tag_position": self.tag_position * ball,
+            "tag_rotation": float(np.deg2rad(self.tag_rotation)) * ball,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraErrors:
+    """By how much one robot's cameras differ from its kinematic model.
+
+    `mounts`: by camera, (6,): displacement [m], then rotation vector [rad], both in the camera's own axes: the true camera is that of the
+    model, displaced and then turned.  `encoders`: (n,) rad, true position minus what the encoder says, 0 but for the head.  `latency`: s,
+    true minus assumed: the true exposure is this much before the stamp.  `tag`: (6,) as a mount, in the tag's axes.
+    """
+
+    mounts: Mapping[str, Array]
+    encoders: Array
+    latency: float
+    tag: Array
+
+    @classmethod
+    def none(cls, robot: Robot, cameras: Sequence[str]) -> CameraErrors:
+        """Return errors that are all zero."""
+        return cls({name: np.zeros(6) for name in cameras}, np.zeros(len(robot.motors)), 0.0, np.zeros(6))
+
+
+def camera_errors(settings: CameraSettings, robot: Robot, cameras: Sequence[str], seed: int) -> CameraErrors:
+    """Draw the errors of one robot: displacements and rotations uniform in balls, encoder offsets and latency uniform in intervals."""
+    rng = np.random.default_rng([seed, _STREAM])
+
+    def drawn(position: float, rotation_deg: float) -> Array:
+        return np.concatenate([_in_ball(rng, position), _in_ball(rng, float(np.deg2rad(rotation_deg)))])
+
+    mounts = {name: drawn(settings.mount_position, settings.mount_rotation) for name in cameras}
+    encoders = np.zeros(len(robot.motors))
+    if HEAD in robot.parts:
+        where = robot.parts[HEAD].slice
+        encoders[where] = np.deg2rad(rng.uniform(-settings.encoder_offset, settings.encoder_offset, len(robot.parts[HEAD])))
+    latency = float(rng.uniform(-settings.latency_error, settings.latency_error))
+    return CameraErrors(mounts, encoders, latency, drawn(settings.tag_position, settings.tag_rotation))
+
+
+def _in_ball(rng: np.random.Generator, radius: float) -> Array:
+    """Return a point (3,) that is uniform in a ball about 0."""
+    direction = rng.standard_normal(3)
+    found: Array = radius * rng.uniform() ** (1.0 / 3.0) * direction / np.linalg.norm(direction)
+    return found

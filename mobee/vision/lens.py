@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A lens: from directions in a camera's frame to pixels and back, with the distortion of Brown and Conrady."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+
+ROUNDS, ENOUGH = 30, 1e-12  # of Newton's method that inverts the distortion; its last step, times the focal length
+
+
+@dataclass(frozen=True, slots=True)
+class Lens:
+    """The intrinsic parameters of a camera; the middles of pixels are at integers, and the origin is top left.
+
+    `fx`, `fy`: focal lengths, px.  `cx`, `cy`: principal point, px.  `k1`, `k2`: radial, `p1`, `p2`: tangential distortion of Brown and
+    Conrady, in OpenCV's order and sign.  A camera's frame has x to the right, y down and z along the direction of view.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.numbers).all() and min(self.fx, self.fy) > 0.0):
+            raise InvalidValue(f"lens {self.numbers}: must be eight finite numbers fx fy cx cy k1 k2 p1 p2, the first two above 0")
+
+    @classmethod
+    def ideal(cls, view_deg: float, width: int, height: int) -> Lens:
+        """Return the lens without distortion of a picture with a vertical field of view [degrees]."""
+        focal = 0.5 * height / float(np.tan(0.5 * np.deg2rad(view_deg)))
+        return cls(focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5)
+
+    @classmethod
+    def of_matrix(cls, matrix: Array, distortion: Array) -> Lens:
+        """Return the lens of a matrix (3, 3) in pixels and the coefficients k1 k2 p1 p2 (4,), or (0,) for none; raises InvalidValue."""
+        if np.shape(matrix) != (3, 3) or len(distortion) not in (0, 4):
+            raise InvalidValue(f"a lens of {np.size(matrix)} and {len(distortion)} numbers: expected 9, and 4 or none")
+        return cls(*(float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2))), *(float(one) for one in distortion))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The eight parameters in their order."""
+        return self.fx, self.fy, self.cx, self.cy, self.k1, self.k2, self.p1, self.p2
+
+    @property
+    def matrix(self) -> Array:
+        """The matrix (3, 3), px, without the distortion."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def distortion(self) -> tuple[float, ...]:
+        """The coefficients k1 k2 p1 p2; empty for a lens without distortion."""
+        given = self.k1, self.k2, self.p1, self.p2
+        return given if any(given) else ()
+
+    def distort(self, flat: Array) -> Array:
+        """Return the distorted coordinates (..., 2) of points (..., 2) in the plane at distance 1."""
+        x, y = flat[..., 0], flat[..., 1]
+        square = x * x + y * y
+        radial = 1.0 + square * (self.k1 + square * self.k2)
+        return np.stack(
+            [
+                x * radial + 2.0 * self.p1 * x * y + self.p2 * (square + 2.0 * x * x),
+                y * radial + self.p1 * (square + 2.0 * y * y) + 2.0 * self.p2 * x * y,
+            ],
+            axis=-1,
+        )
+
+    def distortion_slope(self, flat: Array) -> Array:
+        """Return the derivative (..., 2, 2) of `distort` at points (..., 2)."""
+        x, y = flat[..., 0], flat[..., 1]
+        square = x * x + y * y
+        radial = 1.0 + square * (self.k1 + square * self.k2)
+        slope = 2.0 * (self.k1 + 2.0 * square * self.k2)  # of `radial` by x, over x
+        mixed = slope * x * y + 2.0 * (self.p1 * x + self.p2 * y)
+        out = np.empty((*x.shape, 2, 2))
+        out[..., 0, 0] = radial + slope * x * x + 2.0 * self.p1 * y + 6.0 * self.p2 * x
+        out[..., 1, 1] = radial + slope * y * y + 6.0 * self.p1 * y + 2.0 * self.p2 * x
+        out[..., 0, 1] = out[..., 1, 0] = mixed
+        return out
+
+    def undistort(self, flat: Array) -> Array:
+        """Return the points (..., 2) whose distorted coordinates are given (..., 2), by Newton's method; NaN where there is none."""
+        given = np.asarray(flat, dtype=np.float64)
+        found, step = given.copy(), np.full(given.shape, np.inf)
+        with np.errstate(all="ignore"):
+            for _ in range(ROUNDS):
+                slope, error = self.distortion_slope(found), self.distort(found) - given
+                det = slope[..., 0, 0] * slope[..., 1, 1] - slope[..., 0, 1] ** 2
+                step[..., 0] = (slope[..., 1, 1] * error[..., 0] - slope[..., 0, 1] * error[..., 1]) / det
+                step[..., 1] = (slope[..., 0, 0] * error[..., 1] - slope[..., 0, 1] * error[..., 0]) / det
+                found -= step
+                if not np.nanmax(np.abs(step), initial=0.0) > ENOUGH:
+                    break
+            slope = self.distortion_slope(found)
+            shown = (slope[..., 0, 0] > 0.0) & (slope[..., 0, 0] * slope[..., 1, 1] > slope[..., 0, 1] ** 2)  # else the lens folds back
+            wrong = ~((np.abs(step).max(axis=-1) <= 1e-6) & shown)
+        found[wrong] = np.nan
+        return found
+
+    def project(self, points: Array) -> Array:
+        """Return the pixels (..., 2), column and row, of points (..., 3) m in the camera's frame; NaN for those behind the camera."""
+        ahead = np.where(points[..., 2:] > 0.0, points[..., 2:], np.nan)
+        found: Array = self.distort(points[..., :2] / ahead) * (self.fx, self.fy) + (self.cx, self.cy)
+        return found
+
+    def projection_slope(self, points: Array) -> Array:
+        """Return the derivative (..., 2, 3) [px/m] of `project` at points (..., 3) m."""
+        ahead = points[..., 2]
+        flat = points[..., :2] / ahead[..., None]
+        by_flat = self.distortion_slope(flat) * np.array([[self.fx], [self.fy]]) / ahead[..., None, None]
+        return np.concatenate([by_flat, -(by_flat @ flat[..., None])], axis=-1)
+
+    def unproject(self, pixels: Array) -> Array:
+        """Return the unit vectors (..., 3) in the camera's frame of pixels (..., 2); NaN where the lens shows no direction."""
+        flat = self.undistort((pixels - np.array([self.cx, self.cy])) / np.array([self.fx, self.fy]))
+        rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
+        found: Array = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        return found
+
+
+DRAGONFLY = Lens(215.6, 215.1, 163.4, 111.2, -0.3675, 0.1323, -0.0004, -0.0002)
+"""Of an iCub's eye at 320x240: the published example of the left camera in the documentation of the iCub's stereo calibration."""

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The place of a point that two or more cameras see, with a covariance that holds the noise of pixels, encoders, stamp and calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms
+from mobee.vision.encoders import Moment
+from mobee.vision.mount import camera_frames
+from mobee.vision.rig import Rig, see_points
+
+STEPS, ENOUGH = 8, 1e-7  # of Gauss and Newton, m
+PARALLEL = 1e6  # condition above which rays count as parallel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighted:
+    """A point in one picture: pixel (2,), column and row, and the standard deviation of each, px."""
+
+    pixel: Array
+    noise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Place:
+    """A point in the root frame: position (3,) m, covariance (3, 3) m^2, and the misfit of its pixels, in squared deviations."""
+
+    position: Array
+    covariance: Array
+    misfit: float
+
+
+def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
+    """Return the place (3,) m that is nearest to the rays through the pixels; None if they are parallel, or do not exist."""
+    transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
+    normal: Array = np.zeros((3, 3))
+    against: Array = np.zeros(3)
+    for camera, one in sighted.items():
+        position, rotation = camera_frames(rig.cameras[camera], transforms, x[rig.where(camera)])
+        ray = rotation @ rig.lens.unproject(one.pixel)
+        across: Array = np.eye(3) - np.outer(ray, ray)
+        normal = np.asarray(normal + across, dtype=np.float64)
+        against += across @ position
+    if not np.isfinite(normal).all() or np.linalg.cond(normal) > PARALLEL:
+        return None
+    found: Array = np.linalg.solve(normal, against)
+    return found
+
+
+def locate(
+    rig: Rig,
+    x: Array,
+    moment: Moment,
+    sighted: Mapping[str, Sighted],
+    uncertainty: Array | None = None,
+    jitter: float = 0.0,
+) -> Place | None:
+    """Return the place of a point from its pixels in two or more pictures of one stamp, by least squares; None if rays do not meet.
+
+    Args:
+        rig: the robot and its cameras.
+        x: the calibration's parameters (P,).
+        moment: encoders at the stamp.
+        sighted: the point in the pictures, by camera.
+        uncertainty: covariance (P, P) of the parameters; None: they are exact.
+        jitter: standard deviation of the stamp, s.
+    """
+    place = rays_meet(rig, x, moment, sighted)
+    if place is None:
+        return None
+    measured = np.concatenate([one.pixel for one in sighted.values()])
+    own = np.repeat([one.noise**2 for one in sighted.values()], 2)
+    q, dq = moment.q[None], moment.dq[None]
+    for _ in range(STEPS):
+        seen = [see_points(rig, camera, x, q, dq, place[None, None]) for camera in sighted]
+        slope = np.concatenate([one.by_point[0, 0] for one in seen])
+        by_posture = np.concatenate([one.by_posture[0, 0] for one in seen])
+        late = np.concatenate([one.by_time[0, 0] for one in seen])
+        spread = np.diag(own) + (by_posture * moment.variance) @ by_posture.T + jitter**2 * np.outer(late, late)
+        if uncertainty is not None:
+            by_parameters = np.concatenate([one.by_parameters[0, 0] for one in seen])
+            spread = spread + by_parameters @ uncertainty @ by_parameters.T
+        missing = measured - np.concatenate([one.pixels[0, 0] for one in seen])
+        if not np.isfinite(missing).all():
+            return None
+        weighted = np.linalg.solve(spread, slope)
+        covariance = np.linalg.inv(slope.T @ weighted)
+        step = covariance @ (weighted.T @ missing)
+        place = place + step
+        if float(np.abs(step).max()) < ENOUGH:
+            break
+    left = missing - slope @ step
+    return Place(place, covariance, float(left @ np.linalg.solve(spread, left)))
