@@ -332,7 +332,7 @@ class WorldObject(Message, frozen=True, kw_only=True):
 
 
 class Image(Message, frozen=True, kw_only=True):
-    """Picture of one camera at tick k_capture: rows top to bottom, height x width x 3 bytes."""
+    """Picture of one camera, rows top to bottom, height x width x 3 bytes; t is the middle of the exposure by the camera's clock."""
 
     stream: ClassVar[Stream] = Stream("vision/image/{camera}", "BULK", writers=("renderer",), readers=("vision", "monitor"))
 
@@ -345,14 +345,18 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class Camera(Message, frozen=True, kw_only=True):
-    """Calibration of a camera, and the posture of the robot at the picture's tick."""
+    """Lens of a camera, and the encoders of the robot at the picture's stamp t."""
 
     stream: ClassVar[Stream] = Stream("vision/camera/{camera}", "BULK", writers=("renderer",), readers=("vision",))
 
     camera: Name
     k_capture: Count
     intrinsics: Matrix3  # pixels; pixel centres at integers, origin top left
+    distortion: list[float]  # k1 k2 p1 p2 of Brown and Conrady, or empty
+    exposure: Annotated[float, Meta(ge=0)]  # s
     q: list[float]  # rad, all motors
+    dq: list[float]  # rad/s, all motors
+    readings: Annotated[int, Meta(gt=0)]  # of each encoder, from which q and dq were computed by a line
 
 
 class Transition(Message, frozen=True, kw_only=True):

@@ -22,6 +22,7 @@ EXPERIMENTS = {
     "exploration-uniformity": "experiments.claims.ch7_learning.exploration_uniformity",
     "forced-contact": "experiments.claims.ch5_control.forced_contact",
     "gain-tuning": "experiments.claims.ch5_control.gain_tuning",
+    "hand-eye-calibration": "experiments.claims.ch4_vision.hand_eye_calibration",
     "hypercube-exploration": "experiments.claims.ch7_learning.hypercube_exploration",
     "information-gain": "experiments.claims.ch7_learning.information_gain",
     "live-reach": "experiments.claims.ch8_reaching.live_reach.claim",

@@ -29,6 +29,7 @@ VERBS = {
     "learn": "learn offline on any robot, with the transitions in a file",
     "plan": "plan a path by what an agent has learned",
     "reach": "move a hand to a place, on the running robot or offline",
+    "calibrate": "find where cameras are, by looking at the robot's own hand",
     "roadmap": "build, show, query and play roadmaps of whole-body motions",
     "export": "write the transitions of a run as one table",
     "experiment": "measure the claims of the papers: list, run, figure",

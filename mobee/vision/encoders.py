@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 
+KEPT = 128  # readings of a part
 WINDOW = 0.035  # s: readings within this time of the stamp are used
 
 
@@ -20,6 +23,39 @@ class Moment:
     q: Array
     dq: Array
     variance: Array
+
+
+class Readings:
+    """The newest readings of the encoders, part by part, since each part has its own times."""
+
+    def __init__(self, parts: Mapping[str, slice], motors: int) -> None:
+        self._parts, self._motors = dict(parts), motors
+        self._rows: dict[str, deque[tuple[float, Array]]] = {part: deque(maxlen=KEPT) for part in parts}
+
+    def note(self, part: str, t: float, q: Array) -> None:
+        """Add a reading (n_part,) rad of a part at time t [s]; one that is there already is ignored."""
+        rows = self._rows[part]
+        if not rows or t > rows[-1][0]:
+            rows.append((t, q))
+
+    def at(self, t: float) -> tuple[Array, Array, int]:
+        """Return the encoders (n,) rad and their velocities (n,) rad/s at time t [s], and the fewest readings of a part in them.
+
+        Raises InvalidValue if a part has fewer than two readings near that time.
+        """
+        q, dq, fewest = np.zeros(self._motors), np.zeros(self._motors), KEPT
+        for part, where in self._parts.items():
+            times = np.array([time for time, _ in self._rows[part]])
+            values = np.array([value for _, value in self._rows[part]])
+            found = moment_at(times, values, t, np.ones(where.stop - where.start))
+            q[where], dq[where] = found.q, found.dq
+            fewest = min(fewest, int((np.abs(times - t) <= WINDOW).sum()))
+        return q, dq, fewest
+
+    def forget(self) -> None:
+        """Drop all readings, at the start of a new run."""
+        for rows in self._rows.values():
+            rows.clear()
 
 
 def moment_at(times: Array, readings: Array, t: float, noise: Array) -> Moment:

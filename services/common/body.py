@@ -38,6 +38,13 @@ class Body:
             q[part.slice] = self.states[name].q
         return q
 
+    def dq(self) -> Array:
+        """Return the motor velocities, shape (n,), in [rad/s]; call it only after `update` has returned True."""
+        dq = np.empty(len(self._robot.motors))
+        for name, part in self._robot.parts.items():
+            dq[part.slice] = self.states[name].dq
+        return dq
+
     def ages(self, t: int) -> dict[str, int]:
         """Return the age [ns] of each part's sample at bus time t [ns]."""
         return {name: t - state.t for name, state in self.states.items()}

@@ -17,5 +17,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Motors on which a contact acts: all between the body's root and the contact, or those of the touched part only."""
     contact_forces: bool = True
     """False: contacts are published but exert no force, for experiments without that force."""
+    calibration: str = ""
+    """File of `mobee calibrate`, whose offsets of the head's encoders are added to what they report; empty: none."""
     terms: list[str] = []
     """User-defined terms of the controller; if there are any, contacts are published with the forces, because terms may depend on them."""

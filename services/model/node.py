@@ -20,7 +20,9 @@ from mobee.model.contact import KINDS, Contact, touched
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.pose import Pose as ModelPose
 from mobee.model.snapshot import MAX_HANDS
+from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
+from mobee.vision.calibration.calibration import load_calibration
 from services.common.lockstep import Participant
 from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
@@ -42,6 +44,7 @@ class ModelNode:
         self._gains = Gains.named(config.gains)
         self._publishes_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
+        self._offsets = _encoder_offsets(config, robot)
         self._world = WorldServer(service, self._model)
         bus = service.bus
         self._forces = bus.publisher(Forces, "model")
@@ -94,7 +97,7 @@ class ModelNode:
     def _tick(self, tick: Tick) -> None:
         begin = time.perf_counter()
         self._world.expire(tick.t)
-        self._q = np.array(tick.q)
+        self._q = np.array(tick.q) if self._offsets is None else np.array(tick.q) + self._offsets
         pose = self._world.pose = self._track.evaluate(self._q, self._reaching)
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         self._note_contacts(pose)
@@ -176,6 +179,13 @@ class ModelNode:
         except MobeeError as error:
             raise CallRefused("marker", str(error)) from None
         return JacobianReply(v=VERSION, rows=jacobian.shape[0], columns=jacobian.shape[1], data=jacobian.ravel().tolist())
+
+
+def _encoder_offsets(config: Config, robot: Robot) -> Array | None:
+    """Return the true positions minus those of the encoders (n,) rad by the calibration; None without one.  Raises InvalidValue."""
+    if not config.calibration:
+        return None
+    return load_calibration(config.calibration).errors(robot, cameras_of(robot)).encoders
 
 
 def _item(c: Contact) -> ContactItem:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from mobee.errors import InvalidValue
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters
@@ -78,8 +79,19 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """Columns of a picture."""
     height: Annotated[int, Meta(ge=16, le=1024)] = 240
     """Rows of a picture."""
+    optics: Literal["ideal", "dragonfly"] = "ideal"
+    """ideal: pictures of the posture that the encoders report; dragonfly: of the simulator's true posture, by cameras with distortion,
+    noise, motion blur, latency, and mounting errors drawn by the seed, in a room (docs/vision.md).  Needs robot_sim's truth_rate = 100."""
+    samples: Annotated[int, Meta(ge=1, le=16)] = 2
+    """dragonfly: moments of the exposure at which the scene is drawn; a picture takes as many times as long."""
+    tag: str = ""
+    """Marker on which a tag is drawn, for `mobee calibrate`; empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
         """Check also that the robot has a camera; raises MobeeError."""
         super().check_robot(robot)
         require_cameras(robot, cameras_of(robot, self.cameras), 1)
+        if self.tag:
+            robot.marker(self.tag)
+        if self.optics == "dragonfly" and (self.width, self.height) != (320, 240):
+            raise InvalidValue(f'optics = "dragonfly" makes pictures of 320 x 240 pixels, not of {self.width} x {self.height}')

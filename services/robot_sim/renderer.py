@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renders the pictures of the cameras in a process of its own, `python -m services.robot_sim.renderer`.
 
-Reads: clock, {part}/state, sim/truth (where the simulator has its objects).
+Reads: clock, {part}/state, sim/truth (where the simulator has its objects); with optics = "dragonfly" tick in place of the states.
 Writes: vision/image/{camera}, vision/camera/{camera}; only while there are subscribers.
 """
 
@@ -14,13 +14,20 @@ from typing import Any
 import numpy as np
 
 from bus_schema.messages import Camera, Clock, Image, Truth
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.rendering.room import clutter, room
 from mobee.rendering.scene import Scene
+from mobee.rendering.solid import Solid
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
+from mobee.vision.imperfections import CameraSettings, camera_errors
+from mobee.vision.tag import Tag, tag_solids
 from services.common.body import Body
 from services.common.rate import Percentiles
 from services.common.service import Service, run_node
 from services.robot_sim.config import RendererConfig
+from services.robot_sim.imperfect import ImperfectCameras
 
 
 class RendererNode:
@@ -29,7 +36,9 @@ class RendererNode:
     def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
         self._service = service
         self._period = round(1e9 / config.frame_rate)  # ns
-        self._scene = Scene(robot, config.load_world(), cameras_of(robot, config.cameras), config.width, config.height)
+        self._imperfect = self._imperfect_cameras(config, robot) if config.optics == "dragonfly" else None
+        if self._imperfect is None:
+            self._scene = _scene(config, robot, np.zeros(6), [])
         self._body = Body(service.bus, robot)
         self._truth = service.bus.latest(Truth)
         self._images = {name: service.bus.publisher(Image, name) for name in self._scene.cameras}
@@ -42,11 +51,23 @@ class RendererNode:
         service.on_run(self._new_run)
         service.on_clock(self._tick)
 
+    def _imperfect_cameras(self, config: RendererConfig, robot: Robot) -> ImperfectCameras:
+        settings = CameraSettings(width=config.width, height=config.height, samples=config.samples)
+        errors = camera_errors(settings, robot, list(cameras_of(robot, config.cameras)), config.seed)
+        objects = config.load_world().objects.values()
+        self._scene = _scene(config, robot, errors.tag, [*room(config.seed), *clutter(objects, config.seed)])
+        return ImperfectCameras(self._service, robot, self._scene, settings, errors, config.seed)
+
     def _tick(self, clock: Clock) -> None:
-        if clock.t < self._due:
+        late = 0 if self._imperfect is None else round(1e9 * self._imperfect.settings.latency)
+        if clock.t < self._due + late:
             return
         if not any(self._images[name].has_subscribers or self._cameras[name].has_subscribers for name in self._scene.cameras):
             self._due = clock.t + self._period
+            return
+        if self._imperfect is not None:
+            exposed, self._due = max(self._due, clock.t - late - self._period), max(self._due + self._period, clock.t - late)
+            self._expose(self._imperfect, exposed)
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
         if self._body.update() and len({state.k for state in self._body.states.values()}) == 1:
@@ -68,7 +89,43 @@ class RendererNode:
             self._frame_time.add(1e3 * (time.perf_counter() - start))
             self._frame_work.add(1e3 * (time.thread_time() - work))
             stamp: dict[str, Any] = {"k": state.k, "t": state.t, "camera": name, "k_capture": state.k}
-            self._cameras[name].put(**stamp, intrinsics=self._scene.intrinsics(name).ravel().tolist(), q=q.tolist())
+            self._cameras[name].put(
+                **stamp,
+                intrinsics=self._scene.intrinsics(name).ravel().tolist(),
+                distortion=[],
+                exposure=0.0,
+                q=q.tolist(),
+                dq=self._body.dq().tolist(),
+                readings=1,
+            )
+            height, width, _ = picture.shape
+            self._images[name].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
+        self._pairs += 1
+        self._pair_time.add(1e3 * (time.perf_counter() - begin))
+
+    def _expose(self, cameras: ImperfectCameras, t: int) -> None:
+        """Publish the pictures of an exposure at time t [ns]; with none if the truth around it is missing."""
+        begin = time.perf_counter()
+        try:
+            found = cameras.expose(1e-9 * t)
+        except InvalidValue as error:
+            self._missed += 1
+            self._service.bus.reject("truth", str(error))
+            return
+        lens = cameras.settings.lens
+        t_stamp = max(0, round(1e9 * found.stamp))
+        k = t_stamp // max(1, self._service.bus.dt)
+        for name, picture in found.pictures:
+            stamp: dict[str, Any] = {"k": k, "t": t_stamp, "camera": name, "k_capture": k}
+            self._cameras[name].put(
+                **stamp,
+                intrinsics=lens.matrix.ravel().tolist(),
+                distortion=list(lens.distortion),
+                exposure=cameras.settings.exposure,
+                q=found.q.tolist(),
+                dq=found.dq.tolist(),
+                readings=found.readings,
+            )
             height, width, _ = picture.shape
             self._images[name].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
         self._pairs += 1
@@ -76,10 +133,12 @@ class RendererNode:
 
     def _new_run(self) -> None:
         self._body.forget()
+        if self._imperfect is not None:
+            self._imperfect.forget()
         self._due = 0
 
     def _mark(self) -> None:
-        self._pairs = 0
+        self._pairs = self._missed = 0
         self._frame_time.clear()
         self._frame_work.clear()
         self._pair_time.clear()
@@ -87,6 +146,7 @@ class RendererNode:
     def _describe(self) -> tuple[str, dict[str, float]]:
         numbers = {
             "pairs": self._pairs,
+            "missed": self._missed,
             "frame_ms_p50": self._frame_time.at(50),
             "frame_ms_p99": self._frame_time.at(99),
             "frame_cpu_ms_p50": self._frame_work.at(50),
@@ -96,6 +156,12 @@ class RendererNode:
         }
         each = f", {numbers['frame_ms_p50']:.0f} ms a picture" if self._pairs else ""
         return f"{self._pairs} pairs of pictures{each}", numbers
+
+
+def _scene(config: RendererConfig, robot: Robot, mount: Array, around: list[Solid]) -> Scene:
+    """Return the scene; `mount` (6,): of the tag on the palm."""
+    worn = tag_solids(Tag(config.tag), robot, mount) if config.tag else []
+    return Scene(robot, config.load_world(), cameras_of(robot, config.cameras), config.width, config.height, worn, around)
 
 
 def main(argv: Sequence[str] | None = None) -> None:

@@ -4,13 +4,19 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bus_schema.messages import Camera, Geometry, Image, WorldObject
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-from mobee.vision.ball import Frame, Sighting, find_balls, locate
+from mobee.vision.ball import Fix, Frame, Sighting, find_balls, locate
+from mobee.vision.calibrated_ball import locate_calibrated
+from mobee.vision.calibration.calibration import load_calibration
+from mobee.vision.encoders import Moment
+from mobee.vision.lens import Lens
 from services.common.cameras import STEREO, frame_at_capture
 from services.common.rate import Percentiles
 from services.common.service import Service
@@ -25,6 +31,7 @@ class VisionNode:
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
         self._mounts = dict(list(config.cameras_on(robot).items())[:STEREO])
+        self._calibration = load_calibration(config.calibration) if config.calibration else None
         self._images: dict[str, Image] = {}
         self._cameras: dict[str, Camera] = {}
         self._place = service.bus.publisher(WorldObject, BALL)
@@ -66,7 +73,7 @@ class VisionNode:
         first, second = self._mounts
         left, right = self._sightings(first), self._sightings(second)
         self._seen += bool(left) + bool(right)
-        fix = locate(left, right, (self._frame(first), self._frame(second)), self._config.radius)
+        fix = self._fix(left, right)
         if fix is None:
             self._mismatched += bool(left and right)
             return
@@ -83,10 +90,22 @@ class VisionNode:
             valid_until=camera.t + round(1e9 * self._config.valid_for),
         )
 
+    def _fix(self, left: Sequence[Sighting], right: Sequence[Sighting]) -> Fix | None:
+        """Return the ball's place; with a calibration its covariance holds the noise of pixels, encoders and calibration."""
+        first, second = self._mounts
+        if self._calibration is None:
+            return locate(left, right, (self._frame(first), self._frame(second)), self._config.radius)
+        camera = self._cameras[first]
+        lens = Lens.of_matrix(np.array(camera.intrinsics).reshape(3, 3), np.array(camera.distortion))
+        rig = replace(self._calibration.rig(self._robot, self._mounts), lens=lens)
+        variance = np.full(len(camera.q), self._config.encoder_noise**2 / camera.readings)
+        moment = Moment(np.array(camera.q), np.array(camera.dq), variance)
+        return locate_calibrated(rig, self._calibration, moment, (left, right), self._config.radius)
+
     def _sightings(self, name: str) -> list[Sighting]:
         image = self._images[name]
         picture = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
-        return find_balls(picture, np.array(self._cameras[name].intrinsics).reshape(3, 3))
+        return find_balls(picture, np.array(self._cameras[name].intrinsics).reshape(3, 3), self._cameras[name].distortion)
 
     def _frame(self, name: str) -> Frame:
         return frame_at_capture(self._robot, self._mounts[name], np.array(self._cameras[name].q))

@@ -79,6 +79,11 @@ class Watcher:
         return moment_at(motion.times, motion.encoders, stamp, noise), pictures
 
 
+def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
+    """Return the parts that move during a calibration: the head, if the robot has one, and the arm."""
+    return (HEAD, part) if HEAD in rig.robot.parts else (part,)
+
+
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
     """Move the head and one arm through postures (K, n) rad; return what the cameras saw of the tag.
 
@@ -86,7 +91,7 @@ def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):
-        motion, arrived = watcher.move(posture, (HEAD, part), rest)
+        motion, arrived = watcher.move(posture, moved_parts(watcher.rig, part), rest)
         begin = float(motion.times[0])
         moving = [begin + share * (arrived - begin) for share in np.linspace(0.2, 0.5, MOVING)]
         for t in [*moving, *(arrived + 0.04 + PERIOD * k for k in range(RESTING))]:

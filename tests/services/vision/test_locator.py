@@ -273,7 +273,8 @@ def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray) -> Callable[..., No
         for eye in EYES:
             k_capture = late if late is not None and eye == "right" else k
             stamp = {"k": k, "t": k * TICK, "camera": eye, "k_capture": k_capture}
-            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), q=q.tolist() if posture is None else posture)
+            encoders = {"q": q.tolist() if posture is None else posture, "dq": [0.0] * len(q), "readings": 1}
+            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), distortion=[], exposure=0.0, **encoders)
             images[eye].put(**stamp, width=320, height=240, encoding="rgb8", data=pictures[eye][:size])
 
     return put
