@@ -81,7 +81,7 @@ class Tick(Clock, frozen=True, kw_only=True):
     """Start of tick k, with the newest state of every part; each part has its own sampling time."""
 
     stream: ClassVar[Stream] = Stream(
-        "tick", "CONTROL", writers=("robot_sim",), readers=("model", "controller", "port_filter", "agent"), when="every tick"
+        "tick", "CONTROL", writers=("robot_sim",), readers=("model", "controller", "port_filter", "agent", "renderer"), when="every tick"
     )
 
     q: RobotVector  # rad, encoders

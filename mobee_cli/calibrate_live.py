@@ -45,6 +45,7 @@ from services.vision.config import Config as VisionConfig
 
 WHO = f"mobee_calibrate_{os.getpid()}"
 REST = 0.4  # s of wall-clock time for which the robot rests in a posture
+TRIES = 5  # of a motion that a hold interrupts
 FIRST_PICTURE = 15.0  # s for the first picture
 
 
@@ -127,12 +128,8 @@ def _watch(
     for number, posture in enumerate(postures):
         progress.show(number / len(postures), "watching the hand")
         pictures.shots.clear()
-        try:
-            for which in parts:
-                plant.measure(which)
-                plant.act(which, posture[rig.robot.part(which).slice])
-        except ActionInterrupted as interruption:
-            raise UserError(f"the robot was interrupted: {interruption}. `mobee status` shows its state.", FAILED) from None
+        for which in parts:
+            _move(plant, which, posture[rig.robot.part(which).slice])
         moving = len(pictures.shots)
         service.spin(time.monotonic() + REST)
         middle = [pictures.shots[int(moving * share)] for share in np.linspace(0.2, 0.5, MOVING)] if moving else []
@@ -140,6 +137,19 @@ def _watch(
             if (one := _observation(rig, shot)) is not None:
                 found.append(one)
     return found
+
+
+def _move(plant: BusPlant, part: str, target: Array) -> None:
+    """Move a part to a target (n_part,) rad, again after a hold; raises UserError if it is interrupted every time."""
+    why = ""
+    for _ in range(TRIES):
+        try:
+            plant.measure(part)
+            plant.act(part, target)
+            return
+        except ActionInterrupted as interruption:
+            why = str(interruption)
+    raise UserError(f"the robot was interrupted {TRIES} times: {why}. `mobee status` shows its state.", FAILED)
 
 
 def _observation(rig: Rig, shot: Shot) -> Observation | None:

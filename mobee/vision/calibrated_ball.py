@@ -14,7 +14,7 @@ from mobee.vision.mount import camera_frames
 from mobee.vision.rig import Rig
 from mobee.vision.stereo import Sighted, locate
 
-BALL_NOISE = 0.25  # px, standard deviation of a ball's middle along column and row
+BALL_NOISE = 0.16  # px, standard deviation of a ball's middle along column and row, measured in rendered pictures
 
 
 def locate_calibrated(

@@ -49,6 +49,7 @@ class ImperfectCameras:
         self._truths: deque[tuple[float, Array]] = deque(maxlen=TRUTHS)
         self._parts = {name: part.slice for name, part in robot.parts.items()}
         self._readings = Readings(self._parts, len(robot.motors))
+        self._ticked = 0.0  # s, time of the newest tick
         service.on_each(Truth, self._note_truth)
         service.on_each(Tick, self._note_tick)
 
@@ -56,6 +57,17 @@ class ImperfectCameras:
         """Drop what was before, at the start of a new run."""
         self._truths.clear()
         self._readings.forget()
+        self._ticked = 0.0
+
+    @property
+    def latency(self) -> int:
+        """The true latency of the pictures, ns, without the time for which they are drawn."""
+        return round(1e9 * (self.settings.latency + self.errors.latency))
+
+    @property
+    def newest(self) -> int:
+        """The time until which truth and encoders are known, ns: messages that wait are handled after the clock's."""
+        return round(1e9 * min(self._truths[-1][0], self._ticked)) if self._truths else 0
 
     def expose(self, t: float) -> Exposure:
         """Return the exposure whose middle is at time t [s]; raises InvalidValue if truth or encoders are missing around it."""
@@ -80,6 +92,6 @@ class ImperfectCameras:
             self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
 
     def _note_tick(self, tick: Tick) -> None:
-        q = np.array(tick.q)
+        q, self._ticked = np.array(tick.q), 1e-9 * tick.t
         for part, status in tick.parts.items():
             self._readings.note(part, 1e-9 * status.t, q[self._parts[part]])

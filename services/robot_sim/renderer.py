@@ -59,14 +59,15 @@ class RendererNode:
         return ImperfectCameras(self._service, robot, self._scene, settings, errors, config.seed)
 
     def _tick(self, clock: Clock) -> None:
-        late = 0 if self._imperfect is None else round(1e9 * self._imperfect.settings.latency)
-        if clock.t < self._due + late:
+        late, now = (0, clock.t) if self._imperfect is None else (self._imperfect.latency, self._imperfect.newest)
+        if now < self._due + late:
             return
         if not any(self._images[name].has_subscribers or self._cameras[name].has_subscribers for name in self._scene.cameras):
             self._due = clock.t + self._period
             return
         if self._imperfect is not None:
-            exposed, self._due = max(self._due, clock.t - late - self._period), max(self._due + self._period, clock.t - late)
+            exposed = max(self._due, now - late - self._period)
+            self._due = exposed + self._period
             self._expose(self._imperfect, exposed)
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
