@@ -43,7 +43,7 @@ class ImperfectCameras:
     def __init__(self, service: Service, robot: Robot, scene: Scene, settings: CameraSettings, errors: CameraErrors, seed: int) -> None:
         """`seed`: of the noise in stamps and pictures."""
         self.settings, self.errors = settings, errors
-        self._scene = scene
+        self._scene, self._bus = scene, service.bus
         self._cameras = Cameras(scene, settings, errors, seed)
         self._rng = np.random.default_rng([seed, 0x7374616D70])
         self._truths: deque[tuple[float, Array]] = deque(maxlen=TRUTHS)
@@ -86,8 +86,9 @@ class ImperfectCameras:
         return (1.0 - share) * first + share * second
 
     def _note_truth(self, truth: Truth) -> None:
-        if not self._truths or 1e-9 * truth.t > self._truths[-1][0]:
-            self._truths.append((1e-9 * truth.t, np.array(truth.q)))
+        t = 1e-9 * (truth.t + self._bus.dt)  # the physics has advanced by the tick that began at truth.t
+        if not self._truths or t > self._truths[-1][0]:
+            self._truths.append((t, np.array(truth.q)))
         for thing in truth.objects:
             self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
 

@@ -2,9 +2,9 @@
 """Calibration of imperfect cameras by looking at the own hand (thesis 4.1.2): errors of a ball's position before and after.
 
 Source: thesis 4.1.2 lets two robots look at each other's world, without numbers for calibrated stereo.  Aims of this reproduction: after
-`mobee calibrate` the position of a ball is wrong by at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each of 5 robots), with cameras
-displaced by up to 2 cm and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is honest: the normalised
-error is within its 95 % band for 90 to 98 % of the places.
+`mobee calibrate` the position of a ball is wrong by at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each
+of 5 robots), with cameras displaced by up to 2 cm and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is
+honest: the normalised error is within its 95 % band for 90 to 98 % of the places.
 
 A trial draws the errors of one robot, calibrates it by 40 postures of its hand, and then shows it balls.  All pictures are rendered with
 distortion, noise and motion blur, in a cluttered room.  "Before" is the same sightings with the model's own cameras.  Of sightings that
