@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +15,20 @@ from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.calibration.calibration import load_calibration
 from mobee.vision.imperfections import CameraSettings, camera_errors
-from mobee_cli.__main__ import main
 from tests.system.live import running
 
 pytestmark = pytest.mark.system
 pytest.importorskip("pybullet")
 
 
-def test_the_running_robot_finds_its_cameras(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_running_robot_finds_its_cameras(tmp_path: Path) -> None:
     file, robot = tmp_path / "eyes.json", load_robot("icub")
+    options = ["--live", "--postures", "8", "--save", str(file), "--json"]
     with running(tmp_path, "eyes") as (launched, _):
-        assert main(["calibrate", "--live", "--postures", "8", "--endpoint", launched.endpoint, "--save", str(file), "--json"]) == 0
-    printed = json.loads(capfd.readouterr().out)
+        command = [sys.executable, "-m", "mobee_cli", "calibrate", *options, "--endpoint", launched.endpoint]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=200.0)
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
     assert printed["calibrated"]["metres_median"] < 0.006 < 0.012 < printed["uncalibrated"]["metres_median"]
     found = load_calibration(file)
     rig = found.rig(robot, cameras_of(robot))
