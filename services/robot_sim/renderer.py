@@ -27,7 +27,7 @@ from services.common.body import Body
 from services.common.rate import Percentiles
 from services.common.service import Service, run_node
 from services.robot_sim.config import RendererConfig
-from services.robot_sim.imperfect import ImperfectCameras
+from services.robot_sim.renderer_imperfect import ImperfectCameras
 
 
 class RendererNode:
