@@ -38,13 +38,13 @@ class Place:
 def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
     """Return the place (3,) m that is nearest to the rays through the pixels; None if they are parallel, or do not exist."""
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
-    normal, against = np.zeros((3, 3)), np.zeros(3)
+    normals, targets = [], []
     for camera, one in sighted.items():
         position, rotation = camera_frames(rig.cameras[camera], transforms, x[rig.where(camera)])
         ray = rotation @ rig.lens.unproject(one.pixel)
-        across = np.asarray(np.eye(3) - ray[:, None] * ray, dtype=np.float64)
-        normal += across
-        against += across @ position
+        normals.append(np.eye(3) - ray[:, None] * ray)
+        targets.append(normals[-1] @ position)
+    normal, against = np.sum(normals, axis=0), np.sum(targets, axis=0)
     if not np.isfinite(normal).all() or np.linalg.cond(normal) > PARALLEL:
         return None
     found: Array = np.linalg.solve(normal, against)
