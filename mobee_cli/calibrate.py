@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +130,7 @@ def _lines(found: Calibration, drawn: Array | None, file: Path) -> list[str]:
         _row("corner in the pictures, px", "pixels", 1.0, found),
         _row("tag in space, mm", "metres", 1e3, found),
         "",
-        f"{'':<30}{'found':>12}{'+-':>10}{'' if drawn is None else 'drawn':>12}",
+        f"{'':<30}{'found':>12}{'+-':>10}{'' if drawn is None else '       drawn'}",
     ]
     for k, name in enumerate(found.names):
         factor, unit = _unit(name)
@@ -153,4 +154,5 @@ def _unit(name: str) -> tuple[float, str]:
 
 
 def _direction(one: Unobservable) -> str:
-    return "  " + " ".join(f"{weight:+.2f} {name}" for name, weight in one.weights.items())
+    text = ", ".join(f"{weight:+.2f} {name}" for name, weight in one.weights.items())
+    return textwrap.fill(text, 80, initial_indent="  ", subsequent_indent="    ")
