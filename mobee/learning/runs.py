@@ -110,8 +110,9 @@ class OutcomeRuns:
         """End the runs of the neighbours with the probability that they have changed too; returns those that had been tried."""
         share, found = rise * self._shared / (self._shared + self._unshared), []
         goal = int(self._goals[state, action])
-        back = [(goal, other) for other in np.flatnonzero(self._goals[goal] == state).tolist()]
-        for near in [*map(tuple, np.argwhere(self._goals == goal).tolist()), *back]:
+        to_goal = [(int(one), int(other)) for one, other in np.argwhere(self._goals == goal)]
+        back = [(goal, int(other)) for other in np.flatnonzero(self._goals[goal] == state)]
+        for near in [*to_goal, *back]:
             known = self._runs.get(near)
             if known is None or near == (state, action):
                 continue
