@@ -190,8 +190,8 @@ def _learned(detector: str | DetectorOf, settings: dict[str, Any], seed: int) ->
         found = agent.evaluate(targets(), REPETITIONS)
         without = float(np.isnan(found.missing).sum(axis=1).mean())
         rows.append((float(found.scores.mean()), float(found.failures.sum(axis=1).mean()), without))
-    score, failed, without = zip(*rows, strict=True)
-    return {"score": score, "failures": failed, "without": without, "false": false, "detected": first}
+    columns = dict(zip(("score", "failures", "without"), zip(*rows, strict=True), strict=True))
+    return columns | {"false": false, "detected": first}
 
 
 def _detected(agent: ReachAgent) -> int:
