@@ -92,7 +92,7 @@ def damaged(path: Path, what: str) -> MobeeError:
 
 
 def json_of(path: Path, what: str, text: object) -> Any:
-    """Return the value of a JSON text in the file; raises MobeeError, naming `what` it is, if it is none."""
+    """Return the value of a JSON text in the file; raises MobeeError if it is not JSON. `what`: name of the value for the message."""
     try:
         if isinstance(text, str):
             return json.loads(text)
@@ -102,7 +102,7 @@ def json_of(path: Path, what: str, text: object) -> Any:
 
 
 def _check(path: Path, database: sqlite3.Connection) -> None:
-    """Raise MobeeError if pages or indices of the file are damaged, or a table of ours is none; it reads the whole file."""
+    """Raise MobeeError if pages or indices of the file are damaged, or one of the two tables is absent; it reads the whole file."""
     (found,) = database.execute("PRAGMA integrity_check(1)").fetchone()
     if found != "ok":
         raise damaged(path, " ".join(str(found).split())[:200])

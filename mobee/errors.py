@@ -20,7 +20,7 @@ class OlderVersion(UserWarning):
 
 
 class Simplified(UserWarning):
-    """A warning that a robot file has what this library has no counterpart for; the message says how it is read."""
+    """Warns that a robot file has an element that this library does not model; the message says how it is read."""
 
 
 class InvalidValue(MobeeError, ValueError):

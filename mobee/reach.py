@@ -58,7 +58,7 @@ class ReachTarget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachOutcome:
-    """The outcome of a reach in two phases: a force draws the marker to the target, then the attractor draws the part back.
+    """The outcome of a reach in two phases: a force pulls the marker to the target, then the attractor pulls the part back.
 
     `q`: (n_part,) rad, encoder values at the end of the force.  `marker`: (3,) m, root frame, position of the marker that the model
     computes from `q`.  `missing`: m, remaining error.  `settled`: False if the first phase timed out.  `duration`: s of both phases,
@@ -83,9 +83,9 @@ class ReachPlant(Plant, Protocol):
         ...
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Apply a force that draws the marker to the presented target until the part has settled or timed out, then end it (thesis 8.2).
+        """Apply a force that pulls the marker to the presented target until the part has settled or timed out, then end it (thesis 8.2).
 
-        The attractor stays at the target of the part's last action, and draws the part back when the force has ended.  `stay`: the
+        The attractor stays at the target of the part's last action, and pulls the part back when the force has ended.  `stay`: the
         attractor moves to the pose in which the reach ended, and `after` is that end.
         Raises InvalidValue if nothing is presented or the part does not move the marker; ActionInterrupted as `act`.
         """

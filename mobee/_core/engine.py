@@ -40,7 +40,7 @@ class Handle:
 
 
 class _Memory:
-    """An array that the core has allocated and handed over."""
+    """An array allocated by the core; it is freed when no NumPy array uses it any more."""
 
     def __init__(self, at: int, shape: tuple[int, ...], kind: str) -> None:
         self.__array_interface__ = {"shape": shape, "typestr": kind, "data": (at, False), "version": 3}
@@ -218,7 +218,7 @@ class Following:
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return what is stored (0 nothing, 1 pose, 2 list, 3 pose with an outdated list), the pairs in the list, the poses served."""
+        """Return the state of the list (0 empty, 1 pose, 2 list, 3 pose with an outdated list), the pairs in it, and the poses it was used for."""
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()

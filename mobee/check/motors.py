@@ -184,7 +184,7 @@ def home_zones(subject: Subject) -> Iterator[Finding]:
 
 
 def _drift(subject: Subject, motors: Sequence[Motor], better: dict[str, float]) -> str:
-    """Describe how far from home the motor comes to rest that is pushed farthest: there the spring balances the limit force."""
+    """Describe the motor that its limit zone pushes farthest: the rest position where the spring balances the limit force, from home."""
     gains = Gains.default()
     slope = gains.max_limit / gains.limit_width
     share = slope / (slope + gains.stiffness)
@@ -207,7 +207,7 @@ def _finding(subject: Subject, motors: Sequence[Motor], better: dict[str, float]
 
 
 def _change(subject: Subject, motor: Motor, home: float) -> str:
-    """Return the text to write, and its line, in the format of the file."""
+    """Return the text for the file that sets this home, and the line where it belongs."""
     line = _line(subject, motor).rpartition(":")[2]
     if subject.is_mjcf:
         return f"{motor.name} {home:.6g} in the qpos of a keyframe home"

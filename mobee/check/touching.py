@@ -81,7 +81,7 @@ def _kind(reason: str) -> str:
 
 
 def _reason(robot: Robot, i: int, j: int, met: Mapping[str, set[LinkPair]]) -> str:
-    """Return why two shapes of one role are not tested; `met`: for each role the pairs of links of which some shapes are tested."""
+    """Return why two shapes of one role are not tested; `met`: for each role, the pairs of links with some tested shapes."""
     one, other = robot.shapes[i], robot.shapes[j]
     links = frozenset((one.link, other.link))
     if one.link == other.link:
@@ -170,7 +170,7 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
 
 
 def _written(subject: Subject) -> str:
-    """Return a hint at the option that writes the lines for solids of a URDF."""
+    """Return a hint that names the option which writes these <disable_collisions> lines; for a URDF only."""
     return " (--write-srdf writes it)" if subject.is_urdf else ""
 
 
@@ -288,8 +288,8 @@ class LeftOut:
 def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any) -> LeftOut:
     """Write <disable_collisions> for every two links of a URDF whose solids touch at home or in all of many random poses.
 
-    `out`: the SRDF; None: the one that the robot is read with, or a new one beside it. The text of an existing SRDF is kept word for
-    word. The file is written completely or not at all. `options`: of `load_robot`. Raises RobotFileError and InvalidValue.
+    `out`: the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside it. The text of an existing SRDF is kept
+    word for word. The file is written completely or not at all. `options`: of `load_robot`. Raises RobotFileError and InvalidValue.
     """
     path = find_file(urdf, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks for wrong units: millimetres for metres, degrees for radians."""
+"""Checks for wrong units: millimetres in place of metres, degrees in place of radians."""
 
 from __future__ import annotations
 

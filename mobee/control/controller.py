@@ -134,7 +134,7 @@ class Controller:
         return known if isinstance(known, Forces) else Forces(**dict(zip(self.force_names, known.copy(), strict=True)))
 
     def note_forces(self, forces: Array) -> None:
-        """Make `last_forces` of rows (forces, n) in the order of `force_names`: not copied, it has their values at the time of reading."""
+        """Set `last_forces` to rows (forces, n) in the order of `force_names`, without a copy: later changes of the rows show in `last_forces`."""
         self._last_forces = forces
 
     @property
@@ -178,7 +178,7 @@ class Controller:
         self._pushes: dict[str, Array] = {}
 
     def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
-        """Draw a marker to a target with the motors of one part, against its attractor, until the next call or `end_reach` (thesis 8.2).
+        """Pull a marker to a target with the motors of one part, against its attractor, until the next call or `end_reach` (thesis 8.2).
 
         `part` None: with all motors that move the marker. Raises InvalidValue if no such motor may be moved, and UnknownName.
         """
@@ -187,7 +187,7 @@ class Controller:
         self._reaches[part].aim(target)
 
     def end_reach(self, part: str | None) -> None:
-        """End the reach of a part, or of the whole body (None), if there is one."""
+        """End the reach of a part, or of the whole body (None), if it has one."""
         if part is not None:
             self.robot.part(part)
         self._reaches.end(part)

@@ -102,7 +102,7 @@ class Reaches:
         self.address = address(self._addresses)
 
     def _drawn(self, part: str | None, marker: str) -> Ints:
-        """Return the motors of a part, or of the whole body, that may be moved and that move a marker."""
+        """Return the motors of a part, or of the whole body, that may be moved and move a marker."""
         robot = self._robot
         link, where = robot.marker(marker).link, slice(0, None) if part is None else robot.part(part).slice
         moving = np.zeros(len(robot.motors), dtype=bool)
@@ -117,12 +117,12 @@ class Reaches:
 
 
 def _first(robot: Robot, part: str | None) -> int:
-    """Return the motor that identifies a part in the core; -1 for the whole body, for whose reach no action of a part waits."""
+    """Return the motor that identifies a part in the core; -1 for a reach of the whole body, for whose end no action of a part waits."""
     return -1 if part is None else robot.part(part).start
 
 
 def _chain(robot: Robot, part: str | None, marker: str, motors: Ints) -> Chain:
-    """Return the tables of the chain from the base to a marker that these motors draw."""
+    """Return the tables of the chain of joints from the base to a marker, restricted to these motors."""
     placed, (matrix, offset), units = robot.marker(marker), robot.coupling, motor_units(robot)
     links = tables(robot).ancestry[placed.link]
     number = {int(motor): k for k, motor in enumerate(motors)}

@@ -256,7 +256,7 @@ class Reflex:
             self._keep_place(q)
 
     def _rewind(self) -> bool:
-        """Move the target back along the history; return True when it is where retracing may end."""
+        """Move the target back along the history; return True at a pose where retracing may end."""
         self._credit += self.settings.pace
         while self._credit >= 1.0 and self._history and not self._at_waypoint:
             self._goal, self._at_waypoint = self._history.pop()

@@ -32,7 +32,7 @@ class State:
 
     @property
     def pose(self) -> Pose:
-        """The robot at q in the world of now, with its contacts; evaluated when it is first read."""
+        """The robot at q in the present world, with its contacts; evaluated when it is first read."""
         if self._pose is None:
             self._pose = self._evaluate()
         return self._pose

@@ -26,9 +26,9 @@ class Chain:
 def chains(robot: Robot) -> list[Chain]:
     """Return the chains that end in a leaf, in the order of the tree.
 
-    Where a chain branches, and every branch is shorter than HAND of the chain, the branches are the fingers of a hand and the chain ends
-    there. A branch that is shorter, beside others that are not, is no chain, and does not end the chain. Elsewhere each branch
-    begins a chain, and what carries them is a trunk.
+    Where a chain branches, a branch is short if it is shorter than HAND times the chain. If all branches are short, they are the fingers of
+    a hand and the chain ends there. If only some are short, these are ignored. Elsewhere each branch begins a chain of its own, and the
+    joints before the branching are a trunk, which belongs to no chain.
     """
     tree = _Tree(robot)
     found: list[Chain] = []
@@ -54,7 +54,7 @@ def chains(robot: Robot) -> list[Chain]:
 
 
 class _Tree:
-    """Joints by the link that carries them, and how far each link reaches with what it carries."""
+    """The joints on each link, and the extent of each link: the path length from its joint to the farthest end that it carries."""
 
     def __init__(self, robot: Robot) -> None:
         self._points = [joint.point for joint in robot.joints]
@@ -73,7 +73,7 @@ class _Tree:
                 self.extent[parent] = max(self.extent[parent], step + self.extent[index + 1])
 
     def length(self, joints: Sequence[int]) -> float:
-        """Return the length of a chain [m], from its first joint over each to the farthest of the joints that its last link carries."""
+        """Return the length of a chain [m]: from joint to joint, and from the last one to the farthest of the joints on its last link."""
         points = [self._points[joint] for joint in joints]
         steps = sum(float(np.linalg.norm(b - a)) for a, b in zip(points, points[1:], strict=False))
         ends = [float(np.linalg.norm(self._points[joint] - points[-1])) for joint in self.below[joints[-1] + 1]]
@@ -87,7 +87,7 @@ class _Tree:
 
 
 def corners_of(shape: Shape) -> Array:
-    """Return points (k, 3) m, root frame, between which a shape lies, up to the roundness of its ends."""
+    """Return points (k, 3) m in the root frame, whose convex hull has the extent of a shape along its length; round sides are left out."""
     if shape.vertices is not None:
         local = shape.vertices
     elif shape.kind == "box":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Narrower limits of motors, and clauses, that keep apart solids too near each other in every pose to have fields.
+"""Narrower limits of motors, and clauses, that keep solids apart which are too near each other for fields.
 
 Whether two links a few joints apart touch depends only on the motors between them.  Over random positions of these, half-spaces
 are cut off until no touching position is left: one along a single motor becomes its limit, another a clause (thesis eqs. 5.14 to 5.17).
@@ -34,7 +34,7 @@ ALONE = 0.7  # factor of the cost of a cut along one motor: it is a limit, and l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Links that the same motors move against each other, and positions of these motors from home in which they touch or are free."""
+    """Links that the same motors move against each other, and sampled positions of these motors, relative to home: touching and free ones."""
 
     motors: tuple[int, ...]
     pairs: Ints  # (p, 2) of shapes
@@ -43,10 +43,10 @@ class _Group:
 
 
 def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
-    """Return the robot with limits and clauses that keep these pairs of solids apart, the motors with a narrower range, and what is left.
+    """Return the robot with limits and clauses that keep these pairs of solids apart, the motors with a narrower range, and the other pairs.
 
-    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between, or motors of several parts, are left alone.
-    What is left, (r, 2), are pairs that touch near home or where no half-space cuts them off.
+    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between them, or motors of several parts, are not treated.
+    The other pairs, (r, 2), are those and the pairs that touch near home or for which no half-space excludes the touching positions.
     """
     narrowed: dict[int, Array] = {}
     clauses: list[Clause] = []
@@ -117,7 +117,7 @@ def _cuts(group: _Group) -> Iterator[tuple[Array, float]]:
 
 
 def _candidates(touching: Array, free: Array) -> Iterator[tuple[float, Array, float]]:
-    """Yield cuts with their cost: the free positions that are lost for each touching one that is left out."""
+    """Yield cuts with their cost: the number of free positions lost per touching position that is excluded."""
     count = touching.shape[1]
     axes = [sign * axis for axis in np.eye(count) for sign in (1.0, -1.0)]
     chosen = touching[:: max(1, len(touching) // DIRECTIONS)]

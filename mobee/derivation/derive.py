@@ -39,11 +39,10 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and what was derived.
 
-    `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of
-    contact, or farther from it. `narrowed`: motors with a narrower range, since solids touch beyond it that fields cannot keep apart;
-    the clauses that were added do the same for several motors. `left_out`: pairs of links that are tested no more. `field`: width of the
-    fields that were added [m], 0 for none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its
-    own fields.
+    `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of contact,
+    or farther from it. `narrowed`: motors with a narrower range: beyond it, solids touch that fields cannot keep apart; the added clauses
+    do the same for combinations of several motors. `left_out`: pairs of links that are no longer tested. `field`: width of the fields that
+    were added [m], 0 for none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
     """
 
     robot: Robot
@@ -56,7 +55,7 @@ class Derived:
     gains: Gains
 
     def rest(self, arm: Arm) -> tuple[float, ...]:
-        """Return the home of each motor of the arm's part as a fraction of its range: where those stay that are not learned."""
+        """Return the home of each motor of the arm's part as a fraction of its range: the position of the motors that are not learned."""
         part = self.robot.parts[arm.part]
         low, high = self.robot.limits[part.slice].T
         return tuple(np.clip((self.robot.home[part.slice] - low) / (high - low), 0.0, 1.0).round(6).tolist())
@@ -69,7 +68,7 @@ class Derived:
 def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed: int = 0) -> Derived:
     """Derive arms, joints to learn, limits, home, tested pairs and fields of a robot.
 
-    A robot whose file makes parts keeps them, and one that has fields keeps its fields, its pairs and its home.
+    A robot whose file defines parts keeps them; a robot that has fields keeps its fields, its pairs and its home.
 
     Args:
         robot: any robot.
@@ -164,7 +163,7 @@ def _main_part(robot: Robot, motors: Sequence[int]) -> str:
 
 
 def _parted(robot: Robot, arms: list[tuple[Arm, Chain]], drive: dict[int, int]) -> tuple[Robot, list[tuple[Arm, Chain]]]:
-    """Return the robot with a part for each arm, one for each hand, and one for all else; and the arms with their parts."""
+    """Return the robot with a part for each arm, one for each hand, and one for all other motors; and the arms with their chains."""
     names = names_of([arm.motors for arm, _ in arms])
     groups: dict[str, tuple[str, ...]] = {}
     dealt = {motor for arm, _ in arms for motor in arm.motors}
@@ -182,7 +181,7 @@ def _parted(robot: Robot, arms: list[tuple[Arm, Chain]], drive: dict[int, int]) 
 
 
 def _regrouped(robot: Robot, groups: Mapping[str, Sequence[str]]) -> Robot:
-    """Return the robot with these parts; its motors come in their order, and each shape belongs to the part that moves its link."""
+    """Return the robot with these parts; its motors are in the order of the parts, and each shape belongs to the part that moves its link."""
     order = [robot.motor_index(name) for motors in groups.values() for name in motors]
     of = {name: part for part, motors in groups.items() for name in motors}
     table = tuple(replace(robot.motor_table[k], part=of[robot.motors[k]]) for k in order)

@@ -39,7 +39,7 @@ def bounded(robot: Robot) -> tuple[Robot, list[str]]:
 
 
 def with_limits(robot: Robot, limits: Mapping[int, Array]) -> Robot:
-    """Return the robot with other limits (2,) of some motors, by their numbers; home moves into them."""
+    """Return the robot with other limits (2,) of some motors, by their numbers; home is clipped to these limits."""
     table = [
         replace(motor, limits=limits[k], home=float(np.clip(motor.home, *limits[k]))) if k in limits else motor
         for k, motor in enumerate(robot.motor_table)

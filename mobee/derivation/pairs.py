@@ -163,7 +163,7 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
-    """Return a home (n,) near that of the robot where narrow fields do not meet either, as far as one is found."""
+    """Return a home (n,) near that of the robot where narrow fields do not meet either, if one is found."""
     width = AT_HOME * field_width(reach)
     needed = sorted(set(robot.solid_pairs.ravel().tolist()))
     wide = tuple(replace(_field(robot.shapes[index], width, "_wide"), role="solid") for index in needed)

@@ -176,7 +176,7 @@ class LatticeEnv(Env[Any, Any]):
         return self._arm.state, info
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Do a whole action of the part."""
+        """Perform a whole action of the part."""
         outcome = self._arm.plant.advance()[0][1] if self._arm.begin(int(action)) else None
         state, reward, over, info = self._arm.end(int(action), outcome)
         return state, reward, over, False, info
@@ -230,7 +230,7 @@ class LatticeVectorEnv(RobotVectorEnv):
         return self._states(), infos
 
     def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Do a whole action of each robot whose episode has not ended; the others begin a new episode."""
+        """Perform a whole action of each robot whose episode has not ended; the others begin a new episode."""
         chosen, over = np.asarray(actions).tolist(), self._over
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
         plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]

@@ -61,7 +61,7 @@ class ReachTask(Settings):
 
 
 class _Reaching:
-    """What the environments of one vector have in common: the model, the spaces, the rewards."""
+    """The model, the spaces and the rewards, which the environments of one vector share."""
 
     def __init__(self, task: ReachTask) -> None:
         given = model_of(task.robot, task.world)
@@ -141,10 +141,10 @@ def extent(robot: Robot, marker: str) -> float:
 class ReachEnv(Env[Any, Any]):
     """The task is to reach places with a hand; the controller of MoBeE moves the arm to an attractor and prevents collisions on the way.
 
-    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  During
-    every action of the agent, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest
-    contacts of the step, in m: `solid_depth`, 0 if nothing collided, and `field_depth`.  Solids are tested against the world, and in
-    those pairs of links that have fields against each other.
+    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  During every
+    action of the agent, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest contacts of
+    the step, in m: `solid_depth`, 0 if nothing collided, and `field_depth`.  Solids are tested against the world and, within the robot, for
+    those pairs of links whose fields are tested against each other.
 
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
     controller's own velocities [rad/s]; `achieved_goal` (3,): the marker's position, `desired_goal` (3,): its goal, in m in the

@@ -42,7 +42,7 @@ def _loaded(name: str | Path) -> Robot:
 
 
 def model_of(robot: RobotFile, world: WorldFile) -> Model:
-    """Return the model of a robot in a world, each given as an object, a shipped name, or a path; the world may be None, empty.
+    """Return the model of a robot in a world, each given as an object, a shipped name, or a path; None: an empty world.
 
     Environments of one robot file share the robot, which is never changed; each has a world of its own.
     """

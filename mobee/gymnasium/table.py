@@ -162,7 +162,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
             self._under_way[part] = action
 
     def _learn(self, part: str, outcome: Outcome) -> float:
-        """Take over the outcome of a part's action; returns the reward."""
+        """Record the outcome of a part's action; returns the reward."""
         before, action = self._states[part], self._under_way.pop(part)
         self._states[part] = self.spaces[part].state_of(outcome.q)
         return self.learned[part].observe(before, action, self._states[part]) if self.learned else 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Worlds that are given by tables, as Gymnasium environments."""
+"""Tabular worlds as Gymnasium environments."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What vectors of robots have in common: spaces, random generators, and the ends of episodes."""
+"""The common part of vector environments: spaces, random generators, and the ends of episodes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
         self._steps[:], self._over[:] = 0, False
 
     def _count_steps(self, terminated: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Count a step of each robot, none for those that began a new episode in it; returns which episodes are truncated now."""
+        """Count a step of each robot, except those that began a new episode in it; returns which episodes are truncated now."""
         self._steps = np.where(self._over, 0, self._steps + 1)
         truncated: NDArray[np.bool_] = self._steps >= self._most
         self._over = terminated | truncated

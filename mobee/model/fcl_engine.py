@@ -132,7 +132,7 @@ def _links(robot: Robot, snapshot: Snapshot) -> list[int]:
 
 
 def _placed(volumes: tuple[Shape | WorldObject, ...], links: list[int], transforms: Array) -> tuple[list[Any], Array, Array]:
-    """Return fcl's objects of all volumes, and centres (v, 3) and radii (v,) of their bounding spheres, root frame now."""
+    """Return fcl's objects of all volumes, and centres (v, 3) and radii (v,) of their bounding spheres, root frame at this pose."""
     moved = np.concatenate([transforms, np.eye(4)[None]])[links]  # the last stands for -1
     position = np.array([volume.position for volume in volumes]).reshape(-1, 3)
     rotation = np.array([volume.rotation for volume in volumes]).reshape(-1, 3, 3)
@@ -215,10 +215,10 @@ SOLID, FIELD = 0, 1
 def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
     """Return first volume, second volume and kind (0 solid, 1 field) of every tested pair; volumes are shapes, then objects.
 
-    Pairs of shapes are the robot's own list. A free object is tested against every shape but those of the base, and a target not
-    against the hands that are `reaching`. An attached object is tested as a solid against the shapes and objects on all links that its
-    own link is tested against, and against free objects. Ghosts are not tested. Raises UnknownName for an object that is attached to a
-    link which the robot does not have.
+    Pairs of shapes are the robot's own list. A free object is tested against every shape but those of the base, and a target is not tested
+    against the hands that are `reaching`. An attached object is tested as a solid against the shapes and objects on all links that its own
+    link is tested against, and against free objects. Ghosts are not tested. Raises UnknownName for an object that is attached to a link
+    which the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

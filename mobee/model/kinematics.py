@@ -119,7 +119,7 @@ def link_transforms(robot: Robot, q: Array) -> Array:
 
 
 def joint_axes(robot: Robot, transforms: Array) -> tuple[Array, Array]:
-    """Return the joints' axes and points now, root frame: two arrays (..., J, 3), unit vectors and m, from (..., L, 4, 4)."""
+    """Return the joints' axes and points at this pose, root frame: two arrays (..., J, 3), unit vectors and m, from (..., L, 4, 4)."""
     return _moved_axes(robot, transforms, np.arange(len(robot.joints)))
 
 
@@ -127,7 +127,7 @@ def point_jacobian(robot: Robot, transforms: Array, link: int, point: Array) -> 
     """Return the Jacobian of a point that is fixed to a link (thesis eq. 5.1), (..., 6, n).
 
     Three rows of velocity [m/rad], then three of angular velocity, root frame, per motor.
-    `transforms`: (..., L, 4, 4); `point`: (..., 3) m in the root frame now.
+    `transforms`: (..., L, 4, 4); `point`: (..., 3) m in the root frame at this pose.
     """
     t = tables(robot)
     chain = t.ancestry[link]

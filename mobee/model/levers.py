@@ -12,7 +12,7 @@ from mobee.robot.robot import LEVER, Robot
 
 
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
-    """Return the lever of a contact of two links [m]: the norm of the changes of its depth when each motor moves by 1 rad of the law.
+    """Return the lever of a contact of two links [m]: the norm of the changes of its depth when each motor moves by 1 rad (for a motor that slides, by its unit in the law).
 
     A joint that moves both links changes nothing. `transforms`: (L, 4, 4). `point` (3,) m and `normal` (3,): root frame, at this pose.
     A link below 0 is a free object.

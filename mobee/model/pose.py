@@ -96,7 +96,7 @@ class Pose:
         return self.transforms[..., m.link, :3, :3] @ m.normal
 
     def point_jacobian(self, link: int, point: Array) -> Array:
-        """Return the Jacobian of a point (..., 3) m, root frame now, that is fixed to a link: (..., 6, n), linear rows, then angular."""
+        """Return the Jacobian of a point (..., 3) m, root frame at q, that is fixed to a link: (..., 6, n), linear rows, then angular."""
         return point_jacobian(self.robot, self.transforms, link, point)
 
     @property
@@ -120,7 +120,7 @@ class Pose:
 
     @property
     def projection_of_part(self) -> Array:
-        """The same as `projection`, but each contact acts only on the motors of its own part: an arm's contact not on the torso.
+        """The same as `projection`, but each contact acts only on the motors of its own part: the contact of an arm does not act on the torso.
 
         The original program of 2014 projected contacts like this.
         """
@@ -144,7 +144,7 @@ class Pose:
 
     @property
     def objects(self) -> dict[str, WorldObject]:
-        """The world's objects at the time of this evaluation; for one pose only. Attached ones are where their link is in this pose.
+        """The world's objects at the time of this evaluation; for one pose only. Attached objects are at their position in this pose.
 
         Raises UnknownName if an object is attached to a link that the robot does not have.
         """

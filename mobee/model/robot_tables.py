@@ -80,7 +80,7 @@ class RobotTables:
 
 
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
-    """Return the tables of a robot with the objects that its links carry; raises InvalidValue for a robot that contradicts itself."""
+    """Return the tables of a robot with the objects that its links carry; raises InvalidValue if its indices are inconsistent."""
     _check(robot)
     rows, corner, edges = _rows(robot.shapes)
     rows = np.concatenate([rows, *(one.row.reshape(1) for one in carried)])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Neighbours:
-    """Computes the contacts of one robot pose after pose, with a list of the pairs nearer than `skin` [m]; for one thread at a time.
+    """Computes the contacts of a robot in consecutive poses, with a list of the pairs nearer than `skin` [m]; for one thread at a time.
 
     `cut`: see `Engine.contacts`.
     """

@@ -164,8 +164,8 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
     """Return 1; for a robot with a least lever, LEVER^2 / (|J|^2 + least_lever^2) times the contact's share in the depth between its links.
 
-    J is the change of the depth when each motor moves by 1 rad of the law. With this factor J^T pushes along the smallest motion
-    that undoes the contact, whatever its lever, and the contacts between two links push as one.
+    J is the change of the depth when each motor moves by 1 rad (one that slides: by its `unit`). With this factor J^T pushes along the
+    smallest motion that undoes the contact, whatever its lever, and the contacts between two links push as one.
     """
     if robot.least_lever == 0.0:
         return 1.0

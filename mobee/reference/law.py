@@ -3,7 +3,7 @@
 
 This file has the sum of the forces, one step of the system, and the command. The forces themselves are in `forces`.
 
-A new force is a function of the `State`. Put it behind the others and give the list to `acceleration`, or to
+A new force is a function of the `State`. Append it to the others, and pass the list to `acceleration`, or to
 `mobee.reference.plant.Plant`:
 
     def viscous(s: State) -> Array:

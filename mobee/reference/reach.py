@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The force that draws a marker to a target with one part or the whole body (thesis 5.1, 8.2).
+"""The force that pulls a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
 Published law: J^T f, with f proportional to the distance of the marker, bounded as a client's force, against the attractor's spring.
 
-Default law: J^T control oscillates with late commands, because its stiffness depends on the pose: it is J J^T plus, for a far target,
-the curvature of the marker's path. And it stops in singular poses (thesis 5.1). Therefore the marker is drawn at the same RATE in
-every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. The force leads out of a
-singular pose along a direction in which the error has negative curvature. Limits, clauses and contacts count as walls, along which the
-motion continues. The attractor's spring is removed while the reach lasts.
+Default law: J^T control oscillates with late commands, because its stiffness depends on the pose: the stiffness is J J^T plus, for a far
+target, the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1). Therefore the marker is pulled at the
+same RATE in every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. The force leads
+out of a singular pose along a direction in which the error has negative curvature. Limits, clauses and contacts count as walls, along which
+the motion continues. The attractor's spring is removed while the reach lasts.
 """
 
 from __future__ import annotations
