@@ -7,7 +7,7 @@ are wxyz, and all poses are in the root frame.
 
 In every tick the control chain is three messages: `Tick` of robot_sim, `Forces` of the model, `Commands` of the controller.
 
-After a change of a struct raise VERSION (version.py) and run `python -m bus_schema.page`, which writes the tables of docs/bus.md.
+After a change of a struct, increase VERSION (version.py) and run `python -m bus_schema.page`, which writes the tables of docs/bus.md.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Force(Request, frozen=True, kw_only=True):
 
 
 class ReachFor(Request, frozen=True, kw_only=True):
-    """Start an action that draws a marker to an object of the model's world until the part has settled (thesis 8.2)."""
+    """Start an action that pulls a marker to an object of the model's world until the part has settled (thesis 8.2)."""
 
     epoch: Count
     action_id: Name
@@ -215,7 +215,7 @@ class Stat(Reply, frozen=True, kw_only=True):
 
 
 class Pulse(Reply, frozen=True, kw_only=True):
-    """The course of a service's inbox; answered also while a handler runs."""
+    """Progress of a service's inbox; answered also while a handler runs."""
 
     handled: int  # messages, calls and timers since the start
     waiting: int  # messages and calls in the inbox

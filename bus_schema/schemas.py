@@ -46,7 +46,7 @@ def schemas_of(key: str) -> dict[str, dict[str, Any]]:
 
 @cache
 def _types() -> dict[str, type[Struct]]:
-    """All messages, requests and replies, and the structs inside them, by name, in the order of the source."""
+    """Return all messages, requests and replies, and the structs inside them, by name, in the order of the source."""
     return {cls.__name__: cls for module in (messages, rpc) for cls in page.structs(module)}
 
 
@@ -74,7 +74,7 @@ def _comments(cls: type[Struct]) -> dict[str, str]:
 
 @cache
 def _commented() -> dict[str, dict[str, str]]:
-    """The comment beside each field, by class and field."""
+    """Return the comment beside each field, by class and field."""
     found: dict[str, dict[str, str]] = {}
     fields: dict[str, str] = {}
     for line in (line for module in (messages, rpc) for line in inspect.getsource(module).splitlines()):

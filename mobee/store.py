@@ -119,7 +119,7 @@ STORE = "transitions.sqlite"  # of a run, in its folder
 
 
 def store_of(run: Path) -> Path:
-    """Return the file of transitions of a run: itself, or the one in the folder."""
+    """Return the file of transitions of a run: `run` itself if it is a file, else the file in that folder."""
     return run / STORE if run.is_dir() else run
 
 
@@ -184,8 +184,8 @@ class TransitionStore(AgentFile):
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
         """Begin with a copy of this agent's transitions in another file; nothing is done if this file has a record of the agent.
 
-        They must have been made with the same settings, but for those of the plant, which may be another one: offline and live. The
-        record keeps, as "continued", how many there were and the settings of their plant. Raises MobeeError.
+        They must have been made with the same settings, except those of the plant: transitions made offline may be continued live. The
+        record keeps, as "continued", their number and the settings of their plant. Raises MobeeError.
         """
         if self._last or self.settings():
             return

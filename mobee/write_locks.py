@@ -36,7 +36,7 @@ _open: dict[Path, _LockFile] = {}
 
 
 def lock(path: Path, name: str) -> None:
-    """Lock what `name` has in a file against other processes.
+    """Lock the data of `name` in a file against other processes.
 
     Raises InUse while another process holds the lock, NoRoom if the disk is full, MobeeError if no lock can be made for another reason.
     """

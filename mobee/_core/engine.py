@@ -218,7 +218,7 @@ class Following:
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return the state of the list (0 empty, 1 pose, 2 list, 3 pose with an outdated list), the pairs in it, and the poses it was used for."""
+        """Return the list's state (0 empty, 1 pose, 2 list, 3 pose with outdated list), the pairs in it, and the poses it was used for."""
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()

@@ -134,7 +134,10 @@ class Controller:
         return known if isinstance(known, Forces) else Forces(**dict(zip(self.force_names, known.copy(), strict=True)))
 
     def note_forces(self, forces: Array) -> None:
-        """Set `last_forces` to rows (forces, n) in the order of `force_names`, without a copy: later changes of the rows show in `last_forces`."""
+        """Set `last_forces` to rows (forces, n) in the order of `force_names`.
+
+        The rows are not copied: `last_forces` always shows their present values.
+        """
         self._last_forces = forces
 
     @property

@@ -122,12 +122,12 @@ ReachStatus = Literal["reaching", "reached", "stuck"]
 
 
 class Reacher:
-    """Pulls a marker of a controlled robot to a target; the pull begins when the object is made. Call `update` once per tick, and `stop` at the end.
+    """Pulls a marker of a controlled robot to a target; call `update` once per tick, and `stop` at the end.
 
-    All motors that move the marker take part, the torso's too. The controller's forces keep the robot away from obstacles. With the
-    published gains the springs of the attractor pull back during the reach, so that the marker stops before the target. A controller has
-    one reach of the whole body at a time: a new `Reacher` replaces it. For two hands at once use `Controller.reach_toward` with their
-    parts.
+    The pull begins when the object is made. All motors that move the marker take part, also those of the torso. The controller's forces
+    keep the robot away from obstacles. With the published gains the springs of the attractor pull back during the reach, so that the marker
+    stops before the target. A controller has one reach of the whole body at a time: a new `Reacher` replaces it. For two hands at once use
+    `Controller.reach_toward` with their parts.
     """
 
     __slots__ = ("_best", "_controller", "_marker", "_seen", "_since", "_tolerance", "angle", "distance", "target")

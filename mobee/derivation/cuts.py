@@ -34,7 +34,7 @@ ALONE = 0.7  # factor of the cost of a cut along one motor: it is a limit, and l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Links that the same motors move against each other, and sampled positions of these motors, relative to home: touching and free ones."""
+    """Links that the same motors move against each other, and positions of these motors relative to home: touching ones and free ones."""
 
     motors: tuple[int, ...]
     pairs: Ints  # (p, 2) of shapes
@@ -43,7 +43,7 @@ class _Group:
 
 
 def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
-    """Return the robot with limits and clauses that keep these pairs of solids apart, the motors with a narrower range, and the other pairs.
+    """Return the robot with limits and clauses that keep pairs of solids apart, the motors with a narrower range, and the other pairs.
 
     `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between them, or motors of several parts, are not treated.
     The other pairs, (r, 2), are those and the pairs that touch near home or for which no half-space excludes the touching positions.

@@ -181,7 +181,7 @@ def _parted(robot: Robot, arms: list[tuple[Arm, Chain]], drive: dict[int, int]) 
 
 
 def _regrouped(robot: Robot, groups: Mapping[str, Sequence[str]]) -> Robot:
-    """Return the robot with these parts; its motors are in the order of the parts, and each shape belongs to the part that moves its link."""
+    """Return the robot with these parts, its motors in the order of the parts; each shape belongs to the part that moves its link."""
     order = [robot.motor_index(name) for motors in groups.values() for name in motors]
     of = {name: part for part, motors in groups.items() for name in motors}
     table = tuple(replace(robot.motor_table[k], part=of[robot.motors[k]]) for k in order)

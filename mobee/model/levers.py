@@ -12,10 +12,10 @@ from mobee.robot.robot import LEVER, Robot
 
 
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
-    """Return the lever of a contact of two links [m]: the norm of the changes of its depth when each motor moves by 1 rad (for a motor that slides, by its unit in the law).
+    """Return the lever of a contact of two links [m]: the norm of the derivatives of its depth by the motor positions.
 
-    A joint that moves both links changes nothing. `transforms`: (L, 4, 4). `point` (3,) m and `normal` (3,): root frame, at this pose.
-    A link below 0 is a free object.
+    A joint that moves both links does not count; a motor that slides is in the unit of `motor_units`. `transforms`: (L, 4, 4). `point` (3,)
+    m and `normal` (3,): root frame, at this pose. A link below 0 is a free object.
     """
     change = np.zeros(len(robot.motors))
     for link, sign in zip(links, (1.0, -1.0), strict=True):

@@ -120,7 +120,7 @@ class Pose:
 
     @property
     def projection_of_part(self) -> Array:
-        """The same as `projection`, but each contact acts only on the motors of its own part: the contact of an arm does not act on the torso.
+        """The same as `projection`, but each contact acts only on the motors of its own part: a contact of an arm not on the torso's.
 
         The original program of 2014 projected contacts like this.
         """

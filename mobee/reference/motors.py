@@ -126,7 +126,7 @@ def nearer_to_zero(x: Array, by: Array) -> Array:
 
 
 def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
-    """Set the joint side (n,) rad at the end of a substep; the motor side follows into the play, so that no offset accumulates at a stop."""
+    """Set the joint side (n,) rad at the end of a substep; the motor side follows within the play, also when the joint is blocked."""
     torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
     s.velocity, s.q = (q - s.q) / dt, q
     s.motor_q = np.where(torque, q, np.clip(s.motor_q, q - half, q + half))

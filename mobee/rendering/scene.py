@@ -57,7 +57,7 @@ class Scene:
         return np.array([[view.scale, 0.0, -left - 0.5], [0.0, view.scale, up - 0.5], [0.0, 0.0, 1.0]])
 
     def pose(self, q: Array) -> None:
-        """Put the robot's links where they are at q (n,) rad."""
+        """Set the robot's links to their poses at q (n,) rad."""
         self._transforms = link_transforms(self._robot, q)
 
     def place(self, name: str, position: Array, quaternion: Array) -> None:

@@ -294,7 +294,7 @@ def moving(robot: Robot, path: Array) -> tuple[str, ...]:
 
 
 def carrying(robot: Robot, motors: Sequence[str]) -> tuple[str, ...]:
-    """Return the parts of motors, and the parts that move these parts: of the iCub's arm, the arm and the torso."""
+    """Return the parts of these motors, and the parts that carry them: for the iCub's arm, the arm and the torso."""
     moves = np.isin(robot.motors, motors) @ np.abs(tables(robot).coupling) > 0.0  # (J,)
     above = np.zeros(len(robot.joints), dtype=bool)
     for joint in np.flatnonzero(moves):

@@ -102,7 +102,7 @@ def key_of(name: str, otherwise: str) -> str:
 def upright(ahead: Array) -> Array:
     """Return the rotation (3, 3) of a camera that looks along a unit vector (3,), its picture upright; columns right, down, ahead.
 
-    Of a vertical view the picture's right is the root frame's -y, as of one that looks along x.
+    For a vertical view, the picture's right is the -y axis of the root frame, as for a camera that looks along x.
     """
     right = np.cross(ahead, UP)
     length = float(np.linalg.norm(right))

@@ -40,10 +40,10 @@ def join_robots(
     """Join several robots into one, each at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
 
     Names of parts, motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged.
-    Parts and motors are in the order given. The bases become one link, with the name of the first. Every solid is tested against all
-    solids of the other robots, every field against all fields; within a robot its own pairs are kept. The least lever, one number of a
-    robot, is the largest of all: give the robots the same one if contacts shall push each as before.
-    Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place without a robot.
+    Parts and motors are in the order given. The bases become one link, with the name of the first. Every solid is tested against all solids
+    of the other robots, every field against all fields; within a robot its own pairs are kept. The joined robot has one least lever, the
+    largest of all: give all robots the same one if contacts must push them as before. Raises InvalidValue for equal names, for no robots
+    and for a place that is not a pose; UnknownName for a place without a robot.
     """
     for key in places or {}:
         if key not in robots:

@@ -110,7 +110,7 @@ class ReachesUnderWay:
 
     @property
     def running(self) -> tuple[str, ...]:
-        """The parts that are reaching or being drawn back."""
+        """The parts that are reaching or returning to their attractors."""
         return tuple(self._under_way)
 
     def present(self, target: ReachTarget | None) -> None:
@@ -141,7 +141,7 @@ class ReachesUnderWay:
         self._under_way[part] = Reach(marker, stay)
 
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
-        """Record that a part has settled or timed out in a pose; returns whether its attractor must draw it back now."""
+        """Record that a part has settled or timed out in a pose; returns whether the part must now return to its attractor."""
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:
             reach.end, reach.marker = end, pose.position(reach.name)

@@ -227,7 +227,7 @@ class OfflinePlant:
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, and run until this part has settled or timed out.
 
-        `reaching`: a marker whose hand the targets do not push meanwhile, as in a reach.
+        `reaching`: a marker whose hand the targets do not push during the action, as in a reach.
         Raises InvalidValue while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
@@ -251,7 +251,7 @@ class OfflinePlant:
         self._reaches.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Draw the marker to the presented target until the part has settled or timed out, then end the force: see `ReachPlant`.
+        """Pull the marker to the presented target until the part has settled or timed out, then end the force: see `ReachPlant`.
 
         Raises InvalidValue also while another part is acting.
         """
@@ -282,7 +282,7 @@ class OfflinePlant:
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until one or more of the acting parts have ended; returns their names and outcomes, in the order of the parts.
 
-        The outcome of a reach is that of the part's return; `reached` returns all of it.
+        For a reach, the outcome is that of the return to the attractor; `reached` returns the outcome of both phases.
         """
         return finished(self.advancing())
 
@@ -366,7 +366,7 @@ class OfflinePlant:
         return rows
 
     def _let_go(self) -> None:
-        """End the force on parts whose reach has settled or timed out, so that their attractors draw them back."""
+        """End the force on parts whose reach has settled or timed out, so that their attractors pull them back."""
         for part in self._reaches.running:
             if part not in self._actions.under_way:
                 if self._reaches.ended(part, self._outcome(part), self.model.evaluate(self.q)):

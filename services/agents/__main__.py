@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.agents --part left_arm`."""
+"""Starts an agent: `python -m services.agents --part left_arm`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Waits of an agent for its store: until there is room on the disk, however long, and until its predecessor has ended."""
+"""Makes an agent wait for its store: for room on the disk, without a time limit, and for the end of an earlier process of this agent."""
 
 from __future__ import annotations
 
@@ -16,21 +16,18 @@ PREDECESSOR = 15.0  # s for which another process may write this agent's data: a
 
 
 class StoreWait:
-    """Repeats what the store refuses for now, and answers calls meanwhile; the part stays where it is."""
+    """Repeats a call that the store refuses, and answers calls of other services between the tries; the part keeps its position."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
         self.waits_for = ""  # why this agent waits; empty: it does not
 
     def status_prefix(self) -> str:
-        """The begin of the agent's line in `mobee status`."""
+        """The beginning of the agent's line in `mobee status`."""
         return f"waits: {self.waits_for}; " if self.waits_for else ""
 
     def until_accepted(self, act: Callable[[], _T]) -> _T:
-        """Return the result of `act`, which is repeated while the disk is full, or while the predecessor writes; raises its other errors.
-
-        Raises InUse after PREDECESSOR s.
-        """
+        """Return the result of `act`, repeated while the disk is full or an earlier process still writes; raises its other errors."""
         begun = time.monotonic()
         while True:
             try:
@@ -49,7 +46,7 @@ class StoreWait:
         return result
 
     def let_append_wait(self, store: Any) -> None:
-        """Make the method `append` of a store wait too."""
+        """Make the method `append` of a store wait in the same manner."""
         append = store.append
         store.append = lambda *data: self.until_accepted(lambda: append(*data))
 

@@ -71,7 +71,7 @@ def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: in
 
 
 def planned_states(agent: CuriousAgent, state: int) -> list[int]:
-    """Return the states that an agent expects to pass from a state on, by its plan, until the reward there is the largest.
+    """Return the states that an agent expects to pass by its plan, from `state` to the one with the largest reward.
 
     The first is `state`; at most LONGEST_PLAN states.
     """
@@ -85,7 +85,7 @@ def planned_states(agent: CuriousAgent, state: int) -> list[int]:
 
 
 def _likeliest(beliefs: OutcomeModel, s: int, a: int) -> tuple[int, float]:
-    """Return the most probable outcome of a state-action, of equal ones the newest, and its probability."""
+    """Return the most probable outcome of a state-action and its probability; among equally probable ones, the newest."""
     probabilities = beliefs.probabilities[s, a]
     best = len(probabilities) - 1 - int(probabilities[::-1].argmax())
     return int(beliefs.outcomes[s, a, best]), float(probabilities[best])

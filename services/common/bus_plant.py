@@ -276,7 +276,7 @@ class BusPlant:
         return self._is_resting
 
     def leave(self) -> None:
-        """Release all goals and, in lockstep, leave the participants."""
+        """Release all goals and, in lockstep, end the participation of this service."""
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()

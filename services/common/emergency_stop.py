@@ -33,7 +33,7 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether a stop is kept in place of another: the stop of a launcher ends with it, that of any other client does not."""
+    """Return whether a stop's record replaces the old one: a launcher's stop ends with it, the stop of another client does not."""
     return old is None or (old.source == BY_LAUNCHER and new.source != BY_LAUNCHER)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The health of a process: rate, age and gaps of the ticks that it gets, refused messages, memory, open files; and which is bad."""
+"""The health of a process: rate, age and gaps of the ticks that it gets, refused messages, memory, open files; and their limits."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Health:
         self.bad: dict[str, float] = {}  # what is or was beyond its limit: its name, and the time [s] of the last check that found it
 
     def numbers(self, waiting: int) -> dict[str, int | float | None]:
-        """Rate [Hz], age and longest gap [ms] of the ticks, refusals a second, memory [MB], open files, threads, waiting messages."""
+        """Rate [Hz], age and longest gap [ms] of the ticks, refusals per second, memory [MB], open files, threads, waiting messages."""
         age, gap = self.beats.age(time.monotonic()), self.beats.gap
         return {
             "rate": self.beats.rate,
@@ -113,7 +113,7 @@ class Health:
 
 
 def _memory() -> float | None:
-    """Resident memory of this process, MB; None where Linux's /proc is not there."""
+    """Resident memory of this process, MB; None without Linux's /proc."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
     except (OSError, ValueError, IndexError):

@@ -239,7 +239,7 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """Note the router; of a second token, ask which router answers: a service must not join a system that is started later."""
+        """Record the router; if a second one appears, ask which answers: a service must not join a system that was started later."""
         if not self._router:
             self._router = router
         elif router != self._router:

@@ -26,7 +26,7 @@ class Raw(Struct, frozen=True, gc=False):
 
     @property
     def type(self) -> str:
-        """The name of the message's type; "" for what is no message of the contract, such as a recorded liveliness token."""
+        """The name of the message's type; "" for data that are no message of the contract, such as a recorded liveliness token."""
         return type_of(self.encoding)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Text of others, from messages and files, for a terminal or a log."""
+"""Text from messages and files, made safe for a terminal or a log."""
 
 from __future__ import annotations
 

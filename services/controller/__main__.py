@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.controller`."""
+"""Starts the controller: `python -m services.controller`."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was a
 
 
 class Drives:
-    """The drive epoch of each part, and the knowledge whether robot_sim follows this controller's commands.
+    """The drive epoch of each part, and whether robot_sim follows this controller's commands.
 
     No method waits for an answer: while one part is being armed, the others need their commands.  Times are of the monotonic clock, in
     lockstep of the bus clock.

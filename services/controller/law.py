@@ -141,7 +141,7 @@ class RobotLaw:
     # Reaches and forces of clients
 
     def reach(self, part: str, marker: str, target: ReachTarget) -> None:
-        """Draw a marker to a target by forces on the part; raises InvalidValue or UnknownName if it cannot reach."""
+        """Pull a marker to a target by forces on the part; raises InvalidValue or UnknownName if it cannot reach."""
         self._law.reach_toward(part, marker, target)
 
     def end_reach(self, part: str) -> None:

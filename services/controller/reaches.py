@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaches in progress: a marker is drawn to a target, then released (thesis 8.2)."""
+"""Reaches in progress: a marker is pulled to a target, then released (thesis 8.2)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Reaches:
         self._streams = {part: bus.publisher(ReachMessage, part) for part in robot.parts}
 
     def begin(self, part: str, asked: ReachFor) -> None:
-        """Start to draw the part's marker to its target; raises InvalidValue or UnknownName if the part cannot reach for it."""
+        """Start to pull the part's marker to its target; raises InvalidValue or UnknownName if the part cannot reach for it."""
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
         if len(others) >= MAX_HANDS:
@@ -73,7 +73,7 @@ class Reaches:
                 self._law.reach(part, reach.marker, reach.target)
 
     def update(self, part: str, tick: Tick) -> None:
-        """End the force when the part has settled or timed out; the part is then drawn back and settles again, unless it is to stay."""
+        """End the force when the part has settled or timed out; the part then returns and settles again, unless it is to stay."""
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.model`."""
+"""Starts the model: `python -m services.model`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.monitor`."""
+"""Starts the monitor: `python -m services.monitor`."""
 
 from __future__ import annotations
 

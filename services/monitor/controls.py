@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Does what people ask for on the page, by the calls of the bus; one page at a time holds the controls."""
+"""Executes the commands of the page by calls on the bus; one page at a time holds the controls."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ FARTHEST = 3.0  # m: a place farther from the origin is a mistake
 
 @dataclass
 class Known:
-    """The newest messages that the calls depend on; the main thread writes, other threads read."""
+    """The newest messages that the calls depend on; the main thread writes them, other threads read them."""
 
     gates: dict[str, str] = field(default_factory=dict)  # by part
     motions: dict[str, Motion] = field(default_factory=dict)
@@ -101,7 +101,7 @@ class PageControls:
         self._publish()
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Do what a page asks for; returns a sentence for the person, raises Refused."""
+        """Execute a command of a page; returns a sentence for the user, raises Refused."""
         if verb == "stop":  # from every page, and without waiting for another call
             return self._stop()
         with self._lock:
@@ -125,7 +125,7 @@ class PageControls:
             return done
 
     def tend(self, open_pages: set[str]) -> None:
-        """Give everything back when the page that holds the controls was closed, and parts whose reach has ended."""
+        """Give all parts back if the page that holds the controls is closed, and each part whose reach has ended."""
         with self._lock:
             self._pages = len(open_pages)
             if self._holder and self._holder not in open_pages:
@@ -249,7 +249,7 @@ class PageControls:
         return f"The {title_of(hand)} reaches for {'it' if name is None else f'the {name}'}."
 
     def _place(self, given: dict[str, Any]) -> str:
-        """Put an object of the simulator somewhere; one that vision does not see is moved in the model's world too."""
+        """Move an object of the simulator; an object that vision does not perceive is also moved in the model's world."""
         name, place = str(given["name"]), _place_of(given["position"])
         self._call(keys.sim("place"), Place, Done, name=name, position=place.tolist())
         if not self._service.alive.get("vision"):

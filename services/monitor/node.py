@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the monitor: the newest message of every stream, twenty times a second, to the page and to files."""
+"""Runs the monitor: sends the newest message of every stream to the page and to files, twenty times per second."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class MonitorNode:
         service.on_each(EStop, self._note_stop, any_run=True)
 
     def _described(self) -> dict[str, Any]:
-        """What the page must know of the robot once."""
+        """Return the constant data of the robot, which the page needs once."""
         robot = self._robot
         parts = [
             {

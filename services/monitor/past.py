@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a monitor recorded of a run: every value at every moment."""
+"""The record that a monitor made of a run: every value at every time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from services.monitor.web.record import SHOWN_EVENTS, STORY, Entry, entries
 
 @dataclass(frozen=True)
 class Track:
-    """The values that something had, in the order of their times [s]."""
+    """The values of one name in the order of their times [s]."""
 
     times: Sequence[float]
     values: Sequence[Any]
@@ -42,7 +42,7 @@ class Track:
 
 
 class Story:
-    """What was recorded of a run."""
+    """The record of a run."""
 
     def __init__(self, run: Path) -> None:
         """Read the record in a run's folder; raises MobeeError."""
@@ -65,7 +65,7 @@ class Story:
         return self.end - self.begin
 
     def at(self, seconds: float) -> dict[str, Any]:
-        """Return all values at a moment, s since the begin."""
+        """Return all values at a moment, s since the beginning."""
         moment = self.begin + min(max(seconds, 0.0), self.length)
         values = {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
         if "event" in self.tracks:
@@ -73,7 +73,7 @@ class Story:
         return values
 
     def pose(self, seconds: float) -> Array:
-        """Return the motor positions (n,) at a moment, s since the begin, between two recorded ones on the straight line between them."""
+        """Return the motor positions (n,) rad at a time [s since the beginning], interpolated linearly between recorded ones."""
         track, moment = self.tracks["q"], self.begin + min(max(seconds, 0.0), self.length)
         after = min(bisect_right(track.times, moment), len(track.times) - 1)
         before = max(after - 1, 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows again what a monitor recorded: the same page, with a time line."""
+"""Replays the record of a monitor: the same page, with a time line."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Player:
         self._at, self._plays, self._since = 0.0, True, time.monotonic()
 
     def seek(self, query: Mapping[str, str]) -> None:
-        """Do what the page's time line asks for: `at`, s since the begin, or `toggle` between playing and a pause.  Raises ValueError."""
+        """Execute a command of the page's time line: `at`, s since the beginning, or `toggle` to play or pause.  Raises ValueError."""
         with self._lock:
             self._advance()
             if "at" in query:
@@ -48,7 +48,7 @@ class Player:
                     self._at = 0.0
 
     def now(self) -> tuple[float, bool]:
-        """Return the position, s since the begin, and whether it plays."""
+        """Return the position, s since the begin, and whether the story is playing."""
         with self._lock:
             self._advance()
             return self._at, self._plays

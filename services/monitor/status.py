@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state of the system in one sentence, with what a person can do about it."""
+"""The state of the system in one sentence, with a remedy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HELD = 1.0  # s of real time for which a part must hold before it is reported: e
 
 @dataclass
 class Seen:
-    """What the monitor knows of the system now."""
+    """The present knowledge of the monitor about the system."""
 
     clock_age: float | None = None  # s of real time since the last tick; None: there was none
     mode: str = ""  # of the clock
@@ -31,7 +31,7 @@ class Seen:
 
 
 def banner(seen: Seen) -> dict[str, Any] | None:
-    """Return what the page must show in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
+    """Return the warning that the page shows in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
     names = sorted(seen.services)
     if seen.ended:
         return _said(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.port_filter`."""
+"""Starts the port filter: `python -m services.port_filter`."""
 
 from __future__ import annotations
 

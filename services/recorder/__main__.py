@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.recorder`."""
+"""Starts the recorder: `python -m services.recorder`."""
 
 from __future__ import annotations
 

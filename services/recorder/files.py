@@ -39,7 +39,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 class Files:
-    """Writes messages; raises OSError where a file cannot be written."""
+    """Writes messages to the files; raises OSError if a file cannot be written."""
 
     def __init__(self, folder: Path, largest: int, settings: Mapping[str, bytes]) -> None:
         """`largest`: bytes of all files; `settings`: files that are attached to each file, by name."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the recorder: takes what has arrived four times a second, and writes it."""
+"""Runs the recorder: four times per second, writes the messages that have arrived."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class RecorderNode:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
     def end(self) -> None:
-        """Write what has arrived, and the index of the file."""
+        """Write the messages that have arrived, and the index of the file."""
         try:
             self._write(self._tap.drain())
             self._files.close()

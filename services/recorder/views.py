@@ -33,7 +33,7 @@ class Views:
     """Makes the copies."""
 
     def __init__(self, robot: Robot, pose_rate: float, json_rate: float) -> None:
-        """Rates: copies a second of real time, of the robot's pose and of each key; 0: none."""
+        """Rates: copies per second of real time, of the robot's pose and of each key; 0: none."""
         self._robot = robot
         self._model = Model(robot)
         self._joints, self._transforms = ros.JointStates(robot.motors), ros.Transforms(robot.links)
@@ -62,7 +62,7 @@ class Views:
 
 
 class _Due:
-    """The keys at a rate."""
+    """Decides for each key whether a copy is due at a rate."""
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate else 0
@@ -78,7 +78,7 @@ class _Due:
 
 @cache
 def _json_channel(key: str, kind: str) -> Channel:
-    """Return the channel of the JSON copies of a key; those of calls contain other types, so that they have no schema."""
+    """Return the channel of the JSON copies of a key; a key of calls has no schema, since its messages have several types."""
     schema = {} if kind == "Served" else schemas_of(kind)
     definition = json.dumps(schema["message"]).encode() if schema else b""
     return Channel(f"json/{key}", "json", "", kind if schema else "", "jsonschema" if schema else "", definition)

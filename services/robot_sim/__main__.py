@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.robot_sim`."""
+"""Starts the simulated robot: `python -m services.robot_sim`."""
 
 from __future__ import annotations
 

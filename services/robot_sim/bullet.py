@@ -39,7 +39,7 @@ class BulletBackend:
         self._build(seed)
 
     def reset(self, seed: int) -> None:
-        """Back home, at rest, in hold, the world as it was."""
+        """Set the home posture, at rest, in hold, and the world in its initial state."""
         self._scene.close()
         self._build(seed)
 
@@ -56,18 +56,18 @@ class BulletBackend:
         self._scene.move(name, position)
 
     def contact(self) -> SolidContact:
-        """The deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick."""
         if not self._deepest:
             return NO_CONTACT
         pair = max(self._deepest, key=self._deepest.__getitem__)
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
         return self._deepest
 
     def gap(self) -> float:
-        """Closest distance of hands and forearms to the obstacles, m; -1 when there is none."""
+        """Return the closest distance of hands and forearms to the obstacles, m; -1 without obstacles."""
         links = [link for link in self._scene.links if link.endswith(GAP_LINKS)]
         gaps = [self._scene.distance(link, obstacle, MAX_GAP) for link in links for obstacle in self._obstacles]
         return max(min(gaps), 0.0) if gaps else -1.0

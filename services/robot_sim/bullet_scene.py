@@ -27,7 +27,7 @@ TABLE = "table"  # in the list it stands for every obstacle of the world
 
 
 class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
-    """The list, and how it came about."""
+    """The list of pairs whose contacts count as solid contacts, and the record of its origin."""
 
     model: str  # of icub-models
     distance: float  # m, at which hulls count as apart
@@ -37,16 +37,16 @@ class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
     apart: list[list[str]]  # the others
 
     def links(self) -> set[frozenset[str]]:
-        """Pairs of two links of the robot."""
+        """Return the pairs of two links of the robot."""
         return {frozenset(pair) for pair in self.always + self.apart if TABLE not in pair}
 
     def against_table(self) -> list[str]:
-        """Links that are listed with the table, sorted."""
+        """Return the links that are listed with the table, sorted."""
         return sorted(first if second == TABLE else second for first, second in self.always + self.apart if TABLE in (first, second))
 
 
 def load_solid_pairs() -> SolidPairs:
-    """The committed list."""
+    """Return the list in this repository."""
     return msgspec.json.decode(SOLID_PAIRS.read_bytes(), type=SolidPairs)
 
 
@@ -55,9 +55,9 @@ BASE = -1  # PyBullet's index of the base link
 
 
 class BulletScene:
-    """Bodies, and what they are called.
+    """The bodies in PyBullet, and their names.
 
-    `motors` and `joints`: which motors of the robot PyBullet moves, and the joints they are there; the others (fingers,
+    `motors` and `joints`: the motors of the robot that PyBullet moves, and their joints in PyBullet; the others (fingers,
     eyes) have no counterpart in the URDF.
     """
 
@@ -95,7 +95,7 @@ class BulletScene:
             self.client.resetJointState(self.body, joint, position)
 
     def motion(self, q: Array) -> Motion:
-        """The equation of motion of the joints in `motors` at q (n,) rad of all motors and at the joints' velocities."""
+        """Return the equation of motion of the joints in `motors` at q (n,) rad of all motors and at the joints' velocities."""
         velocity = np.array([state[1] for state in self.client.getJointStates(self.body, self.joints)])
         at, moving = q[self.motors][self._order].tolist(), velocity[self._order].tolist()
         still = [0.0] * len(at)
@@ -106,7 +106,7 @@ class BulletScene:
         return Motion(mass[np.ix_(self._back, self._back)], coriolis + gravity_torque(self._robot, q)[self.motors], velocity)
 
     def move(self, name: str, position: Iterable[float]) -> None:
-        """Put a world object somewhere, m."""
+        """Move a world object to a position (3,), m."""
         _, turn = self.client.getBasePositionAndOrientation(self.objects[name])
         self.client.resetBasePositionAndOrientation(self.objects[name], tuple(position), turn)
 
@@ -123,7 +123,7 @@ class BulletScene:
                 self.client.setCollisionFilterPair(self.body, body, index, BASE, int((name, thing) in wanted))
 
     def distance(self, link: str, other: str, within: float) -> float:
-        """Distance [m] of a link from another link or a world object, negative when they overlap; inf beyond `within`."""
+        """Return the distance [m] of a link from another link or a world object, negative when they overlap; inf beyond `within`."""
         body, index = (self.objects[other], BASE) if other in self.objects else (self.body, self.links[other])
         points = self.client.getClosestPoints(self.body, body, within, self.links[link], index)
         return min((point[8] for point in points), default=np.inf)

@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The arm's equation of motion now: mass * acceleration + bias = torque at the joints + what contacts do; (d,) driven joints."""
+    """The equation of motion at present: mass * acceleration + bias = joint torques + torques of contacts; (d,) driven joints."""
 
     mass: Array  # (d, d) kg m^2
     bias: Array  # (d,) N m, gravity and what velocities do
@@ -35,9 +35,9 @@ class Share:
 class Gears:
     """Solves a substep of motor, gear and arm together, implicitly, and returns the torque that passes the gear.
 
-    A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside.
-    Both are far larger than the inertia of a wrist, so an explicit step of 5 ms would explode.  What acts from outside (contacts)
-    is taken from the last substep: the difference of what the joints did and what they should have done.
+    A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside. Both are
+    far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge.  The external torque (contacts) is taken from the
+    last substep: it explains the difference between the motion of the joints and the computed motion.
     """
 
     def __init__(self, joints: int) -> None:
@@ -45,16 +45,16 @@ class Gears:
         self._nothing = np.zeros(joints)
 
     def forget(self) -> None:
-        """No torque was passed on in the last substep."""
+        """Forget the last substep, as if no torque had been transmitted in it."""
         self._last = None
 
     def transmit(
         self, now: Motion, torque: Array, free: Mask, velocity: Array, fastest: tuple[Array, Array], touched: bool, h: float
     ) -> Share:
-        """The share of a substep of h [s]; all (d,).
+        """Return the commands of the joints in a substep of h [s]; all arrays (d,).
 
-        `torque` N m acts where `free`, the other joints go at `velocity` rad/s.  A joint that would leave the range `fastest`
-        (lowest and highest velocity, rad/s) is not free: it goes at the end of the range.
+        `torque` N m acts where `free`, the other joints move at `velocity` rad/s.  A joint that would leave the range `fastest`
+        (lowest and highest velocity, rad/s) is not free: it moves at the limit of the range.
         """
         outside = self._outside(now, h) if touched else self._nothing
         free, velocity = free.copy(), velocity.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses the back-end: by name, or of those that are installed the one that suits the robot."""
+"""Chooses the back-end: by name, or the installed one that is most suitable for the robot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WITHOUT_PHYSICS = (
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A back-end, and a sentence about a choice that the user should know of; else ""."""
+    """A back-end, and a message for the user about an unexpected choice, or ""."""
 
     name: Name
     warning: str = ""
@@ -31,7 +31,7 @@ class Choice:
 def choose(backend: Literal["auto", Name], robot: Robot) -> Choice:
     """Return the back-end for a robot; raises BackendUnavailable for one that cannot move it.
 
-    "auto" is PyBullet for the iCub where it is installed, else MuJoCo where it is, else the motor model alone.
+    "auto" is PyBullet for the iCub if it is installed, else MuJoCo if it is installed, else the motor model alone.
     """
     if backend == "pybullet":
         require_simulated(robot)

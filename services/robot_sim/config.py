@@ -57,7 +57,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 
     def packages(self) -> Mapping[str, str]:
-        """See ServiceConfig: those of a back-end that is chosen by name."""
+        """See ServiceConfig; returns the packages of a back-end that is chosen by name."""
         return {} if self.backend == "auto" else dict.fromkeys(PACKAGES[self.backend], EXTRA)
 
     def check_robot(self, robot: Robot) -> None:

@@ -38,7 +38,7 @@ class Limits:
 
     @classmethod
     def of(cls, robot: Robot, part: str) -> Limits:
-        """The limits in the robot file."""
+        """Return the limits in the robot file."""
         motors = robot.motor_table[robot.part(part).slice]
         return cls(
             lower=np.array([m.limits[0] for m in motors]),
@@ -63,12 +63,12 @@ class Order(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, command: Command) -> Order:
-        """The order in a command to one part."""
+        """Return the order in a command to one part."""
         return cls(command.src, command.epoch, command.seq, command.re_k, command.mode, np.array(command.ref), command.ttl)
 
 
 def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
-    """The orders in a message to several parts, by part; raises KeyError for a part that the robot does not have."""
+    """Return the orders in a message to several parts, by part; raises KeyError for a part that the robot does not have."""
     reference = np.array(commands.ref)
     src, seq, re_k, ttl = commands.src, commands.seq, commands.re_k, commands.ttl
     return {
@@ -101,7 +101,7 @@ class Admission:
     """The checks of one part; each raises Refused with its reason."""
 
     def __init__(self, part: str, limits: Limits, dt: float, max_ticks: int | None) -> None:
-        """`max_ticks`: how many ticks ago the one may be that an order answers; None: as many as begin in MAX_AGE."""
+        """Set the limits; `max_ticks`: largest age [ticks] of the tick that an order answers; None: the ticks that begin within MAX_AGE."""
         self._part, self._dt, self._max_ticks = part, dt, max_ticks
         self._velocity, self._torque = limits.velocity * _EXACT, limits.torque * _EXACT
         self._margin, self._start = POSITION_MARGIN * limits.fine, MAX_START * limits.fine
@@ -162,7 +162,7 @@ class Admission:
 
 
 def _all(found: NDArray[np.bool_]) -> bool:
-    """Whether all are true; for few numbers three times as fast as `numpy.all`."""
+    """Return whether all are true; for few numbers three times as fast as `numpy.all`."""
     return bool(np.count_nonzero(found) == found.size)
 
 
@@ -179,17 +179,17 @@ class Shaper:
         self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # by which the reference leads a servo at that speed
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
-        """The velocity for this tick; before a position limit at most what can still be braked."""
+        """Return the velocity for this tick; near a position limit, at most the velocity from which the motor can still stop."""
         self._asked.to_velocity(wanted, q)
         return self._asked.velocity.copy()
 
     def to_position(self, wanted: Array) -> Array:
-        """The position for this tick, on a motion that comes to rest at `wanted`."""
+        """Return the position for this tick, on a motion that comes to rest at `wanted`."""
         self._asked.to_position(wanted)
         return self._asked.position.copy()
 
     def runs_out(self, q: Array, velocity: Array) -> bool:
-        """Whether some motor is a tick of braking too fast, rad/s, to stop before its position limit."""
+        """Return whether a motor is too fast to stop before its position limit, by more than it brakes in a tick."""
         return self._asked.runs_out(q, velocity)
 
 
@@ -292,18 +292,18 @@ class Gate:
         self.force_hold("requested by its owner")
 
     def force_hold(self, why: str) -> None:
-        """Hold at once, without a request of the owner."""
+        """Put the part in hold at once, without a request of the owner."""
         if self.state == "armed":
             self._enter("hold", why)
 
     def lose_owner(self) -> None:
-        """Hold, because the owner's liveliness token is gone."""
+        """Put the part in hold, because the owner's liveliness token is gone."""
         who = self.owner[0] if self.owner else "nobody"
         self.owner = None
         self.force_hold(f"its owner {who} is gone")
 
     def stop(self, why: str) -> None:
-        """Emergency stop: latched."""
+        """Latch an emergency stop."""
         if self.state != "estop":
             self._enter("estop", why)
 
@@ -313,7 +313,7 @@ class Gate:
             self._enter("fault" if self.faults else "hold", "emergency stop reset")
 
     def fail(self, bit: int, why: str) -> None:
-        """A fault of the part's hardware; only a new run clears it."""
+        """Record a hardware fault of the part; only a new run clears it."""
         self.faults |= bit
         if self.state not in ("fault", "estop"):
             self._enter("fault", why)
@@ -357,17 +357,17 @@ class Gate:
         return self._shaped(order.mode, order.reference, q, velocity)
 
     def _beginning(self, re_k: int, k: int, now: int) -> int:
-        """Return when tick re_k began, ns; the present tick k is the newest that has begun."""
+        """Return the time at which tick re_k began, ns; the present tick k is the newest that has begun."""
         ago = k - re_k + 1
         return self._begun[-ago] if ago <= len(self._begun) else now
 
     def _check_delay(self, delay: int) -> None:
-        """Refuse an order that was on its way for too long, although no ticks have passed: this process itself did not run."""
+        """Refuse an order that was delayed for too long although no ticks have passed, because this process did not run."""
         if self._ttl_ticks is None and delay > 1e9 * MAX_AGE * self._stretch:
             raise Refused("age", f"{self.part}: answers a tick that began {delay / 1e6:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
 
     def _has_expired(self, current: InForce, k: int, now: int) -> bool:
-        """Whether the command is too old; then the part holds."""
+        """Return whether the command is too old; then the part holds."""
         age, ttl, late = k - current.order.re_k, float(current.order.ttl), (now - current.expires) / 1e6
         if self._ttl_ticks is not None:
             if age > self._ttl_ticks:

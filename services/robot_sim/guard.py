@@ -22,7 +22,7 @@ CHECK_PERIOD = 0.01  # s between two checks for an emergency stop; there is one 
 
 
 class Guard:
-    """One gate a part, and the emergency stop of all."""
+    """One gate per part, and the emergency stop of all parts."""
 
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
         """Begin with the emergency stop that the record holds.
@@ -57,14 +57,14 @@ class Guard:
         self._on_answer = handler
 
     def reset(self) -> None:
-        """A new run: all gates are idle and without owner; a latched emergency stop stays."""
+        """Start a new run: all gates are idle and without owner; a latched emergency stop stays."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
         if self._stop is not None:
             self._stop_gates(self._stop)
 
     def tick(self, k: int) -> None:
-        """Give the commands that are in force in tick k to the motors."""
+        """Pass the commands that are in force in tick k to the motors."""
         self._check_stop()  # before commands, and past an inbox that a flood has filled
         now = time.monotonic_ns()
         motors = self._backend.motors
@@ -85,7 +85,7 @@ class Guard:
         self._waiting.clear()
 
     def hold_dependents(self, who: str) -> None:
-        """Let the parts hold that depend on a late service."""
+        """Put the parts in hold that depend on a late service."""
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is late")
         for gate in self.gates.values():
@@ -93,7 +93,7 @@ class Guard:
                 gate.force_hold(f"its owner {who} is late")
 
     def hold_all(self, why: str) -> None:
-        """Let every part hold at once."""
+        """Put every part in hold at once."""
         for gate in self.gates.values():
             gate.force_hold(why)
 
@@ -144,7 +144,7 @@ class Guard:
         self._admit(part, order, self._backend.motors.q, self._service.bus.k)
 
     def _admit(self, part: str, order: Order, q: Array, k: int) -> None:
-        """`q`: (n,) rad, measured positions of all motors; `k`: the present tick."""
+        """Admit or refuse an order to a part; `q`: (n,) rad, measured positions of all motors; `k`: the present tick."""
         try:
             self.gates[part].admit(order, k, time.monotonic_ns(), q[self._where[part]])
         except Refused as refused:  # reported and counted

@@ -25,7 +25,7 @@ class BackendUnavailable(InvalidValue):
 
 @dataclass(frozen=True, slots=True)
 class SolidContact:
-    """The deepest solid contact of a listed pair; depth 0 when there is none."""
+    """The deepest solid contact of a listed pair; depth 0 without contact."""
 
     depth: float = 0.0  # m
     pair: str = ""
@@ -64,7 +64,7 @@ class Backend(Protocol):
         ...
 
     def reset(self, seed: int) -> None:
-        """Home posture, at rest, in hold; the world in its initial state."""
+        """Set the home posture, at rest, in hold, and the world in its initial state."""
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
@@ -72,15 +72,15 @@ class Backend(Protocol):
         ...
 
     def contact(self) -> SolidContact:
-        """The deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick."""
         ...
 
     def contacts(self) -> Mapping[str, float]:
-        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
         ...
 
     def gap(self) -> float:
-        """Closest distance of hands and forearms to the table, m; -1 when it is not measured."""
+        """Return the closest distance of hands and forearms to the table, m; -1 if it is not measured."""
         ...
 
 
@@ -96,7 +96,7 @@ class KinematicBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Home posture, at rest, in hold; the world in its initial state."""
+        """Set the home posture, at rest, in hold, and the world in its initial state."""
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
 
@@ -115,11 +115,11 @@ class KinematicBackend:
         self.world.move(name, position=position)
 
     def contact(self) -> SolidContact:
-        """There are no solids."""
+        """Return a contact of depth 0: this back-end has no solids."""
         return SolidContact()
 
     def contacts(self) -> Mapping[str, float]:
-        """There are no solids."""
+        """Return no contacts: this back-end has no solids."""
         return {}
 
     def gap(self) -> float:

@@ -28,17 +28,17 @@ class Lockstep:
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
-        """A new run."""
+        """Start a new run."""
         self._barrier.begin()
         self.flaws, self._reported = 0, -EVENT_PERIOD
 
     def is_complete(self) -> bool:
-        """Whether all participants have answered tick 0; until then it is repeated."""
+        """Return whether all participants have answered tick 0; until then it is repeated."""
         self._began = time.monotonic()
         return not self._barrier.absent()
 
     def startup_status(self) -> str:
-        """Which participants tick 0 waits for, for the status."""
+        """Return the participants for which tick 0 waits, as text for the status."""
         absent = self._barrier.absent()
         return f"waits for {', '.join(absent)}" if absent else "all participants are ready"
 
@@ -53,15 +53,15 @@ class Lockstep:
         self._answered = time.monotonic()
 
     def is_over(self) -> bool:
-        """Whether the run has reached its last tick."""
+        """Return whether the run has reached its last tick."""
         return self._service.bus.k == self._last_tick > 0
 
     def is_degraded(self) -> bool:
-        """Whether a process that lockstep expects to take part is absent."""
+        """Return whether an expected participant of lockstep is absent."""
         return bool(self._barrier.absent())
 
     def note_flaw(self, why: str) -> None:
-        """Count an event that makes the run unrepeatable, and report it at most once a second."""
+        """Count an event that makes the run unrepeatable, and report it at most once per second."""
         self.flaws += 1
         now = time.monotonic()
         if now - self._reported >= EVENT_PERIOD:
@@ -69,11 +69,11 @@ class Lockstep:
             self._service.bus.event("warning", "not_repeatable", f"this run is not repeatable: {why}", k=float(self._service.bus.k))
 
     def speed(self, dt: float) -> float:
-        """Simulated seconds per second of real time since tick 1."""
+        """Return the simulated seconds per second of real time since tick 1."""
         return self._service.bus.k * dt / max(self._answered - self._began, 1e-9)
 
     def numbers(self) -> Mapping[str, float]:
-        """For `stat`."""
+        """Return the numbers of the run for `stat`."""
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
 
     def _note(self, who: str, why: str) -> None:

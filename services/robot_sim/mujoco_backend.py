@@ -25,8 +25,8 @@ Mask = NDArray[np.bool_]
 class MujocoBackend:
     """All joints of any robot with gravity, its base fixed.
 
-    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight.  In torque mode it gets the
-    torque itself, behind a gear with the inertia and the friction of the law, and must include the torque that carries the weight.
+    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight.  In torque mode the commanded
+    torque acts through a gear with the inertia and the friction of the law, and must include the torque that carries the weight.
     """
 
     name = "mujoco"
@@ -43,7 +43,7 @@ class MujocoBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Back home, at rest, in hold, the world as it was."""
+        """Set the home posture, at rest, in hold, and the world in its initial state."""
         self.world = self._load_world()
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self._scene = MujocoScene(self._robot, self.world, self._substep)
@@ -69,23 +69,23 @@ class MujocoBackend:
                     self._deepest[name] = max(depth, self._deepest.get(name, 0.0))
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object somewhere, m; raises MobeeError."""
+        """Move a world object to a position (3,), m; raises MobeeError."""
         self.world.move(name, position=position)
         self._scene.move(name, position)
 
     def contact(self) -> SolidContact:
-        """The deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick."""
         if not self._deepest:
             return SolidContact()
         pair = max(self._deepest, key=self._deepest.__getitem__)
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
         return self._deepest
 
     def gap(self) -> float:
-        """Closest distance of hands and forearms to the obstacles, m; -1 when there is none."""
+        """Return the closest distance of hands and forearms to the obstacles, m; -1 without obstacles."""
         if not self._obstacles or not self._near:
             return -1.0
         return max(self._scene.distance(self._near, self._obstacles, MAX_GAP), 0.0)
@@ -115,7 +115,7 @@ class MujocoBackend:
     def _apply_torques(self, in_torque: Mask, target: Array, q: Array, h: float) -> tuple[Mask, Array]:
         """Give the motors in torque mode their torques; returns which motors are free, and the velocities (n,) rad/s of the others.
 
-        A motor that would leave its range, or be faster than it may, is not free: it goes at the end of the range.
+        A motor that would leave its range, or be faster than it may, is not free: it moves at the limit of the range.
         """
         scene = self._scene
         data = scene.data
@@ -132,7 +132,7 @@ class MujocoBackend:
         return free, np.where(in_torque, within, target)
 
     def _change_gears(self, in_torque: Mask) -> None:
-        """Give motors in torque mode the inertia and the friction of the law, the others those of their own."""
+        """Give motors in torque mode the inertia and the friction of the law, and other motors their own."""
         if (in_torque == self._geared).all():
             return
         scene = self._scene

@@ -74,16 +74,16 @@ class MujocoScene:
         self.refresh()
 
     def refresh(self) -> None:
-        """Compute what depends on positions and velocities: masses, contacts, constraints."""
+        """Compute the quantities that depend on positions and velocities: masses, contacts, constraints."""
         mujoco.mj_step1(self.model, self.data)
 
     def motor_positions(self) -> Array:
-        """Positions (n,) rad of the motors, of their own joints."""
+        """Return the positions (n,) rad of the motors, from the joints on which they act."""
         q: Array = (self.data.qpos[self._qpos] - self.offset) / self.scale
         return q
 
     def move(self, name: str, position: Iterable[float]) -> None:
-        """Put a world object somewhere, m."""
+        """Move a world object to a position (3,), m."""
         self.data.mocap_pos[self._mocap[name]] = tuple(position)
         self.refresh()
 
@@ -95,7 +95,7 @@ class MujocoScene:
             self.model.dof_damping[dof] = _share(friction, motor, scale)
 
     def contacts(self) -> Mapping[tuple[str, str], float]:
-        """Depth [m] by pair of the names of links or objects, sorted: the deepest point of each pair that overlaps."""
+        """Return the depth [m] of each pair that overlaps, at its deepest point, by the sorted names of its links or objects."""
         data, found = self.data, dict[tuple[str, str], float]()
         if data.ncon == 0:
             return found
@@ -108,7 +108,7 @@ class MujocoScene:
         return found
 
     def distance(self, links: Iterable[str], objects: Iterable[str], within: float) -> float:
-        """Smallest distance [m] of links from objects, negative when they overlap; `within` if there is none nearer."""
+        """Return the smallest distance [m] of links from objects, negative when they overlap; `within` if all are farther."""
         ours = [geom for link in links for geom in self._solids.get(link, ())]
         theirs = [self.model.geom(_of_object(name)).id for name in objects]
         nearest = within
@@ -166,7 +166,7 @@ class MujocoScene:
 
     @property
     def _soonest(self) -> tuple[float, float]:
-        """The solref of what is as hard as a substep allows."""
+        """MuJoCo's parameter solref of the hardest constraint that a substep allows."""
         return 2.0 * self._substep, 1.0
 
     def _add_motor(self, spec: Any, motor: Motor, joint: int, scale: float, offset: float) -> None:

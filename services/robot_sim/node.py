@@ -195,7 +195,7 @@ class Node:
         return Done(v=VERSION)
 
     def _begin_pause(self, request: Empty, key: str) -> Done:
-        """Pause, or let one's own pause last longer."""
+        """Begin a pause, or prolong it for the service that has begun it."""
         self._require_pauser(request.who)
         if self._pause is None:
             self._guard.hold_all(f"paused by {request.who}")

@@ -24,7 +24,7 @@ DRAWN_TICKS = 256  # ticks whose jitter is drawn at once
 
 
 class Phases:
-    """The time within each tick at which each part is sampled: a fixed phase for each part plus jitter, both drawn from a seed."""
+    """The times within each tick at which the parts are sampled: a fixed phase for each part plus jitter, both drawn from a seed."""
 
     def __init__(self, parts: Sequence[str], jitter: float, seed: int) -> None:
         """`jitter`: standard deviation, share of a tick."""
@@ -34,7 +34,7 @@ class Phases:
         self._drawn: Iterator[list[float]] = iter(())
 
     def next(self) -> list[tuple[float, str]]:
-        """(share of the tick, part) for one tick, in order of time; every share lies in 0..1."""
+        """Return (share of the tick, part) of each part for one tick, in order of time; every share lies in 0..1."""
         times = next(self._drawn, None)
         if times is None:
             jitter = self._jitter * self._rng.standard_normal((DRAWN_TICKS, len(self._parts)))
@@ -44,7 +44,7 @@ class Phases:
 
 
 def part_meta(robot: Robot, part: str) -> PartMeta:
-    """The part's motors and their limits."""
+    """Return the part's motors and their limits."""
     limits = Limits.of(robot, part)
     return PartMeta(
         v=VERSION,
@@ -74,7 +74,7 @@ class Sensors:
         self.reset()
 
     def reset(self) -> None:
-        """A new run."""
+        """Start a new run."""
         self._hash = hashlib.sha256()
         self._statuses: dict[str, PartStatus] = {}
 

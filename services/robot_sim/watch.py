@@ -44,7 +44,7 @@ class Stops:
             self._commanded.pop(part, None)
 
     def note_hold(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
-        """Time [s] and distance [rad] since the last command, if the part has just come to rest; else None."""
+        """Return time [s] and distance [rad] since the last command if the part has just come to rest; else None."""
         if moves or part not in self._commanded:
             return None
         start, q_start = self._commanded.pop(part)
@@ -99,7 +99,7 @@ class Counters:
             self.gap_min = gap
 
     def age_at(self, percent: float) -> float:
-        """Percentile of the age in ticks, -1 before the first command."""
+        """Return a percentile of the age in ticks, -1 before the first command."""
         total, seen = sum(self.ages.values()), 0
         for age in sorted(self.ages):
             seen += self.ages[age]
@@ -108,7 +108,7 @@ class Counters:
         return -1.0
 
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
-        """For `stat`; `missed`: ticks skipped since the start of the process."""
+        """Return the counts for `stat`; `missed`: ticks skipped since the start of the process."""
         return {
             "ticks": self.ticks,
             "missed_ticks": missed - self.missed_before,
@@ -143,7 +143,7 @@ class Recorded:
     """
 
     def __init__(self, inner: Backend, folder: Path) -> None:
-        """Raises InvalidValue for a folder that cannot be written."""
+        """Open the files; raises InvalidValue for a folder that cannot be written."""
         self._inner = inner
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -182,15 +182,15 @@ class Recorded:
         self._inner.place(name, position)
 
     def contact(self) -> SolidContact:
-        """The deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick."""
         return self._inner.contact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Depths of the solid contacts of the last tick, m, by pair."""
+        """Return the depths of the solid contacts of the last tick, m, by pair."""
         return self._inner.contacts()
 
     def gap(self) -> float:
-        """Closest distance of hands and forearms to the obstacles, m; -1 when it is not measured."""
+        """Return the closest distance of hands and forearms to the obstacles, m; -1 if it is not measured."""
         return self._inner.gap()
 
     def _begin(self) -> None:
@@ -216,12 +216,12 @@ class Watch:
         self.counters = Counters()
 
     def mark(self, missed: int) -> None:
-        """A measurement begins; `missed`: ticks skipped until now."""
+        """Begin a measurement; `missed`: ticks skipped until now."""
         self.counters = Counters()
         self.counters.missed_before = missed
 
     def reset(self) -> None:
-        """A new run."""
+        """Start a new run."""
         self.counters.stops.forget()
 
     def measure(self) -> None:

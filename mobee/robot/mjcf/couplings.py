@@ -68,7 +68,7 @@ def actuated(compiled: Compiled) -> dict[int, list[int]]:
 
 
 def loops(compiled: Compiled) -> list[str]:
-    """Return what the file couples and this library cannot: constraints that close a loop, and couplings that are no lines."""
+    """Return descriptions of unsupported couplings: constraints that close a loop, and couplings that are not linear."""
     names, model = compiled.names["equality"], compiled.model
     closed = [f"{compiled.equality_kinds[k]} {names[k]!r}" for kind in ("connect", "weld", "tendon") for k in _active(compiled, kind)]
     bent = [f"joint {names[k]!r} (only its linear part counts)" for k in _active(compiled, "joint") if model.eq_data[k, 2:5].any()]

@@ -45,7 +45,8 @@ def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]
 def read_motor(compiled: Compiled, group: list[tuple[int, int, Drive]], home: Array, meant: bool) -> Motor:
     """Return the motor of a group of joints, each given as (joint of the robot, joint of MuJoCo, drive), the master first.
 
-    `home`: qpos. `meant`: it is that of a keyframe, and is kept even in a limit zone; else home is what is nearest outside the zones.
+    `home`: qpos. `meant`: home is from a keyframe, and is kept even in a limit zone; otherwise home is the nearest position outside the
+    zones.
     """
     _, master, _ = group[0]
     limits = joint_limits(compiled, master)

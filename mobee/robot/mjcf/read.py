@@ -138,7 +138,7 @@ def _excluded(compiled: Compiled) -> dict[frozenset[str], str]:
 
 
 def _markers(compiled: Compiled, skeleton: _Skeleton, where: dict[tuple[str, str], str]) -> dict[str, Marker]:
-    """Return a marker at each named site, on each body that is fixed to what carries it, and on each body at an end of the tree."""
+    """Return a marker at each named site, on each body that is fixed to its parent, and on each body at an end of the tree."""
     model = compiled.model
     carrying = set(model.body_parentid.tolist())
     found: dict[str, Marker] = {}

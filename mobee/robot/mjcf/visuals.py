@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an MJCF model draws, and its cameras."""
+"""The visuals and the cameras of an MJCF model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KINDS: dict[str, VisualKind] = {name: name for name in ("sphere", "capsule", "cy
 
 
 def read_visuals(compiled: Compiled, link_of: list[int]) -> tuple[Visual, ...]:
-    """Return what is drawn: of each body the geoms that cannot collide, or all if it has none of these, in the groups that are shown.
+    """Return the visuals: for each body the geoms that cannot collide, or all its geoms if all can, in the groups that are shown.
 
     The ground (planes and height fields) and geoms that are fully transparent are left out.  `link_of`: the link of each body.
     """

@@ -73,7 +73,7 @@ def _thickened(points: Array) -> Array:
 
 
 def _enclosing(vertices: Array, planes: Array, most: int) -> Array:
-    """Return at most `most` vertices of an intersection of the hull's planes (f, 4), normal and offset: n.x + d <= 0 inside."""
+    """Return at most `most` vertices of a body that encloses the hull: some of its face planes (f, 4) intersected, n.x + d <= 0 inside."""
     from scipy.spatial import HalfspaceIntersection
 
     inside = vertices.mean(axis=0)

@@ -61,7 +61,7 @@ def mesh_places(given: str, robot_file: Path) -> list[Path]:
 
 
 def mesh_name(mesh: MeshSource, path: Path) -> str:
-    """Return the name of a mesh for a robot's file at `path`: as it was if it means the same there, else from the folder of that file."""
+    """Return the name of a mesh for a robot file at `path`: unchanged if it means the same file there, else relative to that folder."""
     found = first_file(mesh_places(mesh.file, mesh.robot_file))
     same = first_file(mesh_places(mesh.file, path)) if mesh.file.partition("://")[0].lower() in PACKAGES else None
     if found is None or same is not None:

@@ -180,7 +180,7 @@ def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Co
 
 
 def _value(node: Node, joint: UrdfJoint) -> float:
-    """Return the position of a joint; for a continuous joint, it may be given as cosine and sine, or with any number of turns."""
+    """Return the position of a joint in a pose; a continuous joint may have a cosine and a sine, or any number of turns."""
     if joint.kind != "continuous":
         return bounded(node, "value")
     numbers = node.numbers("value") if "value" in node.attributes else [bounded(node, "value")]

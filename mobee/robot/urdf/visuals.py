@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads what a URDF draws: its <visual> elements. A fault in one is a warning, since the robot moves without it."""
+"""Reads the <visual> elements of a URDF. A faulty element causes only a warning, since the robot moves without it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_VISUALS = 2000
 
 
 def read_visuals(robot: Node, tree: Tree, skeleton: Skeleton) -> tuple[Visual, ...]:
-    """Return what all links draw; warns, in one line each, of elements that cannot be drawn."""
+    """Return the visuals of all links; warns, in one line each, of elements that cannot be drawn."""
     materials = _materials(robot)
     found: list[Visual] = []
     for link, index in skeleton.index.items():

@@ -61,7 +61,7 @@ class Place:
 
 
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
-    """Return the place inside a link or joint; `name`: its name in reasons."""
+    """Return the place inside a link or joint; `name`: of the element, in the reasons for excluded pairs."""
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:
         draft.hands[index] = name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes <visual> and <camera> tags: what is drawn of a link, and where its cameras are."""
+"""Reads and writes the <visual> and <camera> tags of links."""
 
 from __future__ import annotations
 

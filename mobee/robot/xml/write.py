@@ -28,8 +28,8 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a zero-position XML file (robots/README.md) and return its path.
 
     Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses, clauses, visuals and cameras; meshes stay where
-    they are, and the file names them. Shapes may come in another order, and a
-    convex one with its axes along the root frame's. Raises InvalidValue for a joint that no motor or more than one drives.
+    they are, and the file names them. The order of shapes may differ, and the axes of a convex shape are then those of the root frame.
+    Raises InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName=robot.name, adjacency="listed")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the agents do, expect and know, in words and numbers for people."""
+"""Describes the actions, expectations and knowledge of the agents, in words and numbers for users."""

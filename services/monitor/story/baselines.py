@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What random and least-tried exploration would know after as many transitions, simulated on what an agent has learned."""
+"""Simulates random and least-tried exploration with the outcomes that an agent has learned, to compare it with them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Outcomes:
 def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
     """Return the outcomes that an agent has seen, with their shares.
 
-    An action that it has not tried reaches its goal with the share of all its tries that did, and else stays.
+    An untried action reaches its goal with the success rate of all the agent's tries; otherwise it stays in its state.
     """
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
     (count, actions), missed = known.tries.shape, np.zeros(known.tries.shape)
@@ -58,9 +58,9 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
 
 
 def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transitions: int) -> dict[str, Curve]:
-    """Simulate the explorers BASELINES from a state on; returns the curve of each.
+    """Simulate the explorers BASELINES, each from the state `start`; return the curve of each.
 
-    `exists`: (S, A), which are state-actions at all.
+    `exists`: (S, A), True where a state has an action.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an agent knows and what is left to learn, from its `Learned` messages."""
+"""Measures an agent's knowledge, and how much it can still learn, from its `Learned` messages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mobee.learning.space import Space
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Numbers of all state-actions of an agent, (S, A): tries, last information gain [nats], value, and which are state-actions at all.
+    """Numbers of all state-actions of an agent, (S, A): tries, last information gain [nats], value, and where a state has an action.
 
     `usual`: share of its most frequent outcome.  `n`: transitions.  `state`: where the agent is.
     """
@@ -41,7 +41,10 @@ class Knowledge:
         return float(((self.tries >= PREDICTABLE_TRIES) & (self.usual >= PREDICTABLE_SHARE))[self.exists].mean())
 
     def left(self, first: float) -> Array:
-        """Return how much is left to learn in each state, (S,) in 0..1: the mean information gain of its actions over the `first` one."""
+        """Return how much can still be learned in each state, (S,) in 0..1.
+
+        It is the mean information gain of the state's actions, divided by the gain `first` of a first try.
+        """
         gain = np.where(self.exists, self.reward, 0.0).sum(axis=1) / np.maximum(self.exists.sum(axis=1), 1)
         left: Array = np.clip(gain / max(first, 1e-12), 0.0, 1.0)
         return left

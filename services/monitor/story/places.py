@@ -38,7 +38,7 @@ class Spot:
 
 
 def shown_spot(robot: Robot, part: str) -> Spot | None:
-    """Return the marker with the fewest motors of other parts before it, of equal ones the farthest; without markers the last link.
+    """Return the marker with the fewest motors of other parts before it, among equals the farthest; without markers, the last link.
 
     That is an arm's palm, and a torso's head; None if the part moves no link.
     """

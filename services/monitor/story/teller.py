@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the story of every agent from its messages, as plain data for the page."""
+"""Collects the story of every agent from its messages, as plain data for the page."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ GROWTH = 1.1  # in transitions, after which the baselines are simulated again: t
 
 @dataclass
 class _Agent:
-    """What is known of one agent."""
+    """The data of one agent that were received so far."""
 
     part: str
     color: Color
@@ -59,7 +59,7 @@ class _Agent:
 
 
 class Teller:
-    """The agents' stories; `changed` holds the names of the board's values that are to be put again."""
+    """The agents' stories; `changed` holds the names of the values that must be put on the board again."""
 
     def __init__(self, robot: Robot, colors: dict[str, Color]) -> None:
         """`colors`: of all parts."""
@@ -74,14 +74,14 @@ class Teller:
         return [part for part in self._colors if part in self._agents]
 
     def forget_run(self) -> None:
-        """A new run of the robot: actions under way are void."""
+        """Discard the actions in progress, at the start of a new run of the robot."""
         for agent in self._agents.values():
             agent.decision = agent.reach = None
         self._playback = None
         self.changed |= {"cards", "path"}
 
     def note_decision(self, seen: Decision) -> None:
-        """An agent begins an action."""
+        """Store the action that an agent begins."""
         agent = self._agent(seen.agent)
         if agent is not None:
             self._drop_playback()
@@ -89,7 +89,7 @@ class Teller:
             self.changed |= {"cards", "left"}
 
     def note_transition(self, seen: Transition) -> None:
-        """An action has ended."""
+        """Store the outcome of an action that has ended."""
         agent = self._agent(seen.agent)
         if agent is not None:
             agent.last = seen
@@ -99,7 +99,7 @@ class Teller:
             self.changed.add("cards")
 
     def note_learned(self, learned: Learned) -> None:
-        """An agent reports what it knows."""
+        """Store the knowledge that an agent has published."""
         agent = self._agent(learned.agent)
         if agent is None:
             return
@@ -120,7 +120,7 @@ class Teller:
         self.changed |= {"cards", "left", "curves"}
 
     def note_reach(self, part: str, reach: Reach) -> None:
-        """A part reaches, or has reached."""
+        """Store that a part reaches, or has reached."""
         agent = self._agent(part)
         if agent is not None and agent.reach != reach:
             self._drop_playback()

@@ -28,9 +28,9 @@ def title_of(name: str) -> str:
 
 
 def joint_words(name: str, part: str, robot: Robot) -> str:
-    """Return the name of a motor without what says nothing: l_shoulder_pitch of left_arm is "shoulder pitch", panda_joint1 "joint 1".
+    """Return the name of a motor without redundant words: l_shoulder_pitch of left_arm is "shoulder pitch", panda_joint1 "joint 1".
 
-    It loses the part, the side, or the beginning that all motors of the robot share.
+    The words of the part and the side are removed, or the beginning that all motors of the robot share.
     """
     shared = os.path.commonprefix(robot.motors)
     for prefix in (f"{part}_", *SIDES, shared[: shared.rfind("_") + 1]):
@@ -55,7 +55,7 @@ def listed(words: Sequence[str]) -> str:
 def displacement(way: Array, robot: str) -> str:
     """Describe how a hand moves by `way` (3,) m, by its main directions: "12 cm up and forward"; empty if it hardly moves.
 
-    The robots of the iCub's family have a front; the axes of the root frame are named for others.
+    For robots of the iCub's family the directions are those of the body, such as forward; for others, the axes of the root frame.
     """
     length = float(np.linalg.norm(way))
     if length < SHORTEST:
@@ -89,7 +89,7 @@ def _amount(space: Space, index: int, turn: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as whole percent, never 0 % or 100 % for what is neither."""
+    """Return a share as whole percent; 0 % and 100 % only where the share is exactly that."""
     rounded = round(100 * share)
     if rounded == 0 and share > 0.0:
         return "under 1 %"

@@ -22,7 +22,7 @@ SMALLEST = 0.1  # m
 
 
 def extent_of(robot: Robot) -> tuple[Array, float]:
-    """Centre (3,) and diameter [m] of the robot at home."""
+    """Return centre (3,) m and diameter [m] of the robot at home."""
     transforms = link_transforms(robot, np.clip(robot.home, *robot.limits.T))
     links = [shape.link for shape in robot.shapes] + [joint.parent for joint in robot.joints]
     places = [shape.position for shape in robot.shapes] + [joint.point for joint in robot.joints]
@@ -89,7 +89,7 @@ def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
 
 
 def _motion(parts: Sequence[str]) -> rrb.Grid:
-    """Positions and goals of the joints, and the forces."""
+    """Return the view of the joints' positions and goals, and of the forces."""
     plots = [_plot(f"{part.replace('_', ' ')}: state and goal (thin), rad", f"plots/joints/{part}") for part in parts]
     return rrb.Grid(*plots, _plot("forces, rad/s²", "plots/forces"), name="motion")
 
@@ -104,7 +104,7 @@ def _learning() -> rrb.Vertical:
 
 
 def _spaces(parts: Sequence[str]) -> rrb.Horizontal:
-    """One column for each agent: its state space, with surprising actions coloured, and bar charts of all state-actions."""
+    """Return one column for each agent: its state space, with surprising actions coloured, and bar charts of all state-actions."""
     shares = [1.0 if part == "torso" else 1.4 for part in parts]
     return rrb.Horizontal(*(_agent(part) for part in parts), column_shares=shares, name="states")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws a robot: its visuals and shapes are logged once, then one transform a link."""
+"""Draws a robot: its visuals and shapes are logged once, then one transform per link."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from services.monitor.web.surfaces import flat
 def drawn(
     kind: ShapeKind, size: tuple[float, ...], position: Array, rotation: Array, color: Rgba, vertices: Array | None = None
 ) -> rr.AsComponents:
-    """The volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
+    """Return the volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
     w, x, y, z = quaternion_from_matrix(rotation)
     turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
     if kind == "convex":
@@ -54,13 +54,13 @@ def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
 
 
 def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
-    """The hull of points (v, 3) with flat faces."""
+    """Return the hull of points (v, 3) as a mesh with flat faces."""
     corners, normals, triangles = flat(facets(points))
     return rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, vertex_normals=normals, albedo_factor=color)
 
 
 def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
-    """Yield the name of an entity and what it is, for solids of one link at zero pose; all its opaque meshes are one."""
+    """Yield name and components of each Rerun entity for solids of one link at zero pose; all its opaque meshes are one entity."""
     opaque = [one.solid for one in solids if one.solid.mesh is not None and one.solid.opacity >= 1.0]
     if opaque:
         yield "mesh", _joined(opaque)
@@ -100,9 +100,9 @@ PUSH, LONGEST = 5.0, 0.15  # length of a contact's arrow: in depths, and at most
 
 
 class Figure:
-    """Logs a robot and its world to a stream, then poses as time goes on.
+    """Logs a robot and its world to a stream, then its poses over time.
 
-    A link is shown as its file draws it, and its solids while they touch; `solids`: always as its solids.
+    A link is shown by its visuals, and its solids while they touch; `solids`: always by its solids.
     """
 
     def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None, solids: bool = False) -> None:
@@ -127,7 +127,7 @@ class Figure:
             self._log_markers(link)
 
     def move(self, begin: float, rate: float, poses: Array) -> None:
-        """The robot in poses (k, n) rad, the first at `begin` [s] and then `rate` a second, with what touches in each."""
+        """Log the robot in poses (k, n) rad with their contacts: the first at `begin` [s], then `rate` poses per second."""
         times = begin + np.arange(len(poses)) / rate
         transforms = link_transforms(self._robot, poses)
         turns = quaternion_from_matrix(transforms[..., :3, :3])[..., [1, 2, 3, 0]]
@@ -208,7 +208,7 @@ class Figure:
         return ["robot", self._robot.links[shape.link], f"{shape.role}s", shape.name]
 
     def _log(self, path: list[object], what: rr.AsComponents) -> None:
-        """Log at time 0: it is shown from the beginning, until it is logged again with another colour."""
+        """Log components at time 0: they are shown from the beginning, until they are logged again with another colour."""
         self._stream.set_time(TIMELINE, duration=0.0)
         self._stream.log(path, what)
 

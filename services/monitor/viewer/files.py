@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gets the files of Rerun's viewer for browsers out of Rerun's program, which its wheel brings."""
+"""Extracts the files of Rerun's browser viewer from Rerun's program, which is a part of its wheel."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def program() -> Path:
 
 
 class ViewerFiles:
-    """The viewer's files in a folder, where they are put when the first is asked for."""
+    """The viewer's files in a folder, extracted at the first request."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._lock = folder, Lock()
@@ -41,7 +41,7 @@ class ViewerFiles:
         return self._folder / name
 
     def _extract(self) -> None:
-        """Let the program serve its files on loopback for a moment, without usage data and settings of the user."""
+        """Run the program's web server on loopback for a moment, without usage data and user settings, and copy its files."""
         private = {**os.environ, "RUST_LOG": "off", "XDG_CONFIG_HOME": str(self._folder), "XDG_DATA_HOME": str(self._folder)}
         subprocess.run([program(), "analytics", "disable"], env=private, capture_output=True, check=True, timeout=TIMEOUT)
         web, data = _free_ports()
@@ -71,7 +71,7 @@ def _download(url: str, to: Path) -> None:
 
 
 def _free_ports() -> tuple[int, int]:
-    """Two free ports on the loopback interface."""
+    """Return two free ports on the loopback interface."""
     with socket.socket() as first, socket.socket() as second:
         for probe in (first, second):
             probe.bind(("127.0.0.1", 0))

@@ -50,10 +50,10 @@ class _Part:
 
 
 class Frames:
-    """A stream that logs to a file, if there is one, and for open viewers keeps what they need.
+    """A stream that logs to a file, if there is one, and keeps the data that open viewers still need.
 
-    What is static is kept for all; changes are kept up to a size; of the updates of the robot's pose only the newest is kept, and it is
-    made only if a viewer waits for one. The file gets every fourth update.
+    Static data are kept for all viewers; changes are kept up to a size. Of the updates of the robot's pose only the newest is kept, and it
+    is made only if a viewer waits for one. The file gets every fourth update.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
@@ -72,7 +72,7 @@ class Frames:
         self._time = 0.0
 
     def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
-        """Log to the file, and for viewers."""
+        """Log components to the file, and for viewers."""
         if self._file is not None and (self._is_recorded or not self._is_in_update):
             self._file.log(path, *what, static=static)
         if static:
@@ -84,19 +84,19 @@ class Frames:
             self._update.log(path, *what, static=False)
 
     def set_time(self, timeline: str, seconds: float) -> None:
-        """Set the time of what is logged next."""
+        """Set the time of all following logs."""
         self._time = seconds
         for stream in (self._file, self._changes.stream, self._update.stream):
             if stream is not None:
                 stream.set_time(timeline, duration=seconds)
 
     def close(self) -> None:
-        """Discard what no viewer has asked for; nothing can be logged afterwards."""
+        """Discard the data that no viewer has requested; nothing can be logged afterwards."""
         for part in (self._static, self._changes, self._update):
             part.close()
 
     def begin_update(self) -> bool:
-        """Begin an update: what is logged until `end_update` shows the whole robot; returns whether a viewer or the file needs it."""
+        """Begin an update of the whole robot, which `end_update` completes; returns whether a viewer or the file needs it."""
         self._is_in_update = True
         self._is_recorded = self._file is not None and self._updates % RECORDED == 0
         self._updates += 1
@@ -105,7 +105,7 @@ class Frames:
         return self._is_wanted or self._is_recorded
 
     def end_update(self) -> None:
-        """Give the update, and all changes since the one before, to the viewers that wait."""
+        """Send the update, and all changes since the one before, to the viewers that wait."""
         self._is_in_update = False
         if not self._is_wanted:
             return
@@ -123,7 +123,7 @@ class Frames:
             self._published.notify_all()
 
     def newest(self, after: int, patience: float) -> bytes:
-        """Return what a viewer needs that has shown frame `after`, waiting for a newer one; any thread may call this.
+        """Return the data for a viewer that has shown frame `after`; waits for a newer frame. Any thread may call this.
 
         Bytes: number of the frame (uint64) and its time (float64, s), then pieces, each with its length (uint32) before it; all
         little-endian.  Without a newer frame there are no pieces.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows what agents learn: the state space with its uncertain actions; rewards, values and tries."""
+"""Draws the learning of agents: the state space with its uncertain actions; rewards, values and tries."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ QUANTITIES = ("tries", "reward", "value")
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A space as it is drawn: where its states are, (S, 2), and which entries of (S, A) are state-actions."""
+    """The drawing of a space: positions of its states, (S, 2), and which entries of (S, A) are state-actions."""
 
     space: Space
     places: Array
@@ -46,10 +46,7 @@ class Learning:
         self._made_from: dict[str, str] = {}
 
     def log(self, part: str, learned: Learned) -> None:
-        """The space, arrows, and bars of an agent.
-
-        Nothing is drawn of a space that is too large, or that this robot cannot make, nor of numbers that do not fit it.
-        """
+        """Log the space, the arrows, and the bars of an agent."""
         if len(learned.tries) > 4 * MAX_DRAWN:
             self._leave_out(part, learned)
             return
@@ -75,7 +72,7 @@ class Learning:
         self._log_states(f"{path}/space/states", drawn, best, learned.s)
 
     def log_step(self, part: str, seen: Transition) -> None:
-        """The newest transition: where it was meant to go, and where it went."""
+        """Log the newest transition: one arrow to its goal, and one to its outcome."""
         drawn = self._drawn.get(part)
         if drawn is None or max(seen.s, seen.goal, seen.s_next) >= len(drawn.places):
             return
@@ -98,21 +95,21 @@ class Learning:
             self._stream.log("events", rr.TextLog(text, level="INFO"))
 
     def _log_states(self, path: str, drawn: Drawn, best: Array, here: int) -> None:
-        """States, larger with larger value; the agent's present state is white."""
+        """Log the states, larger with larger value; the agent's present state is white."""
         span = np.ptp(best)
         radii = MIN_RADIUS + (MAX_RADIUS - MIN_RADIUS) * ((best - best.min()) / span if span > 0.0 else np.zeros(len(best)))
         colors = [(255, 255, 255) if state == here else (150, 160, 176) for state in range(len(best))]
         self._stream.log(path, rr.Points2D(drawn.places, radii=radii, colors=colors))
 
     def _log_surprises(self, path: str, drawn: Drawn, found: list[tuple[int, int, int, float]]) -> None:
-        """One colour a state-action, as in the paper's figure 7; the width is the probability."""
+        """Log the surprises in one colour per state-action, as in the paper's figure 7; the width is the probability."""
         colors = [(*palette.JOINTS[(7 * s + a) % len(palette.JOINTS)], 255) for s, a, _, _ in found]
         widths = [MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * share for *_, share in found]
         states, ends = (np.array([one[k] for one in found], dtype=np.intp) for k in (0, 2))
         self._arrows(path, drawn, states, ends, widths, colors)
 
     def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: float | list[float], colors: Rgba | list[Rgba]) -> None:
-        """Arrows between states; one that stays in its state is a dot beside it."""
+        """Return arrows between states; one that stays in its state is a dot beside it."""
         start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
         length = np.linalg.norm(way, axis=1, keepdims=True)
         unit = np.divide(way, length, out=np.full_like(way, 0.7), where=length > 0.0)

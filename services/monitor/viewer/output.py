@@ -34,14 +34,14 @@ RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
 
 
 class NoControls:
-    """The controls of a page before the monitor is on the bus, and of one that shows the past."""
+    """Controls that refuse all commands: of a page before the monitor is on the bus, and of a replay."""
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
         """Refuse."""
         raise Refused("the page cannot do that now")
 
     def tend(self, open_pages: set[str]) -> None:
-        """There is nothing to give back."""
+        """Do nothing: no part was taken."""
 
 
 class LaterControls:
@@ -61,7 +61,7 @@ class LaterControls:
 
 @dataclass(frozen=True)
 class Output:
-    """Where the monitor shows what it sees: the 3D view and the recording (`frames`), the page's values (`board`), the page itself."""
+    """The outputs of the monitor: the 3D view and the recording (`frames`), the values of the page (`board`), and the page itself."""
 
     frames: Frames
     board: Board
@@ -125,7 +125,7 @@ def _key_of(folder: Path | None) -> str:
 
 
 def serve(site: Site, bind: str, port: int) -> PageServer:
-    """Serve a page; exits with code 2 and one line if the port cannot be used, after a second: one that has just ended may hold it."""
+    """Serve a page; exits with code 2 and one line if the port stays in use for a second: a program that has just ended may hold it."""
     give_up = time.monotonic() + 1.0
     while True:
         try:

@@ -19,7 +19,7 @@ LEARNED = ("reward", "value", "transitions")
 
 
 class Plots:
-    """Logs numbers to a stream under plots/; few entities with many series each, because a recording pays by the entity."""
+    """Logs numbers to a stream under plots/; few entities with many series each, because each entity makes a recording larger."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
@@ -39,13 +39,13 @@ class Plots:
                 self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
 
     def log_motion(self, part: str, motion: Motion) -> None:
-        """State and goal of a part; parts without a plot are left out."""
+        """Log positions and goal of a part; parts without a plot are left out."""
         if part not in self._parts:
             return
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
-        """Norms over the whole robot, together with those of the other sender's terms."""
+        """Log the norms of the forces over the whole robot, together with those of the other sender's terms."""
         known = len(self._strengths)
         self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}
         if len(self._strengths) > known:
@@ -53,7 +53,7 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Reward, value and number of a transition; of a part without a plot nothing."""
+        """Log reward, value and number of a transition; nothing for a part without a plot."""
         if part not in self._parts:
             return
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):

@@ -21,7 +21,7 @@ from services.monitor.viewer.frames import Frames
 
 
 class Links:
-    """Logs what is drawn of each link to a stream under robot/, once; then one transform a link."""
+    """Logs the visuals of each link to a stream under robot/ once; then one transform per link."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
@@ -33,7 +33,7 @@ class Links:
                 stream.log(path, rr.CoordinateFrame(frame), body, static=True)
 
     def move(self, transforms: Array) -> None:
-        """The links as they are now; `transforms`: (L, 4, 4), from link_transforms."""
+        """Log the present transforms (L, 4, 4) of the links, as link_transforms returns them."""
         turns = quaternion_from_matrix(transforms[:, :3, :3])[:, [1, 2, 3, 0]]
         for link, frame in self._frames.items():
             place = rr.Transform3D(
@@ -66,12 +66,12 @@ class Scene:
         self._fields = [shape for shape in self._robot.shapes if shape.role == "field"] if shown else []
 
     def forget(self) -> None:
-        """A new run: trails end."""
+        """End the trails, at the start of a new run."""
         for trail in self._trails.values():
             trail.clear()
 
     def log_robot(self, q: Array, contacts: list[ContactItem]) -> None:
-        """The robot at q (n,) rad; fields named in a contact are red."""
+        """Log the robot at q (n,) rad; fields named in a contact are red."""
         transforms = link_transforms(self._robot, q)
         self._links.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
@@ -89,7 +89,7 @@ class Scene:
             self.log_object(thing)
 
     def log_object(self, thing: ObjectState | WorldObject) -> None:
-        """An object where it is believed to be."""
+        """Log an object at its position in the model's world."""
         self._objects[thing.name] = thing
         color = palette.of_object(thing.geometry.kind, thing.role)
         turn = matrix_from_quaternion(np.array(thing.quaternion))
@@ -170,7 +170,7 @@ class Poses:
         stream.log("scene/poses", rr.CoordinateFrame(ROOT), static=True)
 
     def note(self, q: Array) -> None:
-        """The robot at q (n,) rad when an action has ended."""
+        """Add the pose q (n,) rad in which an action has ended."""
         transforms = link_transforms(self._robot, q)
         for part, (joint, markers) in self._chains.items():
             shoulder = self._robot.joints[joint]

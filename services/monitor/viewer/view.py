@@ -30,14 +30,14 @@ TOGETHER = 12.0  # s for all
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A stretch of the motion: what moves in it, and its poses (k, n) rad."""
+    """A section of the motion: a description of what moves, and the poses (k, n) rad."""
 
     title: str
     poses: Array
 
 
 def sweep(robot: Robot) -> list[Stretch]:
-    """One stretch a motor, home -> minimum -> maximum -> home, then one in which all move at once; each begins and ends at home."""
+    """Return a section per motor, home -> minimum -> maximum -> home, and one in which all move at once; each begins and ends at home."""
     low, high = robot.limits.T
     home = np.clip(robot.home, low, high)
     stretches = []
@@ -60,7 +60,7 @@ def _reach(robot: Robot, motor: Motor) -> str:
 
 
 def _there_and_back(count: int, home: float, low: float, high: float) -> Array:
-    """From home to low, to high and back, (count,) rad, at rest where it turns."""
+    """Return positions (count,) rad from home to low, to high and back, with velocity 0 at each turn."""
     turns = np.array([home, low, high, home])
     share = np.linspace(0.0, 3.0, count)
     leg = np.minimum(share.astype(int), 2)
@@ -69,7 +69,7 @@ def _there_and_back(count: int, home: float, low: float, high: float) -> Array:
 
 
 def _together(count: int, home: Array, low: Array, high: Array) -> Array:
-    """Every motor swings between its limits at a pace of its own."""
+    """Return positions of a motor that oscillates between its limits, each motor at its own pace."""
     time = np.linspace(0.0, 1.0, count)[:, None]
     swings = 2 + np.arange(len(home)) % 3
     wave = np.sin(2.0 * np.pi * swings * time)
@@ -89,8 +89,8 @@ def view(
 ) -> None:
     """Show a motion on a page until the user interrupts, or save it to a file.
 
-    `tell` is called with the page's address when all data is there.  `stretches`: of the motion, RATE poses a second; None: a sweep
-    through all that the robot can do.  `solids`: show the solids in place of what the file draws.
+    `tell` is called with the page's address when all data are logged.  `stretches`: of the motion, RATE poses a second; None: a sweep
+    through the ranges of all motors.  `solids`: show the solids in place of what the file draws.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
@@ -118,7 +118,7 @@ def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretche
 
 
 def layout(robot: Robot) -> rrb.Blueprint:
-    """The robot large, its motors, contacts and what happens on the right, time below."""
+    """Return the layout: the robot large, its motors, contacts and events on the right, time below."""
     eye, centre = eye_of(robot)
     scene = rrb.Spatial3DView(
         origin="/",
