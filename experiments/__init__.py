@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One readable file a claim: the claim, its source, the published number, the run that tests it."""
+"""One readable file per claim: the claim, its source, the published number, and the run that tests it."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee doctor`: checks this machine and this installation, and names the command that mends what does not work."""
+"""`mobee doctor`: checks this machine and this installation, and names a command that repairs each fault."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what the options ask for."""
+    """Replay the run as the options say."""
     place: Path = arguments.run
     if not place.exists():
         raise UserError(f"{place}: there is no such folder or recording; runs of `mobee launch` are in runs/", BAD_INPUT)

@@ -13,7 +13,7 @@ STEP = 2  # spaces that a level is farther in
 
 
 def results_text(results: Mapping[str, Any], width: int) -> str:
-    """Results, of the types that JSON has, in lines of at most `width` characters where words allow it."""
+    """Return results, of the types that JSON has, in lines of at most `width` characters as far as words allow it."""
     return "\n".join(_entries(results, "", width))
 
 
@@ -60,7 +60,7 @@ def _needed(rows: Sequence[Sequence[str]]) -> int:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Cells side by side, each as wide as the widest of its column."""
+    """Return lines of cells side by side, each cell as wide as the widest of its column."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [(" " * GAP).join(cell.ljust(wide) for cell, wide in zip(row, widths, strict=True)) for row in rows]
 
@@ -68,7 +68,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 def _table(
     labels: Sequence[str], rows: Sequence[Mapping[str, Any]], columns: Sequence[str], indent: str, width: int, head: str = ""
 ) -> Iterator[str]:
-    """A row a result, over it the names of what is in its columns, a word a line; `head`: that of what the labels are."""
+    """Yield a row per result, below the names of its columns, one word per line; `head`: the name of the labels."""
     stub = len(indent) + max(map(len, [head, *labels]))
     cells = {name: [_cell(row.get(name)) for row in rows] for name in columns}
     widths = {name: max(map(len, [*_words(name).split(), *cells[name]])) for name in columns}
@@ -84,7 +84,7 @@ def _table(
 
 
 def _blocks(columns: Sequence[str], widths: Mapping[str, int], room: int) -> Iterator[list[str]]:
-    """Columns that fit side by side; those that do not go into a further table."""
+    """Yield groups of columns that fit side by side, one group for each table."""
     block: list[str] = []
     taken = 0
     for name in columns:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two checkouts in one run: how much processor time the same work costs in each.
+"""Compares two checkouts in one run: the processor time of the same work in each.
 
-In a round of a case each checkout runs in a fresh process; both prepare the case and do its work once, which does not count, and then by
+In a round of a case each checkout runs in a fresh process; both prepare the case and do its work once without timing, and then by
 turns (old, new, new, old, ...).  Processor time is counted, so other programs on the machine matter little.  The ratio of a round is
 that of the sums; the verdict rests on the median of the rounds.
 """

@@ -128,7 +128,7 @@ def _three_agents() -> Work:
 
 
 def _chapter_8() -> Work:
-    """1/64 of a run of each strategy: of its 3000 transitions, its 6400 tries and its evaluations."""
+    """Measure 1/64 of a run of each strategy: of its 3000 transitions, its 6400 tries and its evaluations."""
     arm = _first("experiments.kit.reaching.arm", "experiments.reaching.scene")
     learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
     targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")

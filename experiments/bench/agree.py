@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live system in lockstep beside the offline plant: whether two programs compute the same motions.
+"""Compares the live system in lockstep with the offline plant: both must compute the same motions.
 
 Claim: on the motor model, encoder noise included, every action of three curious agents ends at the same tick, in the same state and
 within 1e-9 rad of the same posture in both.  Run time: about 30 s for 100 actions.

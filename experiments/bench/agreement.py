@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts of the model beside those of its peers: whether they are the same, and whether depths are right and minimal.
+"""Compares the contacts of the model with those of its peers: the same pairs, and depths that are right and minimal.
 
 Two programs may differ on whether a pair touches that overlaps by less than MIN_OVERLAP.  A depth is *right* if it is how far the first
-volume must move along the normal until a plane separates the two; it is *minimal* if no peer knows a direction in which that is less.
-`separation` computes both, so a peer whose own depths are not minimal (MuJoCo's contact points, the iterative searches of coal and fcl
-where cylinders meet) can be used all the same.
+volume must move along the normal until a plane separates the two; it is *minimal* if no peer gives a direction in which a shorter motion
+separates the volumes. `separation` computes both, so a peer whose own depths are not minimal (MuJoCo's contact points, the iterative
+searches of coal and fcl where cylinders meet) can be used all the same.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Place = tuple[Array, Array]
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """The model beside one peer, over all poses."""
+    """Comparison of the model with one peer, over all poses."""
 
     peer: str
     scene: str
@@ -78,7 +78,7 @@ class ModelContacts:
         return separation(first, at, second, there, direction)
 
     def depth_error(self) -> float:
-        """Return by how much a depth differs from the separation along its normal, at most [m]."""
+        """Return the largest difference [m] between a depth and the separation along its normal."""
         return max(
             (
                 abs(self.separation(at, pair, normal) - depth)

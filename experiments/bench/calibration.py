@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The calibration loop: fixed work, none of it MoBeE's, with which times are compared that have no peer.
+"""The calibration loop: fixed work without MoBeE, the measure for times that cannot be compared with a peer.
 
-A third of its time each goes to Python (calls, a dictionary, floating point numbers), to NumPy on arrays of a few numbers and to NumPy on
-arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is measured
-here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time, so
+One third of its time each is spent on Python (calls, a dictionary, floating point numbers), on NumPy with arrays of a few numbers, and on
+NumPy with arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is
+measured here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time, so
 they are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.
 
 For work of several processes at once there is a `Crew`: helper processes that do the same loop.
@@ -86,7 +86,7 @@ def speed(loops: int = 3) -> float:
 
 
 class Calibration:
-    """Measures the speed of this machine before and after other measurements, at most twice a second."""
+    """Measures the speed of this machine before and after other measurements, at most twice per second."""
 
     def __init__(self, measure_speed: Callable[[], float] = speed) -> None:
         """`measure_speed`: by default of this process."""
@@ -138,11 +138,11 @@ class Crew:
         return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
     def exchanges(self, count: int = 5) -> float:
-        """Return the speed where each portion is requested and answered by a message, and the next one waits for all answers."""
+        """Return the speed if each portion is requested and answered by a message, and the next one waits for all answers."""
         return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 
     def _request(self, message: bytes, times: int, count: int) -> float:
-        """Return the median wall time [s] of `count` times sending the message `times` times to all helpers and awaiting answers."""
+        """Return the median wall time [s] of `count` measurements: `times` messages to all helpers, each answered by all of them."""
         seconds = []
         for _ in range(count):
             start = time.perf_counter()

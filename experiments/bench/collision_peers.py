@@ -98,7 +98,7 @@ class CoalPeer:
     """A robot and the objects of a world as Pinocchio's models, with the same tested pairs."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
-        """Raises NotInstalled; Pinocchio brings coal."""
+        """Build the models; raises NotInstalled if coal, which is installed with Pinocchio, is missing."""
         coal, pinocchio = (import_peer(module, "coal", extra="dev") for module in ("coal", "pinocchio"))
         self._pin, self._coupling = pinocchio, robot.coupling
         first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)

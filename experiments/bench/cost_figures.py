@@ -79,7 +79,7 @@ def _measured(points: list[tuple[str, float]]) -> Iterator[Iterator[tuple[str, f
 
 
 def model_costs(quick: bool, rounds: int | None = None, poses: int = 500) -> Curves:
-    """Return medians [us a pose] against the number of boxes and of primitives; raises NotInstalled without MuJoCo."""
+    """Return medians [us per pose] against the number of boxes and of primitives; raises NotInstalled without MuJoCo."""
     rounds = rounds or (3 if quick else 9)
     curves: Curves = {"boxes": {}, "primitives": {}}
     points: list[tuple[str, float]] = [("boxes", size) for size in BOXES]
@@ -108,7 +108,7 @@ def draw_model_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
 
 
 def _counts_axis(axes: Any, counts: tuple[int, ...]) -> None:
-    """A logarithmic axis for counts from 0 to 1000."""
+    """Set a logarithmic axis for counts from 0 to 1000."""
     axes.set_xscale("symlog", linthresh=3)
     axes.set_xlim(-0.5, 1400)
     axes.minorticks_off()
@@ -116,7 +116,7 @@ def _counts_axis(axes: Any, counts: tuple[int, ...]) -> None:
 
 
 def plant_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Return the processor time of one arm against tick and number of objects: us a tick, and ms a second of plant time."""
+    """Return the processor time of one arm against tick and number of objects: us per tick, and ms per second of plant time."""
     curves: Curves = {"tick": {}, "objects": {}}
     points: list[tuple[str, float]] = [("tick", dt) for dt in TICKS]
     with _measured(points + [("objects", count) for count in OBJECTS]) as sizes:
@@ -147,7 +147,7 @@ def draw_plant_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
 
 
 def plan_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Return medians [us a plan] against the number of states and the discount; raises NotInstalled without quantecon."""
+    """Return medians [us per plan] against the number of states and the discount; raises NotInstalled without quantecon."""
     curves: Curves = {"states": {}, "discount": {}}
     known = vi.after_transitions(1000, 50)
     points: list[tuple[str, float]] = [("discount", at) for at in DISCOUNTS]

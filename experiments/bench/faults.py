@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live system under schedules of faults: time until parts hold, time until all are back, and lost or mixed transitions.
 
-Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine
-that does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, doubled or mixed; no motor
-is faster than the gate allows.  Each schedule is drawn from its number and performed on one running system; one that breaks a promise is
-shrunk.  Times are judged only if the load was low; the load is part of the result.  Run time: about 20 s for each schedule.
+Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine that
+does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, doubled or mixed; no motor is
+faster than the gate allows.  Each schedule is drawn from its number and performed on one running system; from one that breaks a promise,
+faults are removed as long as it still does.  Times are judged only if the load was low; the load is part of the result.  Run time: about 20
+s for each schedule.
 """
 
 from __future__ import annotations
@@ -101,7 +102,7 @@ class _DisturbedSystem:
 
 
 def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[Fault, float, float]]:
-    """Yield each fault whose effect can be told from that of others, with its time and the time until which it is alone."""
+    """Yield each fault whose effect can be distinguished from that of others, with its time and the time until which it is alone."""
     for n, (fault, at) in enumerate(zip(schedule, times, strict=True)):
         following = times[n + 1] if n + 1 < len(times) else at + 10.0
         earlier = max((times[i] + schedule[i].duration for i in range(n)), default=0.0)

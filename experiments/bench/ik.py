@@ -110,7 +110,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _three_digits(value: float) -> str:
-    """Three significant digits, and no fewer than those before the point."""
+    """Return a value as text with three significant digits, but with all digits before the decimal point."""
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 

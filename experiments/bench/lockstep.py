@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live system in lockstep: how much faster than real time it runs, on the motor model alone, on PyBullet and on MuJoCo.
 
-Claim: robot_sim, model, controller and three agents, each a process, make at least 15 s of robot time a second on the motor model
+Claim: robot_sim, model, controller and three agents, each a process, simulate at least 15 s of robot time per second on the motor model
 and 10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured in
 messages between processes that work a little at each.  Run time: six runs of `seconds` each and their start.
 """

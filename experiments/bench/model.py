@@ -66,7 +66,7 @@ QUICK = Settings(rounds=5, poses=500, other_poses=200, compared_poses=50)
 
 
 def _ratio_requirement(robot: str, ours: str, objects: int, at_least: float, aim: float | None = None, peer: str = "mujoco") -> Requirement:
-    """A bound on a rate of ours as a multiple of a peer's, both of the same round."""
+    """Return a bound on a rate of ours as a multiple of a peer's, both of the same round."""
     shown = "MuJoCo" if peer == "mujoco" else "python-fcl"
     table = () if robot == ICUB else ("others", robot)
     return Requirement(f"{robot}, {ours}, {objects}: x {shown}", (*table, f"times_{peer}", objects, ours), at_least, aim=aim)
@@ -147,7 +147,7 @@ def summarized(
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
-    """Return all that is timed on the iCub, in the same world and the same poses."""
+    """Return all contestants on the iCub, in the same world and the same poses."""
     from experiments.bench.collision_peers import FclPairs, FclTrees  # raises NotInstalled without python-fcl
 
     scene = Scene(ICUB, robot, boxes_world(boxes), upper_body_poses(poses))

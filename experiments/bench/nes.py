@@ -62,7 +62,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def _row(name: str, d: int, runs: int) -> dict[str, Any]:
-    """Median evaluations of every strategy, infinite where most runs fail, and the strategy's own time for one."""
+    """Return the median evaluations of every strategy, infinite where most runs fail, and the strategy's own time for one."""
     row: dict[str, Any] = {"function": name, "dimensions": d}
     for strategy in ("nes", "cma", "xnes") if d <= XNES_MAX_DIMENSIONS else ("nes", "cma"):
         results = [search(strategy, name, d, seed) for seed in range(runs)]

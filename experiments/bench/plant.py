@@ -131,7 +131,7 @@ class Pace:
 
 
 class Stopwatch:
-    """Sums the time that passes for plants, in processor time and on the wall, while it runs."""
+    """Sums the processor time and the wall time of the work with plants, while it runs."""
 
     def __init__(self, *plants: OfflinePlant) -> None:
         self._plants = plants

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, in a home without files.
+"""The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, with an empty home folder.
 
 Claim: a robot is curious on the page at most 20 s after the command, 5 s of which are learning offline.
 Each start is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its

@@ -96,7 +96,7 @@ def upper_body_scene(boxes: int, poses: int) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """Which kinds of volumes a robot has, in equal parts, and which kinds of objects are around it."""
+    """The kinds of volumes of a robot, equally many of each, and the kinds of objects around it."""
 
     name: str
     kinds: tuple[ShapeKind, ...]
@@ -154,7 +154,7 @@ def _shape_of(index: int, entry: dict[str, Any], role: Literal["field", "solid"]
 
 
 def _pairs(shapes: tuple[Shape, ...], untested: set[frozenset[int]]) -> list[tuple[int, int]]:
-    """Pairs of shapes on two links that are tested against each other."""
+    """Return the pairs of shapes on two links that are tested against each other."""
     numbered = itertools.combinations(enumerate(shapes), 2)
     return [(i, j) for (i, a), (j, b) in numbered if a.link != b.link and frozenset((a.link, b.link)) not in untested]
 
@@ -219,7 +219,7 @@ def _random_geometry(rng: np.random.Generator, kind: ShapeKind, scale: float = 1
 
 
 def _adjacent_links(joints: tuple[Joint, ...]) -> dict[frozenset[int], str]:
-    """Pairs of links that are mounted on each other or on the same link, and why they are not tested."""
+    """Return the pairs of links that are mounted on each other or on the same link, with the reason why they are not tested."""
     adjacent = {frozenset((joint.parent, index + 1)): "mounted on each other" for index, joint in enumerate(joints)}
     for (i, one), (j, other) in itertools.combinations(enumerate(joints, 1), 2):
         if one.parent == other.parent:

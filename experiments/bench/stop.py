@@ -2,7 +2,7 @@
 """The emergency stop under floods: time from its publication until robot_sim reports `estop`, and until a new client is connected.
 
 Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of
-100 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is said by a new client,
+100 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client,
 as by `mobee estop`.  The time ends with the first state of the head in `estop`, by robot_sim's own clock, which is at most a tick later.
 Run time: about half a minute for each flood.
 """
@@ -56,7 +56,7 @@ QUICK = Settings(floods=(NOTHING, "estop, set = false", "calls of robot_sim's st
 
 
 class _Gate:
-    """The gate of the head in robot_sim's newest state, and since when [s, monotonic] it is so."""
+    """The gate of the head in robot_sim's newest state, and the time since which it has been in it [s, monotonic]."""
 
     def __init__(self, session: Any) -> None:
         self.now, self.since = "", 0.0

@@ -48,7 +48,7 @@ def _pin_threads(cores: set[int]) -> None:
 
 
 def cores_text(core: int | None) -> str:
-    """Where processor time was measured, for reports."""
+    """Return where processor time was measured, as text for reports."""
     return "of one core" if core is not None else "(not pinned to a core)"
 
 

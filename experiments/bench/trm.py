@@ -44,7 +44,7 @@ REQUIREMENTS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The spacing [m], the seeds of each method, how many vertices there must be, and the methods."""
+    """The spacing [m], the seeds of each method, the least number of vertices, and the methods."""
 
     spacing: float = PREGRASP_SPACING
     seeds: int = 1

@@ -123,7 +123,7 @@ class Tables:
 
 @dataclass(frozen=True, slots=True)
 class ChangingProblem:
-    """A problem, and changes of one row each: those of some observations and then, backwards, the same undone."""
+    """A problem and changes of one row each: the changes by some observations, then their reversals in reverse order."""
 
     tables: Tables
     changes: tuple[Row, ...]
@@ -135,7 +135,7 @@ class ChangingProblem:
 
 
 def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem:
-    """Return the problem before the observations, and their changes there and back."""
+    """Return the problem before the observations, with the changes that they make and the reversals."""
     forward, back = [], []
     for row in observations:
         forward.append(row)
@@ -239,7 +239,7 @@ def _plan_warm(problem: ChangingProblem, values: Array, discount: float) -> None
 
 
 def _errors(seed: int) -> tuple[float, float]:
-    """Of a random problem: the difference from policy iteration over the largest value, and the residual over the tolerance."""
+    """Return for a random problem the difference from policy iteration over the largest value, and the residual over the tolerance."""
     tables, discount = random_problem(seed)
     exact, exact_actions = policy_iteration(tables, tables.reward, discount)
     exists, size = np.isfinite(exact_actions), float(np.abs(exact).max(initial=1.0))
@@ -254,7 +254,7 @@ def _errors(seed: int) -> tuple[float, float]:
 
 
 def _residual(tables: Tables, exists: Array, discount: float, values: Array) -> float:
-    """The sup-norm Bellman residual over the states that have actions."""
+    """Return the sup-norm Bellman residual over the states that have actions."""
     onwards = (tables.probabilities * values[tables.outcomes]).sum(axis=-1)
     acting = exists.any(axis=1)
     best = np.where(exists, tables.reward + discount * onwards, -np.inf)[acting].max(axis=1)

@@ -296,7 +296,7 @@ def _follows(player: Player, part: str, seq: int) -> bool:
 
 
 def _in_force(player: Player, part: str) -> int:
-    """Bring a valid command into force, and return its seq; on a busy machine some come too late."""
+    """Bring a valid command into force, and return its seq; repeats it, since on a busy machine some commands arrive too late."""
     for _ in range(ATTEMPTS):
         valid = player.send(part, "velocity", np.zeros(len(player.robot.part(part))))
         if player.until(partial(_follows, player, part, valid), 1e-3 * TTL):

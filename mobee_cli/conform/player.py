@@ -32,7 +32,7 @@ class Broken(Exception):
 
 
 class Player:
-    """The session, what was received, and the drive epochs that are held."""
+    """The session, the messages received so far, and the drive epochs of this client."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         self.service, self.robot = service, robot
@@ -91,11 +91,11 @@ class Player:
         return f": {self.refused[-1]}" if self.refused else ": publish a Tick in every tick"
 
     def status(self, part: str) -> PartStatus:
-        """The status of a part in the newest tick."""
+        """Return the status of a part in the newest tick."""
         return self.tick.parts[part]
 
     def q(self, part: str) -> Array:
-        """The positions of a part in the newest tick, rad."""
+        """Return the positions of a part in the newest tick, rad."""
         return np.array(self.tick.q)[self.robot.part(part).slice]
 
     # Calls
@@ -105,7 +105,7 @@ class Player:
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
     def stat(self) -> Stat:
-        """The status of robot_sim."""
+        """Return the status of robot_sim."""
         return self.call(keys.service_rpc("robot_sim", "stat"), Empty, Stat)
 
     def take(self, part: str, instance: str = "") -> int:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by `mobee play` and `mobee learn`: what learns on which robot, its files, and learning offline."""
+"""The common part of `mobee play` and `mobee learn`: the setup of robot and agents, its files, and learning offline."""

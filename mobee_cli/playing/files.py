@@ -32,7 +32,7 @@ class Files:
 
     @property
     def scenario(self) -> Path:
-        """The scenario that goes on live with what is in the store."""
+        """The scenario in which the agents continue live from the transitions in the store."""
         return self.store.with_suffix(".toml")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learns offline, many times faster than real time, and tells what was found out meanwhile."""
+"""Learns offline, many times faster than real time, and reports the progress at intervals."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Learning:
         return f"{self.transitions} transitions, {self.plant.time / 60.0:.0f} min of robot time, {speed:.0f} x real time"
 
     def report(self) -> str:
-        """Return what has been found out until now, in one line."""
+        """Return the progress so far, in one line."""
         tried = sum(int((agent.model.tries > 0).sum()) for agent in self.agents)
         every = sum(agent.space.state_actions for agent in self.agents)
         surprised = sum(_surprises(agent) for agent in self.agents)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses what learns on a robot: the published agents of the iCub at its table, or agents derived from any robot."""
+"""Chooses the agents of a robot: the published agents of the iCub at its table, or agents derived from any robot."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Setup:
 
 
 def add_setup_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options for what learns."""
+    """Add the options for the choice of the agents."""
     text = "motors that a part learns with, for example arm=joint1,joint2,joint4; may be repeated (default: derived)"
     parser.add_argument("--part", dest="parts", action="append", default=[], metavar="PART=M1,M2", help=text)
     parser.add_argument("--explorer", default="curious", metavar="NAME", help="how the agents choose actions (default: curious)")
@@ -112,7 +112,7 @@ def _parts(texts: list[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str]) -> Iterator[str]:
-    """Yield at most ten lines of at most WIDTH columns that say what was derived."""
+    """Yield at most ten lines of at most WIDTH columns that describe the derived robot."""
     robot = derived.robot
     yield _cut(f"{robot.name}: {len(robot.motors)} motors in {len(robot.parts)} parts, {len(robot.shapes)} shapes")
     for remark in remarks[:2]:
@@ -136,7 +136,7 @@ def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str])
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names with what they all begin with once: "panda_joint1, 2, 3"."""
+    """Return names, their common beginning only once: "panda_joint1, 2, 3"."""
     start = len(os.path.commonprefix(names)) if len(names) > 1 else 0
     return ", ".join([names[0], *(name[start:] or name for name in names[1:])])
 

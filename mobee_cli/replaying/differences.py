@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where two runs part: the first tick, key and field in which their messages differ."""
+"""Finds where two runs diverge: the first tick, key and field in which their messages differ."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class Compared:
 
 
 def compare_runs(first: Recording, second: Recording) -> Compared:
-    """Compare the control streams of two runs from tick 1 on, until they part; raises MobeeError if a run has no such tick.
+    """Compare the control streams of two runs from tick 1 on, until they differ; raises MobeeError if a run has no such tick.
 
     Tick 0 is repeated as often as the start takes.
     """

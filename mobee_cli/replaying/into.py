@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recorded run in lockstep into its controller or model, and compares what it says with what it said, to the last bit.
+"""Plays a recorded run in lockstep into its controller or model, and compares the new messages with the recorded ones, to the last bit.
 
-The service gets in every tick what it got then, and its recorded messages tell when: a call that it had answered before it answered the
-tick is made before, one that it had answered after, after.  Everything that is read from the recording has its recorded bytes.  Epochs
-of goals are the only exception: a controller counts them from the time of its start, so that the recorded ones are translated.
+In every tick the service gets the recorded input.  Its recorded messages give the order of the calls: a call that it had answered before
+it answered the tick is made before the tick, any other call after it.  All messages from the recording have their recorded bytes.
+Epochs of goals are the only exception: a controller counts them from its start, so the recorded ones are translated.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a service reads and says in a tick, by types of messages."""
+    """The messages that a service reads and sends in a tick, by their types."""
 
     with_tick: tuple[str, ...]  # from the model, after the tick: it answers the tick when it has these
     after: tuple[str, ...]  # from others, before the next tick
@@ -52,7 +52,7 @@ ROLES: Mapping[str, Role] = {
 
 @dataclass(slots=True)
 class Result:
-    """What a replay found."""
+    """The result of a replay."""
 
     who: str
     ticks: int = 0
@@ -182,7 +182,7 @@ class _Replay:
             self.result.calls += 1
 
     def _answer_of(self, served: Served, request: bytes) -> bytes:
-        """Make a call, again for a while if the service does not know yet a token that was declared just now."""
+        """Make a call; repeat it for a while if the service does not know yet a token that was just declared."""
         give_up = time.monotonic() + TOKEN_PATIENCE
         while True:
             encoding, answer = self._stage.call(served.key, served.request_type, request)
@@ -238,7 +238,7 @@ class _Replay:
             self._answered = max(self._answered, k)
 
     def _compare(self, tick: TickOf | None) -> bool:
-        """Compare what the service said in a tick whose last message has arrived; return whether it differs."""
+        """Compare the service's messages of a tick whose last message has arrived; return whether they differ."""
         if tick is None:
             return False
         then = [item for item in self._own(tick) if item.type in self._role.says]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording to a monitor of its own, which shows on its page what happened, at the pace of the robot's time."""
+"""Plays a recording to a separate monitor, which shows the run on its page, at the pace of the robot's time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _tick = msgspec.msgpack.Decoder(Tick)
 
 
 class Player:
-    """A recording, and the monitor that sees it."""
+    """A recording, and the monitor that receives it."""
 
     def __init__(self, recording: Recording, port: int, folder: Path) -> None:
         """`folder`: for the files of the monitor; raises MobeeError if the recording does not hold the settings of its run."""
@@ -57,7 +57,7 @@ class Player:
             self._publish(message)
 
     def _time_of(self, tick: Tick) -> int:
-        """Return the time of a tick, ns since the begin, in which runs follow one another."""
+        """Return the time of a tick, ns since the beginning; a later run continues the time of the run before it."""
         if self._offset + tick.t < self._last:
             self._offset = self._last
         self._last = self._offset + tick.t
@@ -76,7 +76,7 @@ class Player:
             self.stage.send(message.key, message.encoding, message.payload)
 
     def _make(self, tick: Tick, t: int) -> None:
-        """Publish what the monitor reads beside the ticks, which have the same content."""
+        """Publish the clock and states that the monitor reads, from the content of a recorded tick."""
         header = {name: getattr(tick, name) for name in _HEADER}
         self._send(Clock(**header, dt=tick.dt, mode=tick.mode, rate=tick.rate))
         if t < self._next_state or tick.parts.keys() != self._robot.parts.keys():

@@ -34,7 +34,7 @@ class Stopped(MobeeError):
 
 
 class Stage:
-    """The bus, the service, and what it has said."""
+    """The bus, the service, and the service's messages."""
 
     def __init__(self, who: str, settings: str, folder: Path) -> None:
         """`who`: the service; `settings`: its settings file of the recorded run; `folder`: for that file and the log."""

@@ -37,7 +37,7 @@ class Stops:
     _commanded: dict[str, tuple[int, Array]] = field(default_factory=dict)  # ns and q at the last tick under command, of parts that moved
 
     def note_command(self, part: str, now: int, q: Array, moves: bool) -> None:
-        """The part follows a command at time `now` [ns] and q (n,) rad, which must not change later; `moves`: it is not at rest."""
+        """Note that the part follows a command at time `now` [ns] and q (n,) rad, an unchanging array; `moves`: it is not at rest."""
         if moves:
             self._commanded[part] = (now, q)
         else:

@@ -63,7 +63,7 @@ COLUMNS = tuple(Record.__annotations__)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=list(ROBOTS), metavar="ROBOT", help=f"of {', '.join(ROBOTS)}")
     parser.add_argument("--objects", type=positive_whole, default=1000, metavar="N", help="largest number of boxes (default: 1000)")
     parser.add_argument("--edits", type=positive_whole, default=1000, metavar="N", help="replaced boxes at each number (default: 1000)")

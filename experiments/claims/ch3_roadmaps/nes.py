@@ -5,8 +5,8 @@ Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.
 Run time: 3 minutes on 2 cores.
 
 A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
-rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  Counted are the evaluations until f < 1e-8;
-a run that does not get there counts with 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
+rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  The evaluations until f < 1e-8 are counted;
+a run that does not reach this counts as 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
 default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
 tasks": fewer on one of the twelve or more, by intervals at a twelfth of the error rate; "comparable": at most 1.5 times as many, median of
 the tasks.

@@ -4,11 +4,11 @@
 Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.
 Source: thesis 3.1.1.  Published: no numbers.  Run time: 3 minutes on 2 cores.
 
-The right palm goes to poses (place and rotation) of random postures among 100 boxes: 5 mm, 5 degrees, no contact; all 41 motors may
+The right palm must reach its poses (place and rotation) in random postures among 100 boxes: 5 mm, 5 degrees, no contact; all 41 motors may
 move, or torso and arm, 10.  All have the same cost; each ends at its first good pose, restarts by its own criterion if it is stuck, and
 gives up after 20 000 evaluations.  NES as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a
-generation at once); simulated annealing; a particle filter.  Counted are the evaluations per target, including targets
-without success: "outperforms" means fewer than the rival.  Each seed has its own targets.  Times are processor time of one core.
+generation at once); simulated annealing; a particle filter.  The evaluations per target are counted, including targets without success:
+"outperforms" means fewer than the rival.  Each seed has its own targets.  Times are processor time of one core.
 """
 
 from __future__ import annotations

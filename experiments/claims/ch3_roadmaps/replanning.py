@@ -6,12 +6,11 @@ fig. 4.7.  Published: no number; aim of this reproduction: the new path under wa
 Run time: 6 minutes on 2 cores, in real time.
 
 The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
-shorter through the ball than over it.  The real processes with PyBullet (with --backend mujoco MuJoCo), in
-free mode, ticks of 10 ms, the default law at full speed.
-Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the
-simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the motion ends there, the
-edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which a command is in
-force that was formed after the new goal.  Also measured: when the joints stop approaching the old goal, which depends on the law.
+shorter through the ball than over it.  The real processes with PyBullet (with --backend mujoco MuJoCo), in free mode, ticks of 10 ms, the
+default law at full speed. Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and
+a body in the simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the motion ends
+there, the edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which a command
+computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the law.
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ DEEP = 2e-3  # m
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     add_backend(parser)
     parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="number of crossings (default: 20)")
     parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same result on any machine")

@@ -177,7 +177,7 @@ class Crosser:
             raise MobeeError(f"the ball cannot be changed: {answer}")
 
     def _tick(self, k: int) -> None:
-        """Count from the first tick after the request of the first motion was answered, and make the ball solid when it is time."""
+        """Count ticks from the first one after the answer to the first request, and make the ball solid at its time."""
         if self._after >= 0.0 and not self.motions:
             self._solid_at, self._after = k + round(self._after * RATE), -1.0
         if 0 <= self._solid_at <= k:
@@ -249,7 +249,7 @@ class ContactStopPlant(BusPlant):
         self.on_forces(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
-        """Commands formed after the tick of the request follow it; each acts one tick later."""
+        """Store that commands formed after the tick of the request follow it; each acts one tick later."""
         if self.commanded < 0 and commands.re_k > self.asked > 0:
             self.commanded = commands.re_k + 1
 

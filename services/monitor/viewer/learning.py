@@ -109,7 +109,7 @@ class Learning:
         self._arrows(path, drawn, states, ends, widths, colors)
 
     def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: float | list[float], colors: Rgba | list[Rgba]) -> None:
-        """Return arrows between states; one that stays in its state is a dot beside it."""
+        """Log arrows between states; one that stays in its state is a dot beside it."""
         start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
         length = np.linalg.norm(way, axis=1, keepdims=True)
         unit = np.divide(way, length, out=np.full_like(way, 0.7), where=length > 0.0)

@@ -69,7 +69,7 @@ def _there_and_back(count: int, home: float, low: float, high: float) -> Array:
 
 
 def _together(count: int, home: Array, low: Array, high: Array) -> Array:
-    """Return positions of a motor that oscillates between its limits, each motor at its own pace."""
+    """Return the poses (count, n) rad of a robot whose motors oscillate between their limits, each at its own pace."""
     time = np.linspace(0.0, 1.0, count)[:, None]
     swings = 2 + np.arange(len(home)) % 3
     wave = np.sin(2.0 * np.pi * swings * time)
