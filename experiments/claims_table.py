@@ -105,7 +105,7 @@ def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Row
 
 
 def largest_rate(p: Sequence[float]) -> float:
-    """Return the largest p value of a decision if at most FALSE_DISCOVERIES of the decisions shall be wrong (Benjamini, Hochberg 1995)."""
+    """Return the largest p value of a decision if at most FALSE_DISCOVERIES of the decisions may be wrong (Benjamini, Hochberg 1995)."""
     ordered = sorted(p)
     allowed = [FALSE_DISCOVERIES * rank / len(ordered) for rank in range(1, len(ordered) + 1)]
     return max((most for value, most in zip(ordered, allowed, strict=True) if value <= most), default=0.0)
@@ -120,7 +120,7 @@ class Finished(NamedTuple):
 
 
 def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
-    """Return the finished run of each experiment, the parts of a chapter's run included; of several as `better` chooses.
+    """Return the finished run of each experiment, the parts of a chapter's run included; among several, the one that `better` chooses.
 
     Raises InvalidValue for a folder without results.
     """
@@ -174,7 +174,7 @@ def better(before: Recorded, after: Recorded) -> Recorded:
 
 
 def replaced(before: Recorded, after: Recorded) -> Recorded:
-    """Return a record with the entries of `after` in place of those before; what new seeds confirmed stays beside them."""
+    """Return a record with the entries of `after` in place of those before; their results with new seeds are kept."""
     kept = {name: {CONFIRMED: entry[CONFIRMED]} for name, entry in before.items() if CONFIRMED in entry}
     return before | {name: kept.get(name, {}) | entry for name, entry in after.items()}
 

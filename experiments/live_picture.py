@@ -113,7 +113,7 @@ def _launched(scenario: str, settings: Sequence[str]) -> Iterator[str]:
 
 
 def _address(launcher: subprocess.Popen[str]) -> str:
-    """The address of the page, with its key, from what the launcher prints."""
+    """Return the address of the page, with its key, from the output of the launcher."""
     give_up = time.monotonic() + START_TIMEOUT
     assert launcher.stderr is not None
     for line in launcher.stderr:

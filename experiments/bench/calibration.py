@@ -96,7 +96,7 @@ class Calibration:
         """All measured speeds."""
 
     def around(self, run: Callable[[], T]) -> tuple[T, float]:
-        """Return the result of `run`, and the speed of the machine around it: seconds times that are seconds on the standard machine."""
+        """Return the result of `run`, and the machine's speed around it; seconds times this speed are seconds on the standard machine."""
         before = self._present_speed()
         result = run()
         return result, 0.5 * (before + self._present_speed())

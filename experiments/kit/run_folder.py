@@ -158,7 +158,7 @@ def _sources() -> dict[str, str]:
 
 
 def _git(*command: str) -> str:
-    """Return what git says about the repository of this file; "" outside a checkout."""
+    """Return the output of a git command for the repository of this file; "" outside a checkout."""
     try:
         done = subprocess.run(["git", "-C", str(Path(__file__).parent), *command], capture_output=True, text=True, timeout=10.0)
     except (OSError, subprocess.TimeoutExpired):

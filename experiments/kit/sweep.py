@@ -167,7 +167,7 @@ def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[dict[
 
 
 def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> dict[tuple[Any, ...], list[Run]]:
-    """Group what `of` returns for each finished cell, as `grouped_by` does."""
+    """Group the results of `of` for the finished cells, as `grouped_by` does."""
     groups: dict[tuple[Any, ...], list[Run]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(of(result))

@@ -41,7 +41,7 @@ def require_tracker(name: str | None) -> None:
 
 
 class Scalars:
-    """The event file of one run of TensorBoard; made anew, what an earlier one in the folder holds is no longer shown."""
+    """The event file of one run of TensorBoard; a new file hides the earlier ones in its folder."""
 
     def __init__(self, folder: Path) -> None:
         from tensorboardX import SummaryWriter
@@ -54,7 +54,7 @@ class Scalars:
             self._writer.add_scalar(name, value, step, time)
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
+        """Write the remaining values, and close the file."""
         self._writer.close()
 
 
@@ -128,7 +128,7 @@ def track_values(values: Mapping[str, Any], folder: Path) -> None:
 def track_stores(run: Path, robot: Robot | None = None) -> None:
     """Write the curves of the agents whose transitions are in files below the folder of a run, as those of live systems.
 
-    `robot`: theirs; None: the shipped one of the name on record.
+    `robot`: that of the agents; None: the shipped robot with the recorded name.
     """
     for file in sorted(run.rglob(STORE)):
         with TransitionStore(file, "", read_only=True) as store:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by both writers: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
+"""Common code of both writers: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
 
 from __future__ import annotations
 

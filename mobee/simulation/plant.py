@@ -261,7 +261,7 @@ class OfflinePlant:
         return self.reached(part)
 
     def begin_reach(self, part: str, marker: str, stay: bool = False) -> None:
-        """Start to draw the marker to the presented target; `advance` runs until the part has been drawn back and has settled again."""
+        """Start to pull the marker to the presented target; `advance` runs until the part has returned to its attractor and settled."""
         self._reaches.begin(part, marker, stay)
         self._test(part)
 

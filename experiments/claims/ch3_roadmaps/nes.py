@@ -94,7 +94,7 @@ def tasks(runs: Runs) -> list[Task]:
 
 
 def _fewer(name: str, runs: Runs) -> tuple[str, bool | None]:
-    """Judge whether a strategy needs fewer evaluations than CMA-ES on one task or more; each of the tasks is a look (Bonferroni)."""
+    """Judge whether a strategy needs fewer evaluations than CMA-ES on one task or more; each comparison counts (Bonferroni)."""
     pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
     spans = {task: ratio_interval(*pair, level_of_each(len(pairs))) for task, pair in pairs.items()}
     found = [task for task, span in spans.items() if span[1] < 1.0]

@@ -249,7 +249,7 @@ class ContactStopPlant(BusPlant):
         self.on_forces(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
-        """Store that commands formed after the tick of the request follow it; each acts one tick later."""
+        """Store the tick in which the first command computed after the request acts: one tick after its own."""
         if self.commanded < 0 and commands.re_k > self.asked > 0:
             self.commanded = commands.re_k + 1
 

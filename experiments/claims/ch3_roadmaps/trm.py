@@ -152,7 +152,7 @@ Runs = Mapping[tuple[str, str], Mapping[str, Array]]  # the COLUMNS of the maps 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     sweep_arguments(parser, seeds=5)
     parser.add_argument("--tasks", nargs="+", choices=tuple(EXAMPLES), metavar="TASK", help=f"of {', '.join(EXAMPLES)}")
 
@@ -252,7 +252,7 @@ def are_complete(runs: Runs) -> bool:
 
 @claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
 def maps_of_all(runs: Runs) -> Measured:
-    """The thesis' own method decides."""
+    """Judge whether every task has its maps; the thesis' own method decides."""
     covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in _figures()} for method in NAMES}
     return _least(covered), all(share >= COVERED for share in covered[NES].values())
 

@@ -49,7 +49,7 @@ def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
 
 
 def draw_film(example: Example, roadmap: Roadmap, path: Path, height: int = 260) -> Path:
-    """Return the motion through the points of the example."""
+    """Draw a filmstrip of the motion through the points of the example; returns its path."""
     return filmstrip([strip_of(example, roadmap)], path, height)
 
 

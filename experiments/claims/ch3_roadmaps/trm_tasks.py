@@ -59,8 +59,8 @@ def between_palms(model: Model, shape: Geometry, width: float) -> None:
 def both_held() -> Example:
     """Both hands hold an object and move it up and down, forward and back (thesis fig. 3.1, left).
 
-    Where the hands are to each other is fixed, as by a box between them, and the box stays level and straight before the robot;
-    the task space is the height of the hands and how far forward they are.
+    The pose of the hands relative to each other is fixed, as by a box between them, and the box stays level and straight before the robot;
+    the task space is the height of the hands and their forward position.
     """
     width = 0.20  # m, from palm to palm
     model = at_table()
@@ -101,7 +101,7 @@ def raise_glass() -> Example:
     """Raise a glass: the held object stays upright at every position of the hand (thesis fig. 3.3).
 
     The thumb points up, and the hand may turn about that line as a glass may; the task space is the place of the hand.  For picking and
-    placing what must not be tipped over.
+    placing objects that must not be tipped over.
     """
     model = at_table()
     carry(model, "glass", mobee.cylinder(0.03, 0.12), RIGHT, 0.045, THUMB)
@@ -150,8 +150,8 @@ def inspect_hand() -> Example:
 def push_forward() -> Example:
     """Push a large object forward with both hands (thesis fig. 3.6).
 
-    Where the hands are to each other is fixed, as is their height; the task space is how far forward they are.  The object neither turns
-    nor goes aside.
+    The pose of the hands relative to each other is fixed, as is their height; the task space is their forward position.  The object neither
+    turns nor moves aside.
     """
     width, height = 0.24, 0.0  # m
     model = at_table()
@@ -165,8 +165,8 @@ def push_forward() -> Example:
 def push_over() -> Example:
     """Push a large object to the side with both hands (thesis fig. 3.7).
 
-    Where the hands are to each other is fixed, as is their height; the task space is how far left or right they are.  The object neither
-    turns nor goes forward.
+    The pose of the hands relative to each other is fixed, as is their height; the task space is their sideways position.  The object
+    neither turns nor moves forward.
     """
     width, height, before = 0.20, 0.0, 0.32  # m
     model = at_table()
@@ -178,8 +178,8 @@ def push_over() -> Example:
 def reach_into() -> Example:
     """Reach into a box that is open above (thesis fig. 3.8).
 
-    The only constraint is that nothing is touched; the task space is its place, in the box and above it.  For picking from the box and
-    placing into it.
+    The only constraint is that nothing is touched; the task space is the place of the hand, in the box and above it.  For picking from the
+    box and placing into it.
     """
     x, y, floor = -0.27, 0.17, -0.22  # m, of the box
     model = alone()
@@ -230,8 +230,8 @@ def bimanual_twist() -> Example:
 def unscrew() -> Example:
     """Unscrew the cap of a bottle (thesis fig. 3.11).
 
-    The left hand keeps its place and orientation, the right one its place above it and its palm down; the task space is how far the right
-    hand is turned about its palm's normal, from where its fingers point forward.
+    The left hand keeps its place and orientation; the right hand stays above it with its palm down.  The task space is the angle of the
+    right hand about its palm's normal, 0 when its fingers point forward.
     """
     bottle = np.array([-0.32, 0.02, 0.05])  # m, where the left hand holds it
     model = alone()

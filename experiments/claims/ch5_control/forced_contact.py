@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forced contact: growing forces push a hand into table, body and joint limits, and draw it to and through singular poses.
+"""Forced contact: growing forces push a hand into table, body and joint limits, and pull it to and through singular poses.
 
 Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a
-limit; and a hand that is drawn to a target, reachable or not, through singular poses or not, does not stop before it arrives and does
+limit; and a hand that is pulled to a target, reachable or not, through singular poses or not, does not stop before it arrives and does
 not oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
 dominate the constraint forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").
 Published: no numbers.  Run time: about six minutes.
 
-The force rises in steps of three seconds each, for both gain sets.  The hand is drawn by the whole body (`mobee.Reacher`).
+The force rises in steps of three seconds each, for both gain sets.  The hand is pulled by the whole body (`mobee.Reacher`).
 Depths are measured at the true joint positions.
 """
 
@@ -101,7 +101,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Press into a wall: "pressed", a record for each level; or draw the hand to a target: "drawn", and its path."""
+    """Press into a wall: "pressed", a record for each level; or pull the hand to the target: "drawn", and its path."""
     if "wall" in settings:
         return {"pressed": press(settings["gains"], settings["wall"], settings["levels"], seed)}
     drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
@@ -143,7 +143,7 @@ def _worst(angles: Array) -> float:
 
 
 def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
-    """Draw the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m.
+    """Pull the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m.
 
     The measures: oscillation and distance from the target at rest, and `dead_s`, the longest time without motion before the end.
     """
@@ -203,7 +203,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _grouped(found: Cells) -> tuple[dict[tuple[str, str], list[Record]], dict[tuple[str, str], list[Record]]]:
-    """Return the levels of force by gain set and wall, and the drawn hands by gain set and target."""
+    """Return the levels of force by gain set and wall, and the pulled hands by gain set and target."""
     pressed: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, PUSHES)}
     drawn: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, GOALS)}
     for result in found.values():

@@ -231,7 +231,7 @@ MIN_STABLE_PERIOD = 0.015  # s: sets that are not stable at this control period 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     parser.add_argument("--sets", type=positive_whole, default=100, metavar="N", help="gain sets to judge (default: 100)")
 
 

@@ -76,7 +76,7 @@ COLUMNS: tuple[tuple[str, float, str, Any], ...] = (  # column of the table, fac
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options."""
+    """Add the options."""
     text = "of each signal in each posture, 2 or more, to measure the noise (default: 2)"
     parser.add_argument("--repetitions", type=whole_from_two, default=2, metavar="N", help=text)
     parser.add_argument("--postures", type=positive_whole, default=3, metavar="N", help="home and N - 1 others (default: 3)")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits the motor model (mobee.simulation.motors) to responses, and checks the method with simulated motors.
 
-Fitted are lag, delay, backlash, friction and encoder noise of every motor.  The model is simulated for all motors at once, since they do
+Lag, delay, backlash, friction and encoder noise of every motor are fitted.  The model is simulated for all motors at once, since they do
 not influence each other.  The model does not depend on the start of a signal, so each response is compared without its mean.
 """
 

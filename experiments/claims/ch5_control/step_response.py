@@ -6,9 +6,9 @@ within three and six seconds (steps of 20 degrees alone, of up to half a range t
 (the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s, 18 000 in two
 days, three agents at once (thesis 7.3). Run time: a few minutes.
 
-Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of that from the attractor, which is
-not zero where a limit or a constraint pushes.  Measured are the true joint positions, not the encoders; the motors have lag, delay, play
-and noise.
+Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of the end position from the
+attractor, which is not zero where a limit or a constraint pushes.  The true joint positions are measured, not the encoders; the motors have
+lag, delay, play and noise.
 """
 
 from __future__ import annotations

@@ -87,17 +87,17 @@ Outcome = Callable[[np.random.Generator, int], int]  # draws the state in which 
 
 
 def reliable(rng: np.random.Generator, goal: int) -> int:
-    """End in the goal."""
+    """Return the outcome of a reliable action: the goal."""
     return goal
 
 
 def failing(rng: np.random.Generator, goal: int) -> int:
-    """End always in the same other state."""
+    """Return the outcome of a failing action: always the same other state."""
     return (goal + 7) % 27
 
 
 def uncertain(rng: np.random.Generator, goal: int) -> int:
-    """End in the goal or in one of two other states, with equal probability."""
+    """Return the outcome of an uncertain action: the goal or one of two other states, with equal probability."""
     return (goal, (goal + 7) % 27, (goal + 11) % 27)[int(rng.integers(3))]
 
 

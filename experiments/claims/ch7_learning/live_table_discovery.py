@@ -103,7 +103,7 @@ def p_value(found: Compared) -> float:
     "equivalent",
 )
 def equal(found: Compared) -> Measured:
-    """Not met if the live run is too far; one live run has no interval, so it cannot show that they are equivalent."""
+    """Judge whether the models are equal: not met if the live run is too far away, else open, since one live run has no interval."""
     one, offline = found.live[ROBOT], [seed.variation for seed in found.offline]
     text = (
         f"total variation {one.variation:.4f} over {one.compared} state-actions, of offline runs {min(offline):.4f} to {max(offline):.4f}: "

@@ -191,7 +191,7 @@ def sooner(grouped: Groups) -> Measured:
     "an impression",
 )
 def denser(grouped: Groups) -> Measured:
-    """Judge whether one of the sparser graphs is as good; each of them is a look."""
+    """Judge whether one of the sparser graphs is as good; each comparison counts (Bonferroni)."""
     fewer = _fewer(grouped)
     shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))
     level = level_of_each(len(fewer) - 1)

@@ -189,7 +189,10 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, int]], paths: Paths) -> tuple[float, float]:
-    """Return the predicted probability that a plan is followed exactly, and the share of plans that were; 0 without a plan."""
+    """Return two numbers of the paths: the predicted probability that a plan is followed exactly, and the share that was followed so.
+
+    Both are 0 if no plan was found.
+    """
     plans = [_plan(space, beliefs, start, goal) for start, goal in pairs]
     kept = [plan is not None and plan.path == path for plan, path in zip(plans, paths, strict=True)]
     return float(np.mean([plan.success if plan else 0.0 for plan in plans])), float(np.mean(kept))

@@ -252,7 +252,7 @@ def each_run(found: Cells) -> EachRun:
 
 
 def _changed(each: EachRun, parameter: str) -> dict[str, list[Row]]:
-    """Return the runs of the variants in which a parameter was changed, by its value."""
+    """Return the runs of all variants that change one parameter, by the value of the parameter."""
     return {variant.rpartition(" ")[2]: rows for variant, rows in each.items() if variant.startswith(parameter)}
 
 

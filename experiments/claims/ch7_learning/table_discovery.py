@@ -160,7 +160,7 @@ def _histogram(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
-    """Return the precision, equal to recall, when as many actions are called dependent as really are, and that of chance."""
+    """Return the precision (equal to the recall) of a detector that names as many actions as are dependent, and the precision of chance."""
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
         found = {score: judged_of(runs, explorer, learner, score) for score in measures.SCORES}

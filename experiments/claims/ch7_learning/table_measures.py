@@ -310,7 +310,7 @@ def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]
 def is_cyclic(ours: Array, theirs: Array) -> bool | None:
     """Return whether there is a second peak, above 0 and above the ghosts' by the intervals over two or more runs.
 
-    False where the runs do not differ from their ghosts by their highest values at any lag beyond BOUT either; None where they do, but
+    False if, in addition, the highest values of the runs beyond the lag BOUT are not above those of the ghosts; None if they are, but
     without a common peak.
     """
     here, there = at_second_peak(ours, theirs)
@@ -342,7 +342,7 @@ class Judged:
 
     @property
     def at_all(self) -> float:
-        """The precision, equal to recall, when as many actions are called dependent as really are."""
+        """The precision (equal to the recall) if as many actions are called dependent as really depend on other parts."""
         return float(self.hits[:, : int(self.hits[0].sum())].mean())
 
     @property

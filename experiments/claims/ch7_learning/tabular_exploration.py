@@ -8,12 +8,12 @@ Source: none; the thesis compares with random and least-tried actions only.  Run
 Worlds: RiverSwim with 6 and 20 states, DeepSea of depth 10, four rooms with slipping steps, and random worlds in which every action has
 five outcomes.  All explorers know the number of states and actions, and nothing of an action before its first try.
 
-Coverage: there is no reward; transitions until every state-action that can be reached was tried once and five times, and the distance
-(L1, 0 to 2) of the believed outcomes (`debiased`, the same for all) from the true ones after 20 transitions for each state-action.
-Return: rewards are found by trying; the sum of all rewards over that of the best policy.  Each explorer has one number to choose, the same
-in all worlds: the weight of the rewards beside the gain in nats, the bonus, the tries until an action is known, the steps of an
-episode, the share of random actions.  They were set in advance, not tuned, but R-MAX's: 10, as a first
-run with 3 gave up in RiverSwim; `--tune` measures others, with seeds of its own.
+Coverage: there is no reward; transitions until every state-action that can be reached was tried once and five times, and the distance (L1,
+0 to 2) of the believed outcomes (`debiased`, the same for all) from the true ones after 20 transitions for each state-action. Return:
+rewards are found by trying; the sum of all rewards over that of the best policy.  Each explorer has one number to choose, the same in all
+worlds: the weight of the rewards beside the gain in nats, the bonus, the tries until an action is known, the steps of an episode, the share
+of random actions.  They were set in advance and not tuned, except that of R-MAX: it is 10, because a first run with 3 gave up in RiverSwim;
+`--tune` measures others, with seeds of its own.
 """
 
 from __future__ import annotations

@@ -213,7 +213,7 @@ def _row(runs: list[Run]) -> dict[str, Any]:
 
 
 def _shares(runs: list[Run]) -> dict[str, str]:
-    """Return the states that were never reached, by the number of runs in which they were not."""
+    """Return the states that were never reached in some run, grouped by the number of such runs."""
     by_count: dict[int, list[int]] = {}
     for state, count in sorted(_unreached(runs).items()):
         by_count.setdefault(count, []).append(state)

@@ -102,7 +102,7 @@ def measure_truth(cell: Cell) -> dict[str, Any]:
 
 
 def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
-    """Learn, or plan with the truth, with evaluations on the targets that are tried and on those that never are."""
+    """Learn (or plan with the true rewards), and evaluate on two sets of targets: those that are tried, and those that never are."""
     settings, space = cell.settings, reach_space()
     plant, aim = reach_plant(cell.seed, settings["law"]), laws()[settings["law"]].aim
     beliefs = learned_beliefs(plant, cell.seed)

@@ -185,14 +185,14 @@ class _PoseComparison:
         self.contacts += sum(self._remains(pair, names, centres, turns) for pair in theirs - found.keys())
 
     def _remains(self, pair: frozenset[str], names: list[str], centres: Array, turns: Array) -> bool:
-        """Whether a contact that only coal finds remains when both volumes are a little smaller."""
+        """Return whether a contact that only coal finds remains when both volumes are a little smaller."""
         i, j = (names.index(name) for name in pair)
         small = [_object(self.volumes[k][1], centres[k], turns[k], SHRINKAGE) for k in (i, j)]
         return _touch(*small)
 
 
 def _touch(first: _Placed, second: _Placed) -> bool:
-    """Whether two volumes overlap, by coal: fcl misses contacts of cylinders that are centimetres deep."""
+    """Return whether two volumes overlap, by coal: fcl misses contacts of cylinders that are centimetres deep."""
     return bool(coal.collide(*first, *second, coal.CollisionRequest(), coal.CollisionResult()))
 
 

@@ -180,7 +180,7 @@ class Program:
         return solids, fields
 
     def is_base(self, node: Node) -> bool:
-        """Whether the volumes of a node are never tested against the world."""
+        """Return whether the volumes of a node are never tested against the world."""
         this, found_link, found_joint = node, False, False
         while this.parent is not None:
             if found_link and found_joint and this.is_link != node.is_link:
@@ -193,7 +193,7 @@ class Program:
         return True
 
     def obeys(self, clause: list[tuple[list[str], list[float], float]], q: dict[str, float]) -> bool:
-        """Whether one row of a clause holds."""
+        """Return whether one row of a clause holds."""
         return any(sum(a * q[name] for name, a in zip(names, factors, strict=True)) + b > 0 for names, factors, b in clause)
 
 

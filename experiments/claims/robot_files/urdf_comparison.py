@@ -157,7 +157,7 @@ class UrdfPeer:
     """The robot of a URDF file as Pinocchio reads it, moved by our motors."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
-        """Raises NotInstalled without Pinocchio, and PeerFailed."""
+        """Read the file; raises NotInstalled without Pinocchio, and PeerFailed."""
         pinocchio = import_peer("pinocchio", "Pinocchio", extra="dev")
         self._pin, self._robot, self._path = pinocchio, robot, path.resolve()
         try:

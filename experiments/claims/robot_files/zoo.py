@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zoo: whether robots of others become curious without an edit, and how near they come to themselves meanwhile.
+"""The zoo: whether robots of others become curious without an edit, and how deep they touch themselves while they explore.
 
 Claim: every robot of five collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
-home, comes no deeper than 2 mm into itself in ten minutes of curiosity with the derived gains, and its agent tries every action of the
+home, touches itself no deeper than 2 mm in ten minutes of curiosity with the derived gains, and its agent tries every action of the
 states that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.
 Published number: none.  Run time: 15 seconds for each robot.
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by experiments about the control law."""
+"""Common code of the experiments about the control law."""

@@ -22,9 +22,9 @@ AT_STOP = np.deg2rad(0.01)  # rad; a motor nearer to a limit is at its hard stop
 
 
 def clause_violations(robot: Robot, q: Array) -> Array:
-    """Return the violation -s/|a| of every clause in the postures q (T, n) rad: (T, clauses) rad along the normal, negative inside.
+    """Return the violation of every clause in the postures q (T, n) rad: (T, clauses) rad, above 0 where the clause is violated.
 
-    s = a.q + b; of a clause with several rows the row that is nearest to being satisfied counts.
+    It is -s / |a| with s = a.q + b; for a clause with several rows, that of the row that is nearest to being satisfied.
     """
     return np.stack([np.min(-(q @ c.a.T + c.b) / np.linalg.norm(c.a, axis=1), axis=1) for c in robot.clauses], axis=1)
 
@@ -88,7 +88,7 @@ def oscillation(model: Model, run: PlantRun, marker: str) -> float:
 def is_listed(first: str, second: str) -> bool:
     """Return whether a solid contact of two shapes is in the simulator's list of pairs; one with an object of the world always is.
 
-    Not listed are pairs that overlap in some legal poses, as upper arms and pelvis; their fields exert no force either.
+    Pairs that overlap in some legal poses, such as upper arms and pelvis, are not listed; their fields exert no force either.
     """
     one, other = _link(first), _link(second)
     return one is None or other is None or frozenset((one, other)) in _pairs()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by experiments about learning the outcomes of actions."""
+"""Common code of the experiments about learning the outcomes of actions."""

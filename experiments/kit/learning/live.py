@@ -248,7 +248,7 @@ def compared(folder: Path, task: str, least: int) -> Compared:
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """How many actions of a part missed their goals, ended in contact with an object, and both, of how many."""
+    """Counts of a part's actions: those that missed their goals, those that ended in contact with an object, both, and all."""
 
     missed: int
     touching: int

@@ -23,7 +23,7 @@ PLAN_TOLERANCE = 1e-3  # of plans in sampled models
 
 
 class RewardedPlant(TabularPlant):
-    """A world of tables whose rewards the agent finds out: each depends on state and action."""
+    """A tabular world with rewards that the agent has to discover: each depends on state and action."""
 
     def __init__(self, world: TabularWorld, seed: int) -> None:
         states, actions = world.outcomes.shape[:2]

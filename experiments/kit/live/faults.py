@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of a running system as schedules: drawn by a seed, performed on its processes, and shrunk to what still fails."""
+"""Faults of a running system as schedules: drawn by a seed, performed on its processes, and shortened as long as they still fail."""
 
 from __future__ import annotations
 
@@ -209,7 +209,7 @@ class FaultInjector:
 
 @contextmanager
 def _forged_token(session: Any, service: str) -> Iterator[None]:
-    """Declare a liveliness token with the name of a service, of no process."""
+    """Declare a liveliness token with the name of a service, without a process."""
     token = session.liveliness().declare_token(keys.alive(service, "i1_forged"))
     try:
         yield

@@ -49,7 +49,7 @@ def _put(cls: type[Message], name: str, payload: bytes, rate: float) -> Callable
 
 
 def _no_stop() -> bytes:
-    """A message on `estop` that sets no stop."""
+    """Return a message on `estop` that sets no stop."""
     return encode(EStop(v=VERSION, run="-", src="flood", seq=0, k=0, t=0, tw=0, set=False, source="flood", reason=""))
 
 
@@ -117,7 +117,7 @@ FLOODS: dict[str, Callable[[str], None]] = {
 
 @contextmanager
 def flood(endpoint: str, name: str) -> Iterator[None]:
-    """One of FLOODS while the body of the `with` statement runs; raises LaunchFailed at its end if the flood has ended before."""
+    """Send one of FLOODS while the body of the `with` statement runs; raises LaunchFailed at its end if the flood has ended before."""
     process = subprocess.Popen([sys.executable, "-m", "mobee_system.run", "experiments.kit.live.floods", endpoint, name])
     try:
         yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a running system did while it was disturbed: its states, and the transitions that agents published beside those on disk."""
+"""Observes a running system while it is disturbed: its states, and the transitions that agents published beside those on disk."""
 
 from __future__ import annotations
 
@@ -86,12 +86,12 @@ class Observer:
                 self.conflicts.append(f"{key[0]} published two transitions {key[1]}")
 
     def newest(self, part: str) -> Moment | None:
-        """The last state of a part."""
+        """Return the last state of a part."""
         with self.lock:
             return self.parts[part][-1] if self.parts.get(part) else None
 
     def all_armed(self, count: int) -> bool:
-        """Whether all `count` parts follow commands now."""
+        """Return whether all `count` parts follow commands now."""
         since = time.monotonic() - FRESH
         with self.lock:
             newest = [states[-1] for states in self.parts.values()]
@@ -128,7 +128,7 @@ def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
 def survived(changes: list[tuple[float, str, str]], fault: float, until: float) -> bool | None:
     """Return whether the action that was under way at a monotonic time has survived until a later one; None if there was none.
 
-    It has if it still moves, waits for the model, or has ended with an outcome.
+    It has survived if it still moves, waits for the model, or has ended with an outcome.
     """
     before = [change for change in changes if change[0] <= fault]
     if not before or before[-1][1] != "moving":

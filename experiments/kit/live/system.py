@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live system that runs while something is done to it: launched as a user launches it, and ended as by Ctrl-C."""
+"""A live system that runs during a `with` statement: launched as a user launches it, and ended as by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _START_TIMEOUT = 120.0  # s
 
 @dataclass
 class System:
-    """A launcher process and where it writes."""
+    """A launcher process and the place of its output."""
 
     process: subprocess.Popen[str]
     endpoint: str
@@ -41,7 +41,10 @@ class System:
 
 @contextmanager
 def running(folder: Path, scenario: str) -> Iterator[System]:
-    """A system without monitor all of whose services are ready; it is stopped afterwards.  `folder`: an empty one.  Raises LaunchFailed."""
+    """Run a system without monitor, and yield it when all its services are ready; stops it afterwards.
+
+    `folder`: an empty one.  Raises LaunchFailed.
+    """
     endpoint = free_endpoint()
     environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
     with (folder / "launcher.err").open("w") as errors:

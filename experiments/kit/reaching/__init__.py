@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared by experiments on reaching: the arm, its targets, learners, the planner peer, and measured true outcomes."""
+"""Common code of the experiments on reaching: the arm, its targets, learners, the planner peer, and measured true outcomes."""

@@ -200,6 +200,6 @@ def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str
 
 
 def _nearness(palms: Array, target: Array) -> Array:
-    """Return the value of each state without a reach, (S,): the reward of its palm position."""
+    """Return the reward of the palm's position in each state, (S,): the value of a state if no reach follows."""
     distances = np.maximum(np.linalg.norm(palms - target, axis=1) - RADIUS, 0.0)
     return np.array([reward_of(float(distance)) for distance in distances])

@@ -146,7 +146,7 @@ class Truth:
         """Learn nothing."""
 
     def mean(self, target: Array) -> Array:
-        """The mean rewards, shape (S,)."""
+        """Return the mean rewards, shape (S,)."""
         return true_rewards(target)
 
     def deviation(self, target: Array) -> Array:
@@ -154,7 +154,7 @@ class Truth:
         return np.zeros(len(toy_space()))
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """The mean rewards, shape (S,)."""
+        """Return the mean rewards, shape (S,)."""
         return true_rewards(target)
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m experiments.claims.ch4_reflex.babbler`."""
+"""Starts the client: `python -m experiments.claims.ch4_reflex.babbler`."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class AtDrives:
         service.on_run(self._forget)
 
     def move(self, k: int, dt: float) -> None:
-        """Tick k, of dt [s]."""
+        """Send the commands of tick k, of length dt [s]."""
         if not self._states.are_complete():
             return
         states = self._states.newest
@@ -129,7 +129,7 @@ class AtGoals:
         service.on_run(self._forget)
 
     def move(self, k: int, dt: float) -> None:
-        """Tick k, of dt [s]."""
+        """Send the goals of tick k, of length dt [s]."""
         if not self._motions.are_complete() or not self._owns_all():
             return
         if self._begin >= 0:

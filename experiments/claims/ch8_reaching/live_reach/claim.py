@@ -219,7 +219,7 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 
 @dataclass(frozen=True)
 class Runs:
-    """All blocks; those of the 27 targets that can be reached; and those of them from which MoBeE's fields do not keep the palm."""
+    """All blocks; the targets among the 27 that can be reached; and those among them that MoBeE's fields let the palm touch."""
 
     blocks: Sequence[Block]
     touchable: frozenset[int]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A block of tries on the live robot, by the learner, which may go on learning, the planner, or the reach alone.
+"""A block of tries on the live robot: by the learner (which may continue to learn), by the planner, or by the reach alone.
 
 The launched performer calls `perform` (experiments/kit/live/performer).  It reads {part}/motion, {part}/reach and commands, and calls
 {part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.

@@ -151,7 +151,7 @@ def moving_problems(seed: int, count: int) -> list[Problem]:
 
 
 def _across(known: PeerBelief, problem: Problem, rng: np.random.Generator) -> list[list[float]] | None:
-    """Return the ends of an obstacle's path that crosses the middle between hand and target; None if no path was found.
+    """Return the two ends of a path on which an obstacle crosses the middle between hand and target; None if none was found.
 
     The whole path is clear of the target; its ends are clear of the robot.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tries on the live robot: the job of a launch, its record, its judgement by the simulator's joints, and the reasons of misses.
+"""Tries on the live robot: the job of a launch, its record, its measures by the simulator's joints, and the reasons of misses.
 
     python -m experiments.claims.ch8_reaching.live_reach.tries
 
@@ -75,7 +75,7 @@ class Tried(Struct, frozen=True):
 
 
 class Judged(Struct, frozen=True):
-    """A try, judged by the simulator's joints."""
+    """The measures of a try, computed from the simulator's joints."""
 
     kind: str
     number: int
@@ -105,7 +105,7 @@ class Block(Struct, frozen=True):
 
 
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
-    """Judge the tries of a launch by the records in its folder."""
+    """Measure the tries of a launch by the records in its folder."""
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > MIN_DEPTH]
     done = read_done(folder, Tried)
@@ -116,7 +116,7 @@ def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
 
 
 def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Model, rate: float) -> Judged:
-    """Judge a try; `q` (T, n) rad: row k - 2 holds the joints at the beginning of tick k."""
+    """Return the measures of a try, such as its success; `q` (T, n) rad: row k - 2 holds the joints at the beginning of tick k."""
     off = np.inf
     if tried.ends:
         palm = model.evaluate(q[tried.ends[-1] - 2]).position(MARKER)
