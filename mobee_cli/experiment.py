@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action."""
+    """Run the requested action of the command."""
     try:
         if arguments.action == "list":
             return _list(arguments)

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Derive, learn, and print what was learned."""
+    """Derive the agents of the robot, let them learn, and print what they learned."""
     curves = arguments.store.with_name(f"{arguments.store.stem}-tensorboard")
     if arguments.store.suffix != ".sqlite":
         raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)

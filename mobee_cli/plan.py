@@ -78,7 +78,7 @@ def _beside(store: Path) -> str | None:
 
 
 def _state(learned: Learned, place: list[str], poses: dict[str, int]) -> int:
-    """Return the state of a place; if this is a pose, add it to `poses`."""
+    """Return the state that a command-line argument means: a state's number, or a pose, which is then added to `poses`."""
     try:
         numbers = [float(word) for word in place]
     except ValueError:

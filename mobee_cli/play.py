@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Derive, learn offline, go live; returns the exit code of the live system."""
+    """Derive the agents of the robot, let them learn offline, then live; return the exit code of the live system."""
     if arguments.learned is not None:
         files = Files(arguments.learned)
         if not files.store.is_file() or not files.scenario.is_file():

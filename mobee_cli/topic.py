@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action, connected to the running system if it needs one."""
+    """Run the requested action, connected to the running system if it needs one."""
     if arguments.action == "schema":
         return _schema(None, arguments)
     with connected(arguments.endpoint) as session:

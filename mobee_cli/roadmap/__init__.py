@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action."""
+    """Run the requested action of the command."""
     try:
         code: int = importlib.import_module(f"mobee_cli.roadmap.{arguments.action}").run(arguments)
     except MobeeError as error:

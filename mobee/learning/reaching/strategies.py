@@ -34,7 +34,7 @@ class Progress:
             self._interest[state] = abs(rewards[-half:].mean() - rewards[:half].mean())
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the changes, shape (S,); in one of five problem-tries, 1 for a random state and 0 for all others."""
+        """Return the change of the rewards of each state, (S,); in one of five problem-tries, 1 for a random state and 0 for all others."""
         if rng.random() >= RANDOM_SHARE:
             return self._interest.copy()
         worth = np.zeros(len(self._interest))
