@@ -51,18 +51,18 @@ def test_lock_names_no_index(lock: str) -> None:
     assert re.findall(r"https?://|file:|--index|--extra-index|--find-links|--trusted", (ROOT / lock).read_text()) == []
 
 
-def test_locks_hold_what_is_declared() -> None:
+def test_the_locks_contain_all_declared_packages() -> None:
     extras = PROJECT["optional-dependencies"]
     run = names([*PROJECT["dependencies"], *(line for extra in RUN_EXTRAS for line in extras[extra])])
     assert run <= names(locked("requirements.lock"))
     assert run | names([line for lines in extras.values() for line in lines]) <= names(locked("requirements-dev.lock"))
 
 
-def test_what_runs_is_tested_in_the_same_versions() -> None:
+def test_the_running_packages_are_tested_in_the_same_versions() -> None:
     assert {line.split()[0] for line in locked("requirements.lock")} <= {line.split()[0] for line in locked("requirements-dev.lock")}
 
 
-def test_only_what_runs_is_installed_to_run() -> None:
+def test_only_packages_of_the_running_system_are_installed_to_run() -> None:
     extras = {name: names(lines) for name, lines in PROJECT["optional-dependencies"].items()}
     others = set().union(*(extras[name] for name in extras if name not in RUN_EXTRAS)) - set().union(*(extras[name] for name in RUN_EXTRAS))
     needed_by_others = {"psutil", "pyarrow"}  # of rerun-sdk
@@ -223,7 +223,7 @@ def test_a_changed_pyproject_installs_the_project_alone(bare_clone: Path) -> Non
     assert log(bare_clone) == before + "pip\n"
 
 
-def test_what_the_tests_need_is_added_to_what_runs(bare_clone: Path) -> None:
+def test_packages_for_the_tests_are_added_to_the_running_environment(bare_clone: Path) -> None:
     fake_interpreter(bare_clone)
     assert ensure(bare_clone).returncode == 0
     before = log(bare_clone)
@@ -234,7 +234,7 @@ def test_what_the_tests_need_is_added_to_what_runs(bare_clone: Path) -> None:
     assert log(bare_clone) == before + "whole again: pybullet\npip\n"  # enough to run, too
 
 
-def test_a_changed_core_is_built_anew_alone(bare_clone: Path) -> None:
+def test_after_a_change_of_the_core_only_the_core_is_built_again(bare_clone: Path) -> None:
     fake_interpreter(bare_clone)
     assert ensure(bare_clone).returncode == 0
     before = log(bare_clone)

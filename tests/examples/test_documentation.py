@@ -58,7 +58,7 @@ def test_the_documented_weight_of_a_robot_is_printed(tmp_path: Path) -> None:
     assert 10.0 < energy < 100.0  # J above the waist
 
 
-def test_what_was_learned_offline_is_planned_with(tmp_path: Path) -> None:
+def test_plans_use_the_transitions_learned_on_the_page(tmp_path: Path) -> None:
     (flow,) = blocks("docs/learning.md", tmp_path)
     run(tmp_path, "-c", flow)
     planned = run(tmp_path, "-m", "mobee_cli", "plan", "--run", ".", "--from", "0", "--to", "26")
@@ -75,7 +75,7 @@ def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
 
 
-def test_many_plants_go_on_together(tmp_path: Path) -> None:
+def test_many_plants_continue_together(tmp_path: Path) -> None:
     _, many = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", many).strip() == "[True, True, True] (100, 41)"
 

@@ -86,7 +86,7 @@ def test_05_only_the_table_keeps_the_arm_from_its_target(tmp_path: Path) -> None
     assert up < 2 and again < 2 and into > 4
 
 
-def test_06_an_agent_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_06_an_agent_continues_after_a_restart(tmp_path: Path) -> None:
     text = printed("06", tmp_path)
     observed = re.findall(r" (\d+): from +(\d+) towards +(\d+), got to +(\d+)", text)
     assert [int(n) for n, *_ in observed] == list(range(1, 11))
@@ -124,7 +124,7 @@ def test_09_reaches_what_is_in_reach_and_rests_before_what_is_not(tmp_path: Path
     assert numbers(r"under the table's top: stuck after \S+" + outcome, text)[0] > 5
 
 
-def test_10_plans_round_what_fails(tmp_path: Path) -> None:
+def test_10_plans_avoid_failing_actions(tmp_path: Path) -> None:
     text = printed("10", tmp_path)
     assert re.search(r"each of 432 state-actions was tried at least [1-9] times", text)
     naive, learned = (np.mean([int(n) for n in taken.split(",")]) for taken in re.findall(r"it took (.*) actions", text))

@@ -47,11 +47,11 @@ def test_the_page_names_every_claim_that_an_experiment_states():
     assert not missing, REGENERATE
 
 
-def test_the_page_is_what_the_recorded_numbers_give():
+def test_the_page_follows_from_the_recorded_numbers():
     assert claims_table.PAGE.read_text() == page(recorded()), REGENERATE
 
 
-def test_the_chapters_in_the_results_are_what_the_recorded_numbers_give():
+def test_the_chapters_in_the_results_follow_from_the_recorded_numbers():
     said = chapters.PAGE.read_text()
     assert said == chapters.with_section(said, chapters_text(recorded())), REGENERATE
     assert {chapters.chapter_of(claim) for _, claim in stated() if not claim.is_aim} == set(chapters.CHAPTERS)
@@ -133,7 +133,7 @@ def test_the_text_fits_the_terminal(claim):
     assert all(len(line) <= 60 for line in said.splitlines())
 
 
-def test_the_page_keeps_what_was_recorded_of_experiments_that_did_not_run(tmp_path, monkeypatch, claim):
+def test_the_page_keeps_the_records_of_experiments_that_did_not_run(tmp_path, monkeypatch, claim):
     monkeypatch.setattr(raw_records, "RECORDS", tmp_path / "records")
     monkeypatch.setattr(claims_table, "RECORD", tmp_path / "claims.json")
     monkeypatch.setattr(claims_table, "PAGE", tmp_path / "README.md")
@@ -219,7 +219,7 @@ def test_new_seeds_confirm_frozen_rules_once_and_stand_beside_the_first(toy, tmp
     assert any("new seeds" in line for line in claims_table.all_differences({"hypercube-exploration": entry}))
 
 
-def test_rules_that_new_seeds_have_judged_are_not_frozen_anew(toy, tmp_path, monkeypatch, capsys):
+def test_rules_that_new_seeds_have_judged_are_not_frozen_again(toy, tmp_path, monkeypatch, capsys):
     toy(0), toy(CONFIRMING_SEED)
     runs = ("--runs", tmp_path / "runs")
     assert command("--freeze", "hypercube-exploration") == 0 and capsys.readouterr().out.endswith("the rules of hypercube-exploration\n")

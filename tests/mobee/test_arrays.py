@@ -21,7 +21,7 @@ def test_numbers_are_copied_as_floats() -> None:
 
 
 @pytest.mark.parametrize("given", ["home", [[1.0], [1.0, 2.0]], object(), [1.0, "a"], ["1", "2"], np.full((9, 1), "1")])
-def test_what_is_no_array_of_numbers_is_refused(given: Any) -> None:
+def test_an_argument_that_is_no_array_of_numbers_is_refused(given: Any) -> None:
     with pytest.raises(mobee.InvalidValue, match=r"^q is .*; it must be an array of numbers\.$"):
         real_array("q", given)
 

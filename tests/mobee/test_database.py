@@ -152,7 +152,7 @@ def stored(path, count=40):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_store_with_damaged_bytes_is_never_begun_anew_and_never_written(tmp_path, seed):
+def test_a_store_with_damaged_bytes_is_never_replaced_or_written(tmp_path, seed):
     """Flipped bytes in the content of a row are beyond SQLite's own checks, but a row is never lost without a word."""
     path = tmp_path / "run.sqlite"
     content = bytearray(stored(path))

@@ -16,7 +16,7 @@ def test_a_target_says_how_much_is_missing() -> None:
 
 
 @pytest.mark.parametrize("bad", [[0.1, 0.2], [0.0, np.nan, 0.0], [np.inf, 0.0, 0.0], "here", None], ids=str)
-def test_a_place_that_is_none_is_refused(bad: object) -> None:
+def test_an_invalid_place_is_refused(bad: object) -> None:
     with pytest.raises(InvalidValue, match="three finite numbers"):
         ReachTarget(bad)  # type: ignore[arg-type]  # the test is about wrong types
 

@@ -40,7 +40,7 @@ def appender(path, agent, until=10**9, **options):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT, **options)
 
 
-def test_what_was_appended_is_loaded_as_it_was(tmp_path):
+def test_appended_transitions_are_loaded_unchanged(tmp_path):
     path = tmp_path / "run.sqlite"
     with TransitionStore(path, "torso") as store:
         for n in range(1, 30):
@@ -107,7 +107,7 @@ def test_the_differing_entries_of_nested_settings_are_reported(tmp_path):
             store.bind({})
 
 
-def test_a_record_with_fewer_settings_is_not_gone_on_with_and_says_what_it_is_good_for(tmp_path):
+def test_a_record_with_fewer_settings_is_refused_with_its_possible_uses(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.bind({"seed": 1})
         with pytest.raises(
@@ -126,7 +126,7 @@ def test_when_each_was_committed_is_on_record(tmp_path):
     assert len(times) == 3 and begin <= times[0] <= times[1] <= times[2] <= time.time()
 
 
-def test_nobody_is_a_valid_agent_name(tmp_path):
+def test_an_empty_name_is_a_valid_agent_without_data(tmp_path):
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
         store.bind({"seed": 1})
         store.append(transition(1))

@@ -60,7 +60,7 @@ def test_the_model_is_judged_by_ratios_of_the_same_round() -> None:
     assert not any(name.startswith("hulls") for name in passed)  # printed beside them
 
 
-def test_the_report_fits_80_columns_and_marks_what_falls_short() -> None:
+def test_the_report_fits_80_columns_and_marks_failed_requirements() -> None:
     from experiments.bench.model import report
 
     lines = report(model_result(ours=5.0, passed=False)).splitlines()

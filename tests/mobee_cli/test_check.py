@@ -26,7 +26,7 @@ def bad(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", [*shipped_robots(), *shipped_worlds()])
-def test_what_is_shipped_passes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_shipped_files_pass(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", name]) == 0
     assert "warning" not in capsys.readouterr().out
 
@@ -69,7 +69,7 @@ def test_with_a_world_the_robot_is_checked_in_it(good: Path, tmp_path: Path, cap
 
 
 @pytest.mark.parametrize("text", ["<World", "<Robot/>", ""])
-def test_what_cannot_be_read_is_bad_input_in_one_line(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unreadable_file_is_bad_input_in_one_line(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "broken.xml"
     path.write_text(text)
     assert main(["check", str(path)]) == 2
@@ -122,7 +122,7 @@ def touching(tmp_path: Path) -> Path:
     return path
 
 
-def test_write_srdf_says_what_it_wrote_and_how_it_is_found(touching: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_write_srdf_prints_the_written_pairs_and_the_file(touching: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(touching), "--write-srdf"]) == 0
     said = capsys.readouterr().out
     words = " ".join(said.split())

@@ -39,7 +39,7 @@ def test_existing_files_are_kept_by_default(tmp_path: Path, capsys: pytest.Captu
     assert main(["convert", "katana", str(tmp_path / "k.urdf"), "--force"]) == 0
 
 
-def test_an_old_robot_goes_into_todays_form_with_what_was_understood(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_old_robot_is_converted_with_remarks_on_its_interpretation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "parts").mkdir()
     (tmp_path / "new").mkdir()
     old, new = tmp_path / "parts" / "old.xml", tmp_path / "new" / "new.xml"

@@ -21,7 +21,7 @@ def examined(capsys: pytest.CaptureFixture[str], port: int) -> tuple[int, dict[s
     return code, {one["subject"]: one for one in json.loads(capsys.readouterr().out)}
 
 
-def test_each_subject_has_a_verdict_and_what_is_wrong_has_a_remedy(free_port: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_subject_has_a_verdict_and_each_fault_a_remedy(free_port: int, capsys: pytest.CaptureFixture[str]) -> None:
     code, found = examined(capsys, free_port)
     assert {"Python", "processor", "memory", "folder", "native core", "extra live", "extra viz", "OpenGL", "systems"} <= set(found)
     assert found["Python"]["verdict"] == found["native core"]["verdict"] == found["extra live"]["verdict"] == "ok"

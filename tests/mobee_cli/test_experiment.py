@@ -53,7 +53,7 @@ def test_the_help_of_an_experiment_fits_the_terminal(name, capsys):
     assert all(len(line) <= 80 for line in capsys.readouterr().out.splitlines())
 
 
-def test_a_run_that_goes_on_elsewhere_is_left_alone(tmp_path, capsys):
+def test_a_run_that_continues_in_another_process_is_not_changed(tmp_path, capsys):
     main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
     folder = Path(json.loads(capsys.readouterr().out)["run"])
     before = (folder / "flood.csv").read_bytes()
@@ -157,7 +157,7 @@ def test_a_run_refused_after_its_first_record_keeps_it(tmp_path, monkeypatch):
     assert (folder / "records.csv").read_text() == "depth\n1.0\n"
 
 
-def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
+def test_ctrl_c_leaves_the_finished_records_and_prints_how_to_continue(tmp_path):
     argv = [sys.executable, "-m", "mobee_cli", "experiment", "run", "model-throughput", "--robots", "katana", "--runs", str(tmp_path)]
     with subprocess.Popen(argv, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         give_up = time.monotonic() + 120.0
@@ -174,7 +174,7 @@ def test_ctrl_c_leaves_the_finished_records_and_says_how_to_go_on(tmp_path):
     assert "Traceback" not in out + err
 
 
-def test_resume_without_a_name_goes_on_with_the_newest_run(tmp_path, capsys):
+def test_resume_without_a_name_continues_the_newest_run(tmp_path, capsys):
     for _ in range(2):
         main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path), "--json"])
         newest = json.loads(capsys.readouterr().out)["run"]

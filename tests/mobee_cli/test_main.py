@@ -86,7 +86,7 @@ def test_ctrl_c_is_no_success(
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["echo", "clock"], 0), (["hz", "clock"], 0), (["list"], 130)])
-def test_ctrl_c_is_how_to_end_what_has_no_end(arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_ends_a_verb_without_an_end(arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(topic, "connected", lambda _: contextlib.nullcontext())
     monkeypatch.setattr(topic, "listen", interrupt)
     assert main(["topic", *arguments]) == code
@@ -125,7 +125,7 @@ def test_the_verbs_of_an_operator_import_no_library() -> None:
     assert done.stdout.strip() == "False"
 
 
-def test_robots_lists_what_is_shipped() -> None:
+def test_robots_lists_the_shipped_files() -> None:
     done = mobee("robots")
     assert done.returncode == 0
     assert "icub         41 motors: torso 3, head 6, left_arm 16, right_arm 16" in done.stdout

@@ -189,7 +189,7 @@ def endpoint(free_port: int) -> str:
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake.words.replace(" ", "_"))
-def test_a_mistake_is_answered_with_what_where_and_what_next(
+def test_a_mistake_is_answered_with_its_place_and_the_next_step(
     mistake: Mistake, folder: Path, endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)

@@ -36,7 +36,7 @@ def planned(run: Path, *words: str, capsys: pytest.CaptureFixture[str]) -> dict[
     return dict(json.loads(capsys.readouterr().out))
 
 
-def test_the_path_goes_round_what_never_worked_and_says_so(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_path_avoids_actions_that_never_succeeded_and_names_them(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "--run", str(run), "--from", "0", "--to", "2"]) == 0
     first, *steps, mean, shortest, failing, avoided = capsys.readouterr().out.splitlines()
     assert first.startswith("torso, by 600 transitions: from state 0 to 2 by 4 actions, all as expected with probability 0.9")

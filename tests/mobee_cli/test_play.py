@@ -37,7 +37,7 @@ def test_without_a_robot_the_icub_finds_its_table(tmp_path: Path, capsys: pytest
     assert all(config.continues == found["store"] for config in agents.values())
 
 
-def test_what_it_saves_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_saved_files_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
     arm.write_text(ARM)
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 0
@@ -61,7 +61,7 @@ def test_a_port_in_use_is_said_before_it_learns(tmp_path: Path, capsys: pytest.C
     assert "actions tried" not in printed.out and not list(tmp_path.iterdir())
 
 
-def test_a_ctrl_c_while_it_learns_keeps_what_was_learned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_ctrl_c_during_learning_keeps_all_transitions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arm, store = tmp_path / "arm.urdf", tmp_path / "mine" / "tiny_arm.sqlite"
     arm.write_text(ARM)
     main_thread = threading.main_thread().ident
@@ -96,7 +96,7 @@ def test_a_file_that_mobee_learn_did_not_write_is_refused(tmp_path: Path, capsys
     assert "x.toml: no such scenario beside" in capsys.readouterr().err
 
 
-def test_what_the_file_draws_and_its_cameras_go_on_live(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_visuals_and_cameras_of_the_file_are_used_live(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
     drawn = '<visual><geometry><mesh filename="lower.stl"/></geometry></visual>'
     arm.write_text(ARM.replace('<link name="lower">', f'<link name="lower">{drawn}'))

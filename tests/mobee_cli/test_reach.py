@@ -118,7 +118,7 @@ def test_a_run_that_does_not_fit_is_refused_in_one_line(learned: Path, capsys: p
         (["--object", "balll"], "Did you mean 'ball'?"),
     ],
 )
-def test_what_cannot_be_reached_for_is_refused_in_one_line(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_invalid_reach_target_is_refused_in_one_line(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["reach", "--offline", *words]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -144,7 +144,7 @@ def test_what_reaches_is_chosen_and_the_choice_is_printed(
     assert max(map(len, said.splitlines())) <= 80
 
 
-def test_the_left_palm_reaches_for_what_is_on_the_left(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_left_palm_reaches_for_targets_on_the_left(capsys: pytest.CaptureFixture[str]) -> None:
     _, result = reach("--target", "-0.3", "-0.2", "0.1", capsys=capsys)
     assert (result["marker"], result["part"]) == ("left_palm", "left_arm")
 

@@ -73,7 +73,7 @@ def test_a_run_is_seen_again_at_any_time(tmp_path: Path) -> None:
         assert shown.stderr.read() == ""
 
 
-def test_what_is_no_run_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_is_no_run_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(tmp_path / "none")]) == 2
     assert "there is no such folder" in capsys.readouterr().err
     assert main(["replay", str(tmp_path)]) == 2

@@ -47,7 +47,7 @@ def test_columns_beyond_the_width_are_in_a_further_table():
     assert results_text(found, 12).splitlines() == ["   one  two", "7    1    2", "8    1    2", "   three", "7      3", "8      3"]
 
 
-def test_what_stands_alone_is_a_line_each():
+def test_single_values_are_one_line_each():
     found = {"passed": True, "judged": None, "objective": [1.0, 0.5], "found": {}, "claims": {"nothing touches": False}}
     said = ["passed: yes", "judged: -", "objective: 1, 0.5", "found: none", "claims:", "  nothing touches: no"]
     assert results_text(found, 80).splitlines() == said

@@ -341,7 +341,7 @@ def test_build_takes_a_task_and_describes_the_map(say: Say, free: Path, tmp_path
     assert given["spacing"] == 0.02 and given["task"].names == ("right_palm x", "right_palm y")
 
 
-def test_an_interrupted_build_says_how_to_go_on(say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_build_prints_how_to_continue(say: Say, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(model: mobee.Model, **settings: Any) -> Roadmap:
         settings["progress"](SimpleNamespace(vertices=30, evaluations=400, open=10, seconds=12.0))
         settings["file"].write_bytes(b"")

@@ -15,7 +15,7 @@ def service(**changes: object) -> dict[str, object]:
     return plain | {"health": HEALTH, "warnings": []} | changes
 
 
-def test_each_process_has_a_row_of_health_in_80_columns_and_what_is_bad_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_process_has_a_row_of_health_in_80_columns_with_bad_numbers_marked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     services = {"robot_sim": service(), "controller": service(warnings=["gap"]), "vision": service(state="down", health={})}
     text = _as_text({"services": services, "parts": {}, "agents": {}})

@@ -52,7 +52,7 @@ def test_every_file_has_a_licence_whose_text_is_here() -> None:
     assert {name: licence for name in tracked() if (licence := licence_of(name)) not in texts} == {}
 
 
-def test_what_derives_from_the_icub_s_models_keeps_their_licence() -> None:
+def test_files_derived_from_icub_models_keep_their_licence() -> None:
     assert {name for name in tracked() if licence_of(name) == CC} == DERIVED_FROM_ICUB_MODELS
 
 
@@ -67,7 +67,7 @@ def test_a_robot_under_another_licence_says_so_at_its_head(name: str) -> None:
     assert f"SPDX-License-Identifier: {CC}" in head
 
 
-def test_the_icub_names_its_source_and_what_was_changed() -> None:
+def test_the_icub_names_its_source_and_the_changes() -> None:
     head = (ROOT / "mobee/robot/robots/icub.xml").read_text()[:1200]
     for words in ("https://github.com/robotology/icub-models", "https://creativecommons.org/licenses/by-sa/4.0/", "Istituto", "Changed:"):
         assert words in head

@@ -359,7 +359,7 @@ def test_random_bytes_do_it_no_harm(stage: Stage, rng: np.random.Generator) -> N
     assert agent.is_running
 
 
-def test_an_agent_that_is_asked_to_rest_gives_its_goal_away_and_goes_on_later(stage: Stage) -> None:
+def test_an_agent_that_is_asked_to_rest_releases_its_goal_and_continues_later(stage: Stage) -> None:
     agent = stage.agent()
     n = len(stage.made(2))
     stage.rig.call(keys.service_rpc("agent_torso", "rest"), Empty, Done)

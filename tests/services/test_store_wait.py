@@ -41,7 +41,7 @@ class Disk:
         self.kept.append(data)
 
 
-def test_what_the_disk_refuses_is_written_once_when_there_is_room_however_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_write_that_the_disk_refuses_is_repeated_until_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
     service, disk = Quick(monkeypatch), Disk([NoRoom("full")] * 3600)
     waits = StoreWait(service)  # type: ignore[arg-type]  # a service without a bus
     waits.let_append_wait(disk)

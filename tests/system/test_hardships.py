@@ -112,7 +112,7 @@ def send_random_bytes(watcher: Watcher) -> None:
         until(lambda who=who: sum(watcher.stat(who).rejected.values()) >= 40, 10.0, f"the refusals of {who}")
 
 
-def test_random_bytes_on_every_key_are_refused_and_nothing_dies(live: tuple[Launch, Watcher]) -> None:
+def test_random_bytes_on_every_key_are_refused_and_no_process_ends(live: tuple[Launch, Watcher]) -> None:
     system, watcher = live
     run = watcher.run
     send_random_bytes(watcher)

@@ -117,7 +117,7 @@ def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher
 
 
 @pytest.mark.parametrize("who", ["vision", "renderer", "monitor"])
-def test_those_who_only_watch_hold_nothing(live: tuple[Launch, Watcher], who: str) -> None:
+def test_observers_cause_no_hold(live: tuple[Launch, Watcher], who: str) -> None:
     """A stall of the machine may hold the robot at any time; a dependence on the one killed would at every kill."""
     _, watcher = live
     held = []

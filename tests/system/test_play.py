@@ -17,7 +17,7 @@ from tests.mobee_cli.test_learn import ARM
 
 @pytest.mark.system
 @pytest.mark.untimed
-def test_a_robot_goes_on_live_with_what_it_learned_offline(tmp_path: Path) -> None:
+def test_a_robot_continues_live_from_offline_transitions(tmp_path: Path) -> None:
     arm = tmp_path / "arm.urdf"
     arm.write_text(ARM)
     command = [sys.executable, "-m", "mobee_cli", "play", str(arm), "--headless", "--transitions", "12", "--duration", "12", "--json"]

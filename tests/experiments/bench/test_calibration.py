@@ -61,7 +61,7 @@ def test_a_crew_does_the_work_and_ends() -> None:
     assert [process.poll() for process in processes] == [0, 0]
 
 
-def test_ages_of_a_bare_chain_count_ticks_since_what_was_answered_last() -> None:
+def test_ages_of_a_bare_chain_count_ticks_since_the_last_answer() -> None:
     ages = bare_ages(rate=100.0, seconds=0.3)
     assert len(ages) == 30 and ages.dtype == np.int64
     assert ages[0] == 1 and (ages >= 1).all()

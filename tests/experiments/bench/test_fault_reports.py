@@ -41,14 +41,14 @@ def test_a_broken_promise_counts_always_and_a_time_on_a_quiet_machine(given: dic
     assert "times are not judged" in report if given["load"] > faults.QUIET else "times" not in report
 
 
-def test_the_effect_of_a_fault_is_told_only_if_no_other_is_near() -> None:
+def test_the_effect_of_a_fault_is_measured_only_if_no_other_is_near() -> None:
     schedule = [Fault(0.0, "freeze", "model", 1.0), Fault(1.5, "kill", "model"), Fault(4.0, "kill", "model"), Fault(4.5, "kill", "model")]
     assert [fault.at for fault, _, _ in faults._alone(schedule, [10.0, 11.5, 14.0, 14.5])] == [0.0]
     schedule[3] = Fault(6.0, "kill", "model")
     assert [fault.at for fault, _, _ in faults._alone(schedule, [10.0, 11.5, 14.0, 16.0])] == [0.0, 4.0, 6.0]
 
 
-def test_the_report_of_stops_fits_80_columns_and_names_what_has_ended() -> None:
+def test_the_report_of_stops_fits_80_columns_and_names_ended_processes() -> None:
     row = {"flood": "calls of robot_sim's stat", "stop_ms_p50": 12.0, "stop_ms_p99": 168.2, "connect_ms_p50": 4.0, "connect_ms_p99": 60.0}
     row |= {"armed_again": 12, "ended": ["model"], "load": 2.0}
     given = {"stops": 12, "at_most_ms": 50.0, "floods": [row], "load": 2.0, "times_judged": True, "late": ["tokens"], "passed": False}

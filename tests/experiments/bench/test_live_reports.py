@@ -54,7 +54,7 @@ def test_lockstep_is_judged_by_the_speed_on_the_standard_machine() -> None:
     assert lockstep.judged_run(lockstep.Case("kinematic", 100), lockstep_summary(0.1), speed=1.0)["passed"]  # nothing is required
 
 
-def test_the_table_of_lockstep_fits_80_columns_and_marks_what_falls_short() -> None:
+def test_the_table_of_lockstep_fits_80_columns_and_marks_failed_requirements() -> None:
     runs = [lockstep.judged_run(lockstep.CASES[1], lockstep_summary(*of_one), speed=0.5) for of_one in ((12.0,), (1.0,), (12.0, False))]
     lines = lockstep.report({"seconds": 20.0, "speed": 0.5, "runs": runs, "passed": False}).splitlines()
     assert max(map(len, lines)) <= 80
@@ -95,7 +95,7 @@ def test_live_ages_are_judged_beside_those_of_a_bare_chain(rate: int, p99: float
     assert live.judged_run(rate, live_summary(p99), bare)["passed"] is passed
 
 
-def test_the_table_of_the_live_chain_fits_80_columns_and_marks_what_is_late() -> None:
+def test_the_table_of_the_live_chain_fits_80_columns_and_marks_late_commands() -> None:
     runs = [live.judged_run(1000, live_summary(p99), 2.0) for p99 in (5.0, 17.0)]
     lines = live.report({"backend": "kinematic", "seconds": 30.0, "runs": runs, "passed": False}).splitlines()
     assert max(map(len, lines)) <= 80

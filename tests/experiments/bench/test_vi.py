@@ -29,7 +29,7 @@ def test_wrong_values_of_a_peer_raise(monkeypatch):
         contestants(problem_of_size(100))
 
 
-def test_changes_there_and_back_leave_what_an_agent_knew_as_it_was():
+def test_changes_and_their_reversals_restore_the_model():
     known = after_transitions(50, 5)
     before = known.tables.probabilities.copy(), known.tables.reward.copy()
     assert len(known.changes) == 10

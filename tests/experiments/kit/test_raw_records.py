@@ -50,7 +50,7 @@ def test_a_record_that_is_empty_too_large_absent_or_damaged_is_refused(run, monk
         pass
 
 
-def test_the_table_is_what_the_raw_records_give():
+def test_the_table_follows_from_the_raw_records():
     assert claims_table.all_differences(claims_table.recorded()) == []
 
 

@@ -10,7 +10,7 @@ from experiments.kit.records import Records, Row, read_records
 COLUMNS = ("robot", "objects")
 
 
-def test_records_are_on_disk_at_once_and_go_on_behind_the_old_ones(tmp_path):
+def test_records_are_on_disk_at_once_and_appended_to_old_ones(tmp_path):
     path = tmp_path / "records.csv"
     assert read_records(path, COLUMNS) == []
     for objects in (1, 2):

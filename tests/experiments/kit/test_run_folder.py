@@ -24,7 +24,7 @@ def test_two_runs_in_one_second_get_two_folders_and_the_newest_is_found(tmp_path
     assert newest_run(tmp_path, "model-throughput") == folders[-1]
 
 
-def test_what_is_no_run_is_refused(tmp_path):
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(mobee.InvalidValue, match="no run of 'model-throughput'.*mobee experiment run model-throughput"):
         newest_run(tmp_path, "model-throughput")
     with pytest.raises(mobee.InvalidValue, match="not the folder of a run"):

@@ -130,7 +130,7 @@ def test_one_bound_is_enough_to_decide():
     assert decides((1.1, 1.2), most=1.0) is False and decides((0.8, 1.2), least=1.0) is None and decides((1.0, 1.2), least=1.0) is True
 
 
-def test_a_mean_is_told_with_its_interval():
+def test_a_mean_is_printed_with_its_interval():
     assert estimate([3.0, 3.0, 3.0]) == "3.00 [3.00, 3.00]"
     assert estimate([321, 320, 320, 320], 0).startswith("320 [320, ")
 
@@ -146,7 +146,7 @@ def test_equal_counts_have_no_spread():
     assert gini([4, 4, 4]) == pytest.approx(0.0) and relative_spread([4, 4, 4]) == 0.0
 
 
-def test_a_ratio_is_told_with_its_interval():
+def test_a_ratio_is_printed_with_its_interval():
     assert ratio_estimate([2.0, 2.0], [4.0, 4.0]) == "0.50 [0.50, 0.50]"
     assert mean_over(["a", "bbb"], len) == 2.0
 
@@ -217,7 +217,7 @@ def test_an_effect_beyond_its_published_size_is_stronger_on_one_side_alone(span,
     assert about(span, 0.4, 0.6, stronger_below=True) == verdict
 
 
-def test_rules_tell_the_estimate_and_judge_its_interval():
+def test_rules_print_the_estimate_and_judge_its_interval():
     assert within([0.5, 0.5], least=0.4, text="share {}") == ("share 0.50 [0.50, 0.50]", True)
     assert ratio_within([2.0, 2.0], [4.0, 4.0], most=0.4) == ("0.50 [0.50, 0.50]", False)
     assert texts({"least_tried": [1.0, 1.0], 0.5: [2.0]}, 1) == "least tried 1.0 [1.0, 1.0], 0.5 2.0 [2.0, 2.0]"

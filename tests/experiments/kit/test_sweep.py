@@ -107,7 +107,7 @@ def test_a_cell_that_fails_is_named_and_the_others_are_finished(tmp_path, jobs):
     assert "the toy is broken" in (tmp_path / "cells" / "toy-s1.failed.txt").read_text()
 
 
-def test_a_cell_whose_process_dies_is_named_and_the_others_are_finished(tmp_path):
+def test_a_cell_whose_process_ends_is_named_and_the_others_are_finished(tmp_path):
     with pytest.raises(CellsFailed, match=r"toy-s0: its process died: killed by signal 9"):
         run_cells(work, cells(4, dies=0), tmp_path, options(str(tmp_path), "--jobs", "2"))
     assert set(load_cells(tmp_path)) == {"toy-s1", "toy-s2", "toy-s3"}

@@ -91,7 +91,7 @@ def test_stores_below_a_run_give_the_curves_of_their_agents(tmp_path: Path) -> N
     assert curves(tmp_path / FOLDER / "launch" / space.part) == curves(tmp_path / "live" / space.part)
 
 
-def test_learn_writes_curves_and_begins_them_anew_when_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_learn_writes_curves_and_new_ones_when_it_continues(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arm = tmp_path / "arm.urdf"
     arm.write_text(ARM)
     for count in ("4", "7"):

@@ -76,7 +76,7 @@ def test_lines_end_as_those_of_the_file_do(urdf: Path) -> None:
     assert srdf.read_bytes() == f'<robot name="toy">\r\n {LINE}\r\n</robot>\r\n'.encode()
 
 
-def test_another_file_takes_over_what_the_robot_was_read_with(urdf: Path, tmp_path: Path) -> None:
+def test_another_srdf_keeps_the_content_of_the_robot_s_own(urdf: Path, tmp_path: Path) -> None:
     srdf = urdf.with_suffix(".srdf")
     srdf.write_text(OLD)
     done = leave_out_touching(urdf, tmp_path / "other.srdf")

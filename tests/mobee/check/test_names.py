@@ -38,7 +38,7 @@ def test_names_that_differ_in_case_only_are_found(tmp_path: Path) -> None:
     assert finding.what == "marker 'tip' differs from marker 'Tip' in upper and lower case only"
 
 
-def test_the_same_name_for_things_of_different_kinds_is_none(tmp_path: Path) -> None:
+def test_one_name_for_elements_of_different_kinds_is_not_reported(tmp_path: Path) -> None:
     assert named(arm(tmp_path, ("<marker", '<marker name="PAN" px="0.1"/><marker')), "name-case") == []
 
 

@@ -27,7 +27,7 @@ def test_a_version_that_is_not_known_is_refused(tmp_path: Path) -> None:
         check_file(world)
 
 
-def test_a_file_of_an_older_version_is_noted_with_what_shows_it(tmp_path: Path) -> None:
+def test_a_file_of_an_older_version_is_noted_with_the_evidence(tmp_path: Path) -> None:
     path = robot_file(tmp_path, *ARM.replace('name="tip"', 'name="tip" tracer="3"').replace('name="pan" z', "z").splitlines())
     text = path.read_text().replace('version="2.0"', 'version="1.0"')
     for name in ("upper", "fore", "bend"):

@@ -13,7 +13,7 @@ from mobee.robot.robot import Shape
 from tests.mobee.check.arm import arm, named
 
 
-def test_a_robot_in_millimetres_is_found_by_what_lies_farthest_out(tmp_path: Path) -> None:
+def test_a_robot_in_millimetres_is_found_by_its_farthest_element(tmp_path: Path) -> None:
     findings = check_robot(arm(tmp_path, ('name="fore" x="-0.2"', 'name="fore" x="-200"')))
     (finding,) = [finding for finding in findings if finding.check == "unit"]
     assert finding.what.startswith("the robot is 200 m across; the farthest out is")

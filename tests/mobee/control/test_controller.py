@@ -114,7 +114,7 @@ def test_given_forces_are_used_and_remembered() -> None:
     assert controller.acceleration == pytest.approx(forces.total)
 
 
-def test_position_commands_integrate_the_own_reference_whatever_the_encoders_say() -> None:
+def test_position_commands_integrate_the_reference_and_not_the_encoders() -> None:
     controller = arm_controller(modality="position")
     controller.attractor = GOAL
     free = Forces(np.zeros(3), np.zeros(3), np.zeros(3))

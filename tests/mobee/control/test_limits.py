@@ -36,7 +36,7 @@ def test_continuous_with_the_slope_of_the_ramp(q: float, width: float) -> None:
 
 
 @given(st.floats(0.0, 2.0))
-def test_the_ramp_goes_on_beyond_the_limit(beyond: float) -> None:
+def test_the_ramp_continues_beyond_the_limit(beyond: float) -> None:
     assert at(3.0 + beyond) == pytest.approx(-1.0 - beyond)
     assert at(-3.0 - beyond) == pytest.approx(1.0 + beyond)
 

@@ -71,7 +71,7 @@ def test_marker_and_columns_are_those_of_the_model_for_any_tree(seed: int) -> No
 
 @BOTH
 @given(seed=SEEDS)
-def test_what_is_kept_between_ticks_changes_no_bit(gains: Gains, seed: int) -> None:
+def test_data_cached_between_ticks_change_no_bit(gains: Gains, seed: int) -> None:
     """Of joints that rest: a law that has just begun says the same.  (The default law's smoothed error is another thing.)"""
     rng = np.random.default_rng(seed)
     model, q = Model(ICUB), ICUB.home.copy()
@@ -118,7 +118,7 @@ def test_parts_reach_side_by_side_as_each_alone(gains: Gains) -> None:
     assert not constraint_force(both, ICUB.home).any()
 
 
-def test_a_reach_goes_on_with_what_it_remembers_when_the_forces_of_clients_end() -> None:
+def test_a_reach_keeps_its_state_when_the_forces_of_clients_end() -> None:
     controller = Controller(Model(ICUB), Gains.default())
     controller.reach_toward("right_arm", "right_palm", ReachTarget((-3.0, 0.1, 0.1)))
     controller.step(ICUB.home, 0.01)

@@ -166,7 +166,7 @@ def test_without_a_history_it_is_stuck_until_the_pose_is_accepted() -> None:
     assert reflex.tick(at(1), (*WALL, *OTHER)) is not None  # only what was there is accepted
 
 
-def test_what_was_accepted_counts_again_once_it_was_away() -> None:
+def test_an_accepted_violation_counts_again_after_it_was_absent() -> None:
     reflex = Reflex(quick(release=2 * DT, dead_time=DT), DT, FAST)
     for _ in range(5):
         reflex.tick(at(1), WALL)

@@ -125,7 +125,7 @@ def test_requested_joints_make_the_part(tmp_path: Path) -> None:
         derive(load_robot("icub"), {"left_arm": ("r_elbow",)})
 
 
-def test_what_is_derived_is_written_and_learns_without_contact(tmp_path: Path) -> None:
+def test_a_derived_robot_is_written_and_learns_without_contact(tmp_path: Path) -> None:
     robot = urdf(tmp_path, limb("left_shoulder", 0.0, 0.35, 0.2), limb("right_shoulder", 0.0, -0.35, 0.2))
     derived = derive(robot)
     assert derived.field > 0.0 and len(derived.robot.field_pairs)

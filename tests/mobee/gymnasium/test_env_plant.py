@@ -121,7 +121,7 @@ def test_states_and_actions_may_begin_anywhere() -> None:
     assert [int(plant.act("environment", plant.space.aim(0, action)).q[0]) for action in (0, 1)] == [0, 1]
 
 
-def test_what_is_not_discrete_or_not_there_is_refused() -> None:
+def test_invalid_spaces_parts_and_actions_are_refused() -> None:
     with pytest.raises(mobee.InvalidValue, match="must be Discrete"):
         EnvPlant(gymnasium.make("CartPole-v1"))
     plant = EnvPlant(gymnasium.make("MoBeE/RiverSwim-v0"))

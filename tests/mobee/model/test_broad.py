@@ -43,7 +43,7 @@ def test_a_grid_hides_nothing(robot: str, places: str, rng: np.random.Generator,
     assert torque == pytest.approx(plain_torque, abs=1e-12)  # summed in another order
 
 
-def test_objects_touch_whatever_their_number(rng: np.random.Generator) -> None:
+def test_contacts_do_not_depend_on_the_number_of_objects(rng: np.random.Generator) -> None:
     """A grid begins at 100 objects; the first ones touch the same before and after."""
     robot = loaded("icub")
     world, q = random_world(rng, robot, 98, 0.5), posed(rng, robot, 5)

@@ -55,7 +55,7 @@ def test_contacts_are_those_of_all_tested_pairs_one_by_one(seed: int, joints: in
 
 @pytest.mark.parametrize("name", ["icub", "icub_2014", "katana"])
 @pytest.mark.parametrize("objects", [0, 1, 99, 100, 101, 500])
-def test_shipped_robots_touch_what_they_should(name: str, objects: int, rng: np.random.Generator) -> None:
+def test_contacts_of_shipped_robots_agree_with_the_reference(name: str, objects: int, rng: np.random.Generator) -> None:
     robot = loaded(name)
     world = random_world(rng, robot, objects, scale=0.6)
     touched = sum(assert_same(robot, q, world, who_reaches(rng, robot)) for q in posed(rng, robot, 3))
@@ -170,7 +170,7 @@ def test_evaluations_leave_one_room_behind_not_one_each(rng: np.random.Generator
     assert len(engine._rooms) == 1
 
 
-def test_what_is_attached_to_no_link_of_the_robot_is_refused() -> None:
+def test_an_object_attached_to_an_unknown_link_is_refused() -> None:
     world = mobee.World()
     world.add("ball", mobee.sphere(0.1))
     world.attach("ball", "tail", ((0.0, 0.0, 0.0), np.eye(3)))

@@ -119,7 +119,7 @@ def test_poses_in_arrays_of_every_kind_are_the_same_poses(rng: np.random.Generat
     [np.nan, np.inf, -np.inf, 1j, "pose", None, [[0.0], [0.0, 1.0]], np.zeros(3), np.zeros((2, 40)), np.array(["0"] * 41), np.array(0.0)],
     ids=lambda wrong: type(wrong).__name__ if isinstance(wrong, np.ndarray) else repr(wrong),
 )
-def test_what_is_no_pose_is_refused_in_one_line(wrong: object) -> None:
+def test_an_invalid_pose_is_refused_in_one_line(wrong: object) -> None:
     model = mobee.Model(loaded("icub"), mobee.World())
     given = np.full(41, wrong) if isinstance(wrong, float | complex) else wrong
     with pytest.raises(InvalidValue) as refused:

@@ -14,7 +14,7 @@ def test_sizes_are_kept_in_the_order_given():
 
 
 @pytest.mark.parametrize("length", [0.0, -0.1, float("nan"), float("inf"), 1e160, 1e-10, "a", None, True, [1.0]])
-def test_a_length_that_is_none_is_refused_by_name(length):
+def test_an_invalid_length_is_refused_by_name(length):
     with pytest.raises(mobee.InvalidValue, match="cylinder: height"):
         mobee.cylinder(0.1, length)
 

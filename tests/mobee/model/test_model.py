@@ -176,7 +176,7 @@ def test_attach_names_the_nearest_link_and_object(model):
 
 
 @pytest.mark.parametrize("engine", ["compiled", "fcl"])
-def test_what_is_attached_to_no_link_of_the_robot_is_refused_by_name(model, engine):
+def test_an_object_attached_to_an_unknown_link_is_refused_by_name(model, engine):
     world = model.world
     for name in ("cup", "ball"):
         world.add(name, mobee.sphere(0.04))
@@ -204,7 +204,7 @@ def test_what_is_attached_to_no_link_of_the_robot_is_refused_by_name(model, engi
         (np.array([[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]]), "motor 'm2' is inf"),
     ],
 )
-def test_what_is_no_configuration_is_refused(model, q, complaint):
+def test_an_invalid_configuration_is_refused(model, q, complaint):
     with pytest.raises(mobee.InvalidValue, match=complaint):
         model.evaluate(q)
 

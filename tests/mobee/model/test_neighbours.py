@@ -36,7 +36,7 @@ def test_one_list_serves_many_small_steps(model: mobee.Model) -> None:
     assert state(track)[2] == 48  # the first pose stands alone, the second makes the list
 
 
-def test_a_list_is_made_anew_when_its_skin_is_used_up(model: mobee.Model) -> None:
+def test_a_list_is_built_again_after_motions_beyond_its_skin(model: mobee.Model) -> None:
     track = model.track()
     creep(model, track, 200, 1e-3)
     assert state(track)[0] == LIST

@@ -13,7 +13,7 @@ from tests.mobee.model.random_scenes import loaded, posed, random_robot, random_
 
 
 @pytest.mark.parametrize("robot", [loaded("icub"), loaded("icub_2014"), loaded("katana"), random_robot(np.random.default_rng(3), 6, 40)])
-def test_the_core_places_every_shape_and_what_is_carried_where_its_link_is(robot: Robot, rng: np.random.Generator) -> None:
+def test_the_core_moves_shapes_and_carried_objects_with_their_links(robot: Robot, rng: np.random.Generator) -> None:
     things = [thing for thing in random_world(rng, robot, 12).objects.values() if thing.link is not None]
     tables = robot_tables(robot, [Carried(robot.links.index(thing.link or ""), volume_row(thing)) for thing in things])
     q = posed(rng, robot)

@@ -36,7 +36,7 @@ def test_the_robots_pairs_are_tested_and_no_others(seed: int, joints: int, shape
     assert pairs_of(robot, carried) == expected
 
 
-def test_what_is_carried_meets_neither_its_own_link_nor_one_that_is_not_tested_against_it() -> None:
+def test_a_carried_object_meets_neither_its_link_nor_links_untested_against_it() -> None:
     robot = loaded("icub")
     one, other = next(iter(robot.untested))
     assert not meets(robot, one, other)

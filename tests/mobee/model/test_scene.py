@@ -32,7 +32,7 @@ def test_every_free_object_stands_in_the_scene_once(count: int, rng: np.random.G
     assert (np.diff(here.starts) >= 0).all()
 
 
-def test_a_table_among_small_things_does_not_widen_the_grid(rng: np.random.Generator) -> None:
+def test_a_table_among_small_objects_does_not_widen_the_grid(rng: np.random.Generator) -> None:
     world = mobee.World()
     for index in range(200):
         world.add(f"o{index}", mobee.sphere(0.02), position=rng.uniform(-1, 1, 3))

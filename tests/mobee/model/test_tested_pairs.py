@@ -72,11 +72,11 @@ def test_a_ghost_meets_nothing(robot, link):
     assert pairs_of(robot, world_with("ghost", link)) == {(BASE, LOWER, "solid")}
 
 
-def test_what_a_link_carries_meets_what_the_link_meets(robot):
+def test_a_carried_object_meets_the_links_that_its_link_meets(robot):
     assert pairs_of(robot, world_with("obstacle", "lower")) == {(BASE, LOWER, "solid"), (BASE, OBJECT, "solid")}
 
 
-def test_what_a_link_carries_meets_free_objects_but_spares_targets_when_it_reaches(robot):
+def test_a_carried_object_meets_free_objects_but_ignores_targets_during_a_reach(robot):
     world = world_with("obstacle", "lower")
     world.add("ball", mobee.sphere(0.1), role="target")
     assert (OBJECT, OBJECT + 1, "solid") in pairs_of(robot, world)

@@ -17,7 +17,7 @@ from tests.mobee.model.random_scenes import loaded, posed, random_world
 THREADS = 8
 
 
-def test_threads_get_what_they_would_get_alone_while_others_edit(rng: np.random.Generator) -> None:
+def test_evaluations_in_threads_equal_single_ones_during_edits(rng: np.random.Generator) -> None:
     robot = loaded("katana")
     model, q = mobee.Model(robot, random_world(rng, robot, 120, 0.4)), posed(rng, robot, 40)
     stop = threading.Event()
@@ -91,7 +91,7 @@ def test_fewer_threads_than_one_are_refused() -> None:
         mobee.Model(robot).evaluate(robot.home, threads=0)
 
 
-def test_what_an_evaluation_has_given_stays_when_the_model_is_gone(rng: np.random.Generator) -> None:
+def test_results_of_an_evaluation_stay_valid_after_the_model_is_deleted(rng: np.random.Generator) -> None:
     """Its memory is the table's; later evaluations must not write there."""
     robot = loaded("icub")
     model, q = mobee.Model(robot, random_world(rng, robot, 150, 0.6)), posed(rng, robot, 200)

@@ -151,7 +151,7 @@ def test_a_skin_that_is_no_distance_is_refused(skin: float) -> None:
         mobee.Model(loaded("katana")).track(skin=skin)
 
 
-def test_a_pose_that_is_no_pose_is_refused_and_the_track_goes_on(rng: Rng) -> None:
+def test_an_invalid_pose_is_refused_and_the_track_continues(rng: Rng) -> None:
     model = mobee.Model(loaded("katana"))
     track, q = model.track(), model.robot.home
     track.evaluate(q)

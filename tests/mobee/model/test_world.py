@@ -43,7 +43,7 @@ def test_the_callers_array_is_not_kept(world):
     assert np.array_equal(world.objects["cup"].position, [1.0, 2.0, 3.0])
 
 
-def test_move_leaves_what_is_not_given(world):
+def test_move_keeps_the_position_or_rotation_that_is_not_given(world):
     world.move("cup", rotation=HALF_TURN)
     assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
     assert np.array_equal(world.objects["cup"].rotation, HALF_TURN)
@@ -78,7 +78,7 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
         ({"color": (255, 0, 0)}, "each 0 to 1"),
     ],
 )
-def test_what_is_no_pose_role_or_color_is_refused(world, given, complaint):
+def test_an_invalid_pose_role_or_color_is_refused(world, given, complaint):
     with pytest.raises(mobee.InvalidValue, match=complaint):
         world.add("thing", mobee.sphere(0.1), **given)
     assert list(world.objects) == ["cup"]
@@ -103,7 +103,7 @@ def test_an_attached_object_moves_only_with_its_link(world):
         world.move("cup", position=(0.0, 0.0, 0.0))
 
 
-def test_what_is_not_attached_cannot_be_detached(world):
+def test_an_object_that_is_not_attached_cannot_be_detached(world):
     with pytest.raises(mobee.InvalidValue, match="not attached"):
         world.detach("cup")
 
@@ -118,7 +118,7 @@ def test_a_name_is_text_that_is_not_empty(world, name):
 
 
 @pytest.mark.parametrize("shape", [0.1, "sphere", mobee.sphere])
-def test_what_is_no_shape_is_refused(world, shape):
+def test_an_invalid_shape_is_refused(world, shape):
     with pytest.raises(mobee.InvalidValue, match="must be a Geometry, as sphere"):
         world.add("lamp", shape)
 

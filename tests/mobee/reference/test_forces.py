@@ -51,7 +51,7 @@ def at(robot: Robot, gains: Gains, q: Array, **more: Any) -> State:
 
 
 @given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=6).map(np.array), SIZES, SIZES)
-def test_what_is_squashed_stays_below_its_maximum_and_keeps_its_sign_or_direction(v: Array, m: float, k: float) -> None:
+def test_a_squashed_vector_stays_below_its_maximum_and_keeps_sign_or_direction(v: Array, m: float, k: float) -> None:
     each, whole = squash(v, m, k), squash_norm(v, m, k)
     assert np.all(np.abs(each) < m) and np.all(each * v >= 0.0)
     assert np.linalg.norm(whole) < m

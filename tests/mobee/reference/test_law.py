@@ -81,7 +81,7 @@ def test_a_humanoid_at_the_table_moves_like_this(gains: Gains, rng: np.random.Ge
 
 
 @given(SEEDS)
-def test_what_is_sent_keeps_the_motors_limits_and_motors_without_weight_rest(seed: int) -> None:
+def test_commands_keep_the_motors_limits_and_motors_without_weight_rest(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot, gains = drawn_robot(rng), drawn_gains(rng).with_motors("m2", weight=0)
     q, n = drawn_pose(rng, robot, 0.0), len(robot.motors)

@@ -33,7 +33,7 @@ def drawn_parameters(rng: Rng, n: int) -> MotorParameters:
 
 
 @given(SEEDS)
-def test_whatever_is_commanded_the_simulated_motors_do_this(seed: int) -> None:
+def test_the_simulated_motors_follow_the_definition_under_any_commands(seed: int) -> None:
     """To the last bit: of every motor the same operations in the same order, without sums."""
     rng = np.random.default_rng(seed)
     robot = drawn_robot(rng)

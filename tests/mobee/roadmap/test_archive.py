@@ -32,7 +32,7 @@ def test_a_robot_with_another_body_is_another(icub: mobee.Robot, what: str) -> N
     assert robot_digest(replace(icub, **other)) != robot_digest(icub)
 
 
-def test_a_world_is_known_by_what_can_be_touched() -> None:
+def test_the_digest_of_a_world_depends_only_on_objects_that_can_be_touched() -> None:
     def world(ball: float = 0.1, role: str = "target", names: tuple[str, str] = ("ball", "block"), ghost: bool = False) -> str:
         made = mobee.World()
         things = [(names[0], mobee.sphere(0.03), ball, role), (names[1], mobee.box(1, 1, 1), 1.0, "obstacle")]
@@ -47,7 +47,7 @@ def test_a_world_is_known_by_what_can_be_touched() -> None:
     assert len(world()) == 16
 
 
-def test_what_a_link_carries_is_another_world() -> None:
+def test_attaching_an_object_changes_the_world_s_digest() -> None:
     free, carried = mobee.World(), mobee.World()
     for world in (free, carried):
         world.add("cup", mobee.sphere(0.03))

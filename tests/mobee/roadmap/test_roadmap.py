@@ -121,7 +121,7 @@ def test_a_map_of_another_robot_or_world_is_refused_with_both_digests(tmp_path: 
         load_roadmap(tmp_path / "map.npz", other)
 
 
-def test_what_is_no_map_is_refused_in_a_line(tmp_path: Path) -> None:
+def test_a_file_that_is_no_roadmap_is_refused_in_one_line(tmp_path: Path) -> None:
     square(table()).save(tmp_path / "map.npz")
     whole = (tmp_path / "map.npz").read_bytes()
     (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])

@@ -43,7 +43,7 @@ def test_an_unknown_inertia_stays_unknown_and_links_are_in_order() -> None:
     assert found[1].inertia is None
 
 
-def test_what_no_solid_thing_can_have() -> None:
+def test_impossible_moments_of_inertia_are_found() -> None:
     assert can_be(np.diag([1.0, 1.0, 2.0]))  # a flat disc
     assert not can_be(np.diag([1.0, 1.0, 2.1]))
     assert not can_be(np.diag([-0.1, 1.0, 1.0]))

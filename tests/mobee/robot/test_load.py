@@ -79,7 +79,7 @@ def test_the_katana_of_appendix_b_rests_without_touching_itself() -> None:
     assert Model(katana).evaluate(katana.home).contacts == ()
 
 
-def test_what_is_neither_name_nor_path_is_refused() -> None:
+def test_a_value_that_is_neither_name_nor_path_is_refused() -> None:
     with pytest.raises(InvalidValue, match="robot is 3; it must be a path, or a name: icub,"):
         load_robot(3)
     with pytest.raises(InvalidValue, match="world is None; .* table,"):

@@ -18,7 +18,7 @@ def test_a_recorded_descent_ends_where_a_link_and_a_joint_with_shapes_have_been_
     assert frozenset((1, 4)) in recorded_neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears nothing, so the descent goes on
 
 
-def test_a_descent_goes_on_past_elements_of_the_kind_that_it_began_with() -> None:
+def test_a_descent_continues_past_elements_of_its_first_kind() -> None:
     chain = bones(6)  # 1 joint, 2 link, 3 joint, 4 link, 5 joint, 6 link
     near = neighbours(chain, set(range(1, 7)))
     assert {frozenset((1, k)) for k in (2, 3)} <= near
@@ -28,7 +28,7 @@ def test_a_descent_goes_on_past_elements_of_the_kind_that_it_began_with() -> Non
     assert frozenset((1, 4)) in neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears no solid
 
 
-def test_what_hangs_on_the_same_element_is_near_with_what_lies_below_it() -> None:
+def test_elements_on_one_parent_are_neighbours_with_their_children() -> None:
     root = Element(-1, "link", "", -1)
     elements = [root, Element(0, "link", "a", -1), Element(0, "joint", "b", -1), Element(2, "link", "b", -1), Element(3, "joint", "b", -1)]
     near = recorded_neighbours(elements, {1, 2, 3, 4})

@@ -21,7 +21,7 @@ def test_shared_arrays_are_read_only() -> None:
     assert np.array_equal(robot.home + 1.0, free)
 
 
-def test_a_per_robot_value_is_built_once_for_each_robot_and_dies_with_it() -> None:
+def test_a_per_robot_value_is_built_once_for_each_robot_and_freed_with_it() -> None:
     built = []
 
     @per_robot

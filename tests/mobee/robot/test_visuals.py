@@ -96,7 +96,7 @@ def toy(tmp_path: Path) -> Robot:
         return load_robot(mjcf_file(tmp_path, MJCF))
 
 
-def test_an_mjcf_draws_what_cannot_collide_else_what_can(toy: Robot) -> None:
+def test_an_mjcf_draws_geoms_that_cannot_collide_or_else_all(toy: Robot) -> None:
     skin, ball = toy.visuals
     assert [toy.links[visual.link] for visual in toy.visuals] == ["arm", "tip"]
     assert skin.mesh is not None and (skin.kind, skin.mesh.file, skin.mesh.name) == ("mesh", "toy.xml", "wedge")

@@ -30,7 +30,7 @@ def pairs(robot: Robot, table: Ints) -> set[str]:
     return {"".join(sorted((robot.shapes[a].name, robot.shapes[b].name))) for a, b in table.tolist()}
 
 
-def test_listed_leaves_out_nothing_but_what_is_named(tmp_path: Path) -> None:
+def test_adjacency_listed_excludes_only_named_pairs(tmp_path: Path) -> None:
     robot = read(tmp_path)
     assert pairs(robot, robot.solid_pairs) == {"ab", "ac", "bc"}
     assert pairs(robot, robot.field_pairs) == {"bfcf"}

@@ -48,7 +48,7 @@ def test_broken_xml_is_refused_with_its_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "says"), [("", "not well-formed XML"), ("no xml at all", "not well-formed XML"), ("\x00\x01", "not well-formed XML")]
 )
-def test_what_is_no_xml_is_refused(tmp_path: Path, text: str, says: str) -> None:
+def test_a_file_that_is_no_xml_is_refused(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(RobotFileError, match=f"given.xml:1: {says}"):
         read_xml(written(tmp_path, text))
 

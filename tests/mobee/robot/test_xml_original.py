@@ -106,7 +106,7 @@ def test_constraints_that_the_program_ignored_are_ignored_with_a_warning(tmp_pat
     ]
 
 
-def test_an_unknown_tag_is_skipped_but_not_what_it_holds(tmp_path: Path) -> None:
+def test_an_unknown_tag_is_skipped_but_not_its_children(tmp_path: Path) -> None:
     robot, said = load(old(tmp_path, '<cover><link x="1"><sphere radius="0.1"/></link></cover>'))
     assert len(robot.shapes) == 1
     assert said == ["4: <cover>: unknown tag is ignored, not what stands inside"]

@@ -75,7 +75,7 @@ def test_a_file_of_0_1_keeps_its_meaning_and_each_rule_is_warned_of_with_its_lin
     assert all("`mobee convert OLD.xml NEW.xml` writes today's form" in line for line in said)
 
 
-def test_what_convert_writes_is_the_same_robot_without_a_warning(tmp_path: Path) -> None:
+def test_a_converted_file_is_the_same_robot_and_causes_no_warning(tmp_path: Path) -> None:
     robot, _ = read(tmp_path, ARM.format(version="", of_0_1='name="pan"'))
     assert write_upgraded(tmp_path / "arm.xml", tmp_path / "new.xml")
     with warnings.catch_warnings():

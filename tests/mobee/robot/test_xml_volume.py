@@ -40,7 +40,7 @@ def test_align_turns_opposite_directions_by_half_a_turn() -> None:
         np.testing.assert_allclose(np.linalg.det(align(axis, -axis)), 1)
 
 
-def test_a_box_lies_width_height_depth_along_x_y_z() -> None:
+def test_width_height_and_depth_of_a_box_are_along_x_y_and_z() -> None:
     node = Node(Path("toy.xml"), 1, "box", {"width": "1", "height": "2", "depth": "3", "px": "4"})
     volume = read_volume(node)
     assert volume.size == (1, 2, 3)
@@ -49,7 +49,7 @@ def test_a_box_lies_width_height_depth_along_x_y_z() -> None:
 
 
 @given(units, st.floats(-180, 180))
-def test_a_boxs_height_lies_along_h_whatever_the_angle(h: Array, angle: float) -> None:
+def test_the_height_of_a_box_is_along_h_for_every_angle(h: Array, angle: float) -> None:
     given_h = {name: repr(float(value)) for name, value in zip(("hx", "hy", "hz"), h, strict=True)}
     rotation = box(**given_h, angle=repr(angle))
     np.testing.assert_allclose(rotation @ Y, h, atol=1e-6)

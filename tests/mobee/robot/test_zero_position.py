@@ -37,7 +37,7 @@ def test_a_link_is_a_step_from_where_its_parent_ended(tmp_path: Path) -> None:
     np.testing.assert_allclose(robot.joints[0].axis, [0, 0, 1])
 
 
-def test_what_hangs_inside_a_joint_turns_about_its_axis_through_the_current_point(tmp_path: Path) -> None:
+def test_an_element_inside_a_joint_turns_about_its_axis_through_the_current_point(tmp_path: Path) -> None:
     robot = read(
         tmp_path,
         '<bodypart name="arm"><link y="1"><motor name="m" minPos="-90" maxPos="90"><joint z="1">',

@@ -92,7 +92,7 @@ def test_a_part_that_is_not_active_cannot_act() -> None:
         plant.act("torso", np.zeros(3))
 
 
-def test_plants_of_one_robot_share_what_it_is_reduced_to() -> None:
+def test_plants_of_one_robot_share_the_reduced_robot() -> None:
     robot = load_robot("icub")
     alive = living(robot, ["left_arm"])
     one = stiffened(robot, alive, solids=False)

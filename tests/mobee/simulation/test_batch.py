@@ -41,7 +41,7 @@ def test_a_batch_is_its_plants_one_after_the_other() -> None:
     assert run_batch(hash_of, seeds, processes=1) == alone
 
 
-def test_what_goes_wrong_in_a_plant_is_raised() -> None:
+def test_an_exception_in_a_plant_is_raised() -> None:
     with pytest.raises(InvalidValue, match="seed 3 is not liked"):
         run_batch(refuse, [3, 4], processes=2)
 
@@ -51,7 +51,7 @@ def test_no_seeds_no_results() -> None:
 
 
 @pytest.mark.parametrize("processes", [0, -1, 1.5, True])
-def test_a_number_of_processes_that_is_none_is_refused(processes: int) -> None:
+def test_an_invalid_number_of_processes_is_refused(processes: int) -> None:
     with pytest.raises(InvalidValue, match="processes"):
         run_batch(hash_of, [1, 2], processes=processes)
 
@@ -208,7 +208,7 @@ def reaching(world: World | None = None) -> OfflinePlant:
 
 
 @pytest.mark.parametrize("together", [advance_together, lambda given, threads=1: run_together(given, 5, threads)], ids=["advance", "run"])
-def test_what_cannot_go_together_is_refused_before_anything_moves(together: Any) -> None:
+def test_incompatible_plants_are_refused_before_any_moves(together: Any) -> None:
     good, world = katanas(2), World()
     for given, message in (
         ([*good, good[0]], r"plants\[2\] is plants\[0\] again"),
@@ -281,7 +281,7 @@ def test_a_function_that_raises_takes_nothing_from_the_others() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_after_a_ctrl_c_plants_go_on_from_what_was_run(count: int) -> None:
+def test_after_a_ctrl_c_plants_continue_from_the_last_tick(count: int) -> None:
     def made() -> list[OfflinePlant]:
         return [OfflinePlant(Model(KATANA), seed) for seed in range(count)]
 

@@ -49,7 +49,7 @@ def test_many_substeps_in_one_call_are_as_many_calls() -> None:
 
 
 @pytest.mark.parametrize("lively", [1.0, 0.6])
-def test_motors_side_by_side_do_what_each_does_alone(lively: float) -> None:
+def test_motors_in_one_robot_equal_separate_ones(lively: float) -> None:
     """Of any kind, in any mode and number, against their stops and with what is no number."""
     robot, rng = load_robot("icub"), np.random.default_rng(5)
     n = len(robot.motors)

@@ -90,7 +90,7 @@ def test_acting_while_another_part_acts_is_refused() -> None:
         plant.act("arm", np.zeros(2))
 
 
-def test_what_the_part_touches_is_in_the_outcome() -> None:
+def test_the_outcome_names_the_objects_that_the_part_touches() -> None:
     model = touching(+0.1)
     plant = OfflinePlant(model)
     outcome = plant.act("trunk", np.array([-0.3]))

@@ -91,7 +91,7 @@ def test_reaching_while_another_part_acts_is_refused() -> None:
         plant.reach("arm", "tip")
 
 
-def test_reaches_and_actions_go_on_side_by_side() -> None:
+def test_reaches_and_actions_run_at_the_same_time() -> None:
     plant = bent()
     plant.present(NEAR)
     plant.begin_reach("arm", "tip")

@@ -44,7 +44,7 @@ def test_equal_plants_have_equal_records_for_any_seed_and_survive_json() -> None
     ],
     ids=lambda value: value if isinstance(value, str) else next(iter(value)),  # the same in every process: no addresses
 )
-def test_whatever_is_made_otherwise_differs(option: dict[str, Any], key: str) -> None:
+def test_every_option_changes_its_own_setting(option: dict[str, Any], key: str) -> None:
     one, other = settings(), settings(**option)
     assert {name for name in one if one[name] != other[name]} == {key}
 

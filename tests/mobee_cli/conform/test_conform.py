@@ -77,7 +77,7 @@ def test_the_example_keeps_the_contract(robot: Rig, capsys: pytest.CaptureFixtur
         ("silent_stop", "emergency-stop", "does not repeat the stop"),
     ],
 )
-def test_what_breaks_the_contract_is_reported(robot: Rig, capsys: pytest.CaptureFixture[str], fault: str, check: str, says: str) -> None:
+def test_each_breach_of_the_contract_is_reported(robot: Rig, capsys: pytest.CaptureFixture[str], fault: str, check: str, says: str) -> None:
     breaks(robot, fault)
     try:
         code, found = conform(robot, capsys, "--only", check)

@@ -66,7 +66,7 @@ def test_a_target_is_put_moved_and_taken_away(service: FakeService, client: Reac
     assert (added["name"], added["position"], added["geometry"].size, added["role"]) == (TARGET, AT, [0.04], "target")
 
 
-def test_what_is_asked_for_is_what_was_presented(client: ReachClient) -> None:
+def test_a_reach_request_names_the_presented_target(client: ReachClient) -> None:
     with pytest.raises(InvalidValue, match=r"no target is presented.* present\(ReachTarget"):
         client.asked()
     client.present(ReachTarget(np.array(AT), aim="surface", normal=np.array([0.0, 0.0, 2.0])))
@@ -98,7 +98,7 @@ def test_an_object_is_reached_for_as_the_sphere_in_its_middle(
     assert [verb for verb, _ in service.calls] == ["list"]
 
 
-def test_what_is_no_target_of_the_world_is_refused_with_what_is_valid(service: FakeService, client: ReachClient) -> None:
+def test_an_object_that_is_no_target_is_refused_with_the_valid_names(service: FakeService, client: ReachClient) -> None:
     service.objects = [thing("table", "box", [0.6, 1.5, 0.5], "obstacle"), thing("ball", "sphere", [0.03])]
     with pytest.raises(UnknownName, match="Did you mean 'ball'.*Valid: ball, table"):
         client.present_object("bal")

@@ -71,7 +71,7 @@ def test_spin_ends_as_soon_as_it_was_enough_and_leaves_the_rest() -> None:
     assert seen == list(range(10))
 
 
-def test_spin_wakes_up_for_what_another_thread_puts() -> None:
+def test_spin_runs_handlers_that_another_thread_puts() -> None:
     inbox, seen = Inbox(), []
     sender = threading.Timer(0.02, lambda: inbox.put(lambda: seen.append(1)))
     sender.start()
@@ -80,7 +80,7 @@ def test_spin_wakes_up_for_what_another_thread_puts() -> None:
     assert seen == [1]
 
 
-def test_spin_returns_although_the_flood_goes_on() -> None:
+def test_spin_returns_during_a_flood() -> None:
     """Every handler puts the next one, so the queue is never empty."""
     inbox, handled = Inbox(), 0
 
@@ -104,7 +104,7 @@ def test_an_error_of_a_handler_reaches_the_caller() -> None:
         inbox.spin(now())
 
 
-def test_a_crowded_inbox_drops_and_counts_what_may_be_dropped() -> None:
+def test_a_crowded_inbox_drops_and_counts_optional_messages() -> None:
     inbox, seen = Inbox(), []
     taken = [inbox.offer(lambda: seen.append(1)) for _ in range(CROWDED + 5)]
     assert taken == [True] * CROWDED + [False] * 5
@@ -236,7 +236,7 @@ def test_a_timer_set_by_another_thread_in_a_handler_is_in_time() -> None:
         assert 0.02 <= now() - start
 
 
-def test_what_goes_wrong_in_another_thread_ends_the_server() -> None:
+def test_an_exception_in_another_thread_ends_the_server() -> None:
     seen: list[str] = []
     with pytest.raises(ZeroDivisionError), Serving() as inbox:
         inbox.handle(lambda: print(1 / 0))

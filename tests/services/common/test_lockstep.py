@@ -113,7 +113,7 @@ def test_a_late_participant_is_dropped_reported_and_returns_with_its_next_answer
     assert bench.barrier.missing(3) == ["agent", "model"]
 
 
-def test_a_process_that_dies_releases_the_barrier_and_is_reported(bench: Bench) -> None:
+def test_a_process_that_ends_releases_the_barrier_and_is_reported(bench: Bench) -> None:
     bench.begun()
     bench.done("model", 1)
     bench.done("agent", 1)
@@ -157,7 +157,7 @@ def test_a_process_that_answers_becomes_a_participant(bench: Bench) -> None:
     assert "stranger" in bench.barrier.missing(2)
 
 
-def test_a_new_run_waits_for_everybody_anew(bench: Bench) -> None:
+def test_a_new_run_waits_for_all_participants_again(bench: Bench) -> None:
     bench.begun().barrier.begin()
     assert bench.barrier.absent() == ["agent", "controller", "model"]
     assert bench.barrier.missing(1) == []

@@ -67,7 +67,7 @@ def test_a_goal_outside_the_limits_is_refused_with_motor_and_range(run: Stage) -
     assert (run.motion("left_arm").goal, run.motion("left_arm").status) == (before, "idle")
 
 
-def test_when_an_agent_dies_its_part_stays_and_the_others_go_on(run: Stage) -> None:
+def test_when_an_agent_ends_its_part_stays_and_the_others_continue(run: Stage) -> None:
     who, other = "agent_left_arm", "agent_right_arm"
     dying, epoch = run.own("left_arm", who)
     _, living = run.own("right_arm", other)

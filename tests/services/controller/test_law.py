@@ -23,6 +23,6 @@ def test_a_law_that_was_warmed_steps_as_a_new_one(gains: str) -> None:
     assert not warmed.reaches
 
 
-def test_what_the_gains_never_move_keeps_no_controller_from_starting() -> None:
+def test_motors_that_the_gains_never_move_do_not_prevent_the_start() -> None:
     gains = replace(Gains.default(), weights=(("l_*", 0.0), ("r_*", 0.0)))
     warm_up(Controller(Model(ROBOT), gains, "velocity"), ROBOT)

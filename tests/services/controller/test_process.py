@@ -13,7 +13,7 @@ from tests.services.controller.stage import PARTS, ROBOT, Stage, near, refused, 
 from tests.services.harness import rig, wait_for
 
 
-def test_a_controller_that_was_killed_is_replaced_by_one_that_takes_all_anew(tmp_path: Path) -> None:
+def test_a_new_controller_takes_all_parts_after_the_old_one_was_killed(tmp_path: Path) -> None:
     with rig(tmp_path, ROBOT) as made:
         first = staged(made)
         first.under_control()

@@ -7,7 +7,7 @@ from services.controller import publish
 from services.controller.publish import Counters
 
 
-def test_the_first_step_has_no_period_and_the_others_are_compared_with_what_was_due(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_step_has_no_period_and_later_ones_are_compared_with_the_due_period(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = iter((5.0, 5.012, 5.02))
     monkeypatch.setattr(publish.time, "monotonic", lambda: next(clock))
     counted = Counters()

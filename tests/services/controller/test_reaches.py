@@ -137,7 +137,7 @@ def test_other_forces_come_and_go_while_it_reaches(run: Stage, told: list[Reach]
     assert told[-1].missing < 0.8 * np.linalg.norm(at - target)
 
 
-def test_what_cannot_be_reached_for_is_refused_with_what_is_valid(run: Stage, told: list[Reach]) -> None:
+def test_an_invalid_reach_is_refused_with_the_valid_values(run: Stage, told: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     here = palm(run.sim.q)
     assert "Did you mean 'right_palm'?" in refused("reach", lambda: reach(run, epoch, here, marker="right_plam"))

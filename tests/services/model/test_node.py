@@ -106,7 +106,7 @@ def test_ticks_on_the_table_are_counted(run: Stage) -> None:
     assert numbers["evaluate_ms_p50"] > 0
 
 
-def test_a_new_run_forgets_what_was_perceived(run: Stage) -> None:
+def test_a_new_run_removes_perceived_objects(run: Stage) -> None:
     run.perceive([-0.3, 0.0, 0.1], valid_for=10_000)
     wait_for(lambda: "ball" in run.world(), "the ball")
     run.sim.new_run()

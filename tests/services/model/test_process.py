@@ -49,7 +49,7 @@ def test_a_missing_world_is_refused_in_one_line(stage: Stage) -> None:
     print(f"refused after {time.monotonic() - start:.1f} s")
 
 
-def test_a_second_model_that_is_started_by_hand_ends_and_the_first_goes_on(stage: Stage) -> None:
+def test_a_second_model_that_is_started_by_hand_ends_and_the_first_continues(stage: Stage) -> None:
     second = stage.rig.spawn("-m", "services.model", "--endpoint", stage.rig.endpoint)
     assert second.wait(30.0) == 3
     first = stage.rig.stat("model")

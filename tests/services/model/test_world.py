@@ -33,7 +33,7 @@ def test_objects_to_be_perceived_are_not_known_beforehand(run: Stage) -> None:
     assert set(run.world()) == set(file) - {"ball"}
 
 
-def test_what_is_perceived_is_known_until_it_was_not_seen_for_long_enough(run: Stage) -> None:
+def test_a_perceived_object_expires_when_it_is_not_seen_again(run: Stage) -> None:
     events = run.rig.record(Event, "model")
     run.perceive([-0.3, 0.1, 0.0], valid_for=20)
     wait_for(lambda: "ball" in run.world(), "the ball")
@@ -59,7 +59,7 @@ def test_a_perceived_object_causes_contacts(run: Stage) -> None:
     assert "ball" in run.tick().touched["left_arm"]
 
 
-def test_perception_changes_only_what_it_brought(run: Stage) -> None:
+def test_perception_changes_only_perceived_objects(run: Stage) -> None:
     """A message of vision that names the scenario's table, or an object of a client, changes nothing, and is counted."""
     run.rig.call(keys.service_rpc("model", "mark"), Empty, Done)
     table = run.world()["table"]

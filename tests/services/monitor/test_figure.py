@@ -65,7 +65,7 @@ def test_a_solid_is_red_while_it_touches(robot: Robot) -> None:
     assert "solid: fore meets ball" in events
 
 
-def test_a_solid_under_what_the_file_draws_is_shown_while_it_touches(robot: Robot) -> None:
+def test_a_solid_hidden_by_visuals_is_shown_while_it_touches(robot: Robot) -> None:
     world = World()
     world.add("ball", sphere(0.05), position=(0.0, -0.373, 0.1))
     link = next(shape.link for shape in robot.shapes if shape.name == "fore")

@@ -54,7 +54,7 @@ def asked(frames: Frames, after: int, when: float) -> tuple[int, float, list[byt
     return pieces(answers[0])
 
 
-def test_a_new_viewer_gets_what_is_static_once_and_then_updates(frames: Frames) -> None:
+def test_a_new_viewer_gets_static_data_once_and_then_updates(frames: Frames) -> None:
     frames.log("shape", rr.Boxes3D(sizes=[[1.0, 1.0, 1.0]]), static=True)
     number, when, first = asked(frames, 0, 1.0)
     assert (number, when, len(first)) == (1, 1.0, 2)

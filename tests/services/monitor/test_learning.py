@@ -69,7 +69,7 @@ def test_surprises_are_the_outcomes_that_are_no_goals_with_their_shares() -> Non
     assert surprises(model) == [Surprise(15, 2, 15, 0.25), Surprise(15, 2, 3, 0.5)]
 
 
-def test_what_an_agent_of_another_robot_knows_is_shown_too(tmp_path: Path) -> None:
+def test_the_knowledge_of_an_agent_of_another_robot_is_shown_too(tmp_path: Path) -> None:
     (tmp_path / "own.xml").write_text(OWN)
     robot = load_robot(tmp_path / "own.xml")
     space = Lattice(robot, ["pan", "bend"], neighbours=4)
@@ -110,7 +110,7 @@ def test_a_space_that_is_too_large_is_not_drawn_and_said_so_once() -> None:
     assert not notebook.logged
 
 
-def test_of_too_many_surprises_the_likeliest_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_too_many_surprises_the_likeliest_are_published(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("services.agents.streams.MAX_SURPRISES", 2)
     model = TransitionModel(SPACE)
     for s, shares in ((3, 1), (15, 2), (20, 3)):

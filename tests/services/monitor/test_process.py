@@ -128,7 +128,7 @@ def test_the_page_shows_the_parts_of_any_robot(tmp_path: Path) -> None:
     }
 
 
-def test_the_plot_of_forces_has_all_that_are_told() -> None:
+def test_the_plot_of_forces_has_all_published_terms() -> None:
     """Those of the law from the beginning, those from outside as soon as the controller publishes them."""
     notebook = Notebook()
     plots = Plots(notebook.stream, ROBOT)

@@ -24,7 +24,7 @@ def values(component: Any) -> Any:
 @pytest.mark.parametrize(
     ("kind", "archetype"), [("sphere", "Ellipsoids3D"), ("capsule", "Capsules3D"), ("cylinder", "Cylinders3D"), ("box", "Boxes3D")]
 )
-def test_every_primitive_is_drawn_as_what_it_is(kind: ShapeKind, archetype: str) -> None:
+def test_every_primitive_is_drawn_in_its_own_form(kind: ShapeKind, archetype: str) -> None:
     body = drawn(kind, SIZES[kind], PLACE, TURN, RED)
     assert type(body).__name__ == archetype
     assert type(recolored(kind, RED)).__name__ == archetype

@@ -26,7 +26,7 @@ def test_a_move_begins_where_the_reference_leaves_a_rest() -> None:
     assert begins(MoveDetector(), [1.0] * 20 + [2.0, 3.0] + [4.0] * 20 + [3.0]) == [0, 20, 42]
 
 
-def test_a_reference_that_pauses_for_less_than_a_rest_goes_on() -> None:
+def test_a_reference_that_pauses_briefly_is_one_motion() -> None:
     assert begins(MoveDetector(), [1.0, 2.0, 2.0, 2.0, 3.0]) == [0]
 
 

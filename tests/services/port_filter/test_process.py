@@ -201,7 +201,7 @@ def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Ca
     assert mine.gate == "armed"
 
 
-def test_a_waypoint_by_call_is_where_another_modality_goes_back_to(client: Callable[[str], Client]) -> None:
+def test_in_another_modality_the_reflex_goes_back_to_a_waypoint_set_by_a_call(client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
     mine.arm()
     mine.drive(YAW, FAST, lambda: bool(mine.q[YAW] > np.deg2rad(5.0)))
@@ -231,7 +231,7 @@ def test_a_robot_that_starts_in_contact_moves_when_a_client_accepts_the_pose(cli
     assert abs(mine.q[PITCH]) < NEAR
 
 
-def test_the_robot_is_released_when_the_client_dies(robot: Rig, client: Callable[[str], Client]) -> None:
+def test_the_robot_is_released_when_the_client_ends(robot: Rig, client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
     states = robot.record(State, "torso")
     mine.arm()

@@ -98,7 +98,7 @@ def test_the_oldest_files_go_when_all_are_too_large(tmp_path: Path) -> None:
     assert files.begun > FILES
 
 
-def test_a_new_recorder_in_a_folder_goes_on_with_a_new_file(tmp_path: Path) -> None:
+def test_a_new_recorder_in_a_folder_continues_in_a_new_file(tmp_path: Path) -> None:
     for number in range(3):
         writer = Writer(tmp_path)
         writer.tick(number)
@@ -116,7 +116,7 @@ def test_a_reader_of_others_finds_the_index(tmp_path: Path) -> None:
     assert summary is not None and summary.statistics is not None and summary.statistics.message_count == 1
 
 
-def test_what_is_no_recording_is_refused_in_a_sentence(tmp_path: Path) -> None:
+def test_a_folder_without_a_recording_is_refused_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(MobeeError, match="there is no messages"):
         Recording(tmp_path)
     (tmp_path / "messages-0000.mcap").write_text("no")

@@ -68,7 +68,7 @@ def test_json_copies_are_as_the_schema_says() -> None:
     assert content["text"] == event.text and content.keys() == schema["properties"].keys()
 
 
-def test_calls_are_shown_with_what_was_asked() -> None:
+def test_calls_are_shown_with_their_requests() -> None:
     from bus_schema.rpc import Done, WithEpoch
 
     request, reply = encode(WithEpoch(v=VERSION, id="1", who="agent_torso", epoch=5)), encode(Done(v=VERSION))
@@ -87,5 +87,5 @@ def test_streams_are_copied_at_a_bounded_rate_and_events_always() -> None:
 
 
 @pytest.mark.parametrize("payload", [b"", b"\x00", b"\xc1", b"\x81" * 5000, encode(tick_at(ROBOT.home))[:-7]])
-def test_what_cannot_be_decoded_has_no_copy(payload: bytes) -> None:
+def test_a_message_that_cannot_be_decoded_has_no_copy(payload: bytes) -> None:
     assert copies(Raw("tick", encoding_of(Tick), payload, 0, 0)) == []

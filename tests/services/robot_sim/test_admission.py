@@ -166,7 +166,7 @@ def test_a_replayed_or_overtaken_command_is_refused(seq: int) -> None:
     assert refusal(gated, ref=0.05, seq=seq) == "seq"
 
 
-def test_a_position_reference_may_go_on_where_a_refused_one_left_off() -> None:
+def test_a_position_reference_may_continue_after_a_refused_one() -> None:
     gated = Gated().owned()
     gated.command("position", 0.02)
     for _ in range(5):

@@ -31,7 +31,7 @@ def test_palms_are_where_the_model_says(rng: np.random.Generator) -> None:
             assert np.abs(np.array(state[4]) - pose.position(f"{side}_palm")).max() < 1e-3
 
 
-def test_the_committed_list_is_what_the_script_finds_on_fewer_poses() -> None:
+def test_the_committed_list_agrees_with_the_script_on_fewer_poses() -> None:
     from experiments.robots import solid_pairs
 
     listed, scene = load_solid_pairs(), BulletScene(ROBOT, load_world("table"), 0.005)
@@ -52,6 +52,6 @@ def test_hands_and_forearms_are_watched_against_body_other_arm_and_table() -> No
     assert BulletBackend(ROBOT, lambda: load_world("table"), MotorParameters(), seed=0, dt=0.01).pairs_watched == len(links) + len(table)
 
 
-def test_a_robot_that_the_urdf_does_not_describe_is_told_to_take_mujoco() -> None:
+def test_the_error_for_another_robot_names_mujoco() -> None:
     with pytest.raises(BackendUnavailable, match='backend = "mujoco"'):
         make_backend(Config(robot="icub_2014", backend="pybullet"), load_robot("icub_2014"))

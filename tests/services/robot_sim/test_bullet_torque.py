@@ -52,7 +52,7 @@ def test_a_blocked_joint_is_pressed_with_the_whole_torque_in_the_end(seed: int) 
     np.testing.assert_allclose(share.torque, torque, atol=1e-5)
 
 
-def test_a_joint_stops_at_the_end_of_its_range_and_the_others_feel_it() -> None:
+def test_a_joint_stops_at_the_end_of_its_range_and_disturbs_the_others() -> None:
     now, torque = replace(arm(1), velocity=np.zeros(3)), np.array([30.0, 0.0, 0.0])
     fastest = (np.full(3, -np.inf), np.array([0.0, np.inf, np.inf]))
     share = Gears(3).transmit(now, torque, np.ones(3, dtype=bool), np.zeros(3), fastest, False, H)
@@ -62,7 +62,7 @@ def test_a_joint_stops_at_the_end_of_its_range_and_the_others_feel_it() -> None:
     np.testing.assert_allclose(share.torque, alone.torque)
 
 
-def test_what_acted_from_outside_is_forgotten_without_contact_and_on_demand() -> None:
+def test_external_torque_is_forgotten_without_contact_and_on_demand() -> None:
     now, free, torque = arm(2), np.ones(3, dtype=bool), np.array([5.0, 0.0, 0.0])
     fresh = Gears(3).transmit(now, torque, free, np.zeros(3), FREE, True, H)
     gears = Gears(3)

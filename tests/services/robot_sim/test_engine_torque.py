@@ -111,7 +111,7 @@ def test_neither_a_limit_nor_the_largest_speed_is_passed(engine: Engine) -> None
     assert np.diff(way[:, elbow]).max() / DT == pytest.approx(most, rel=0.05)
 
 
-def test_hands_press_the_table_no_harder_than_the_torque_and_give_way(engine: Engine) -> None:
+def test_hands_press_the_table_no_harder_than_the_torque_allows(engine: Engine) -> None:
     backend, torso = standing(engine, posture({"elbow": 60.0, "shoulder_pitch": -26.0, "shoulder_roll": 20.0, "wrist_pitch": -1.0})), 2
     torque = np.zeros(41)
     torque[torso] = 8.0

@@ -83,7 +83,7 @@ def test_a_hand_driven_down_touches_the_table_and_is_stopped_by_it(engine: Engin
     assert np.abs(backend.motors.efforts).max() <= 40.0
 
 
-def test_an_object_is_placed_and_the_hand_feels_it_but_it_is_no_solid_contact(engine: Engine) -> None:
+def test_a_placed_object_blocks_the_hand_but_is_no_solid_contact(engine: Engine) -> None:
     backend, free = body(engine), body(engine)
     palm = Model(ROBOT).evaluate(ROBOT.home).position("left_palm")
     backend.place("ball", (float(palm[0]), float(palm[1]), float(palm[2]) - 0.06))

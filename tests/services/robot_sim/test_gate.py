@@ -79,7 +79,7 @@ def test_a_command_is_in_force_until_its_ttl_and_not_a_nanosecond_longer(late: i
     assert gated.gate.state == state
 
 
-def test_a_moving_part_goes_on_smoothly_in_position_mode() -> None:
+def test_a_moving_part_continues_smoothly_in_position_mode() -> None:
     gated = Gated().owned()
     for _ in range(30):
         gated.command(ref=0.5 * VELOCITY)
@@ -282,7 +282,7 @@ def do(gated: Gated, deed: object) -> None:
     pause=st.integers(1, 6),
     parameters=st.sampled_from([MotorParameters.ideal(), MotorParameters()]),
 )
-def test_whatever_happens_the_motors_keep_their_limits(deeds: list[object], pause: int, parameters: MotorParameters) -> None:
+def test_the_motors_keep_their_limits_under_any_commands(deeds: list[object], pause: int, parameters: MotorParameters) -> None:
     gated = Gated(parameters).owned()
     for deed in deeds:
         do(gated, deed)

@@ -141,7 +141,7 @@ def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> No
     assert bench.newest(9).t == round(9 * TICK * 1e9)
 
 
-def test_commands_to_several_parts_answer_the_tick_along_with_what_they_order(bench: Bench) -> None:
+def test_commands_to_several_parts_also_answer_the_tick(bench: Bench) -> None:
     bench.begin()
     bench.arm()
     k = bench.k
@@ -178,7 +178,7 @@ def test_a_command_is_in_force_for_three_ticks_however_long_they_take(bench: Ben
     bench.hears("hold", "no valid command for 4 ticks")
 
 
-def test_who_is_late_is_done_without_its_parts_hold_and_the_run_is_marked(bench: Bench) -> None:
+def test_a_late_participant_is_dropped_its_parts_hold_and_the_run_is_marked(bench: Bench) -> None:
     bench.begin()
     bench.arm()
     bench.command(0.1, re_k=1)
@@ -202,7 +202,7 @@ def test_who_is_late_is_done_without_its_parts_hold_and_the_run_is_marked(bench:
     wait_for(is_waited_for, "a tick that waits")
 
 
-def test_who_dies_is_not_waited_for(bench: Bench) -> None:
+def test_a_participant_that_has_ended_is_not_waited_for(bench: Bench) -> None:
     bench.begin()
     bench.arm()
     bench.rig.drop_token("controller", "c1")

@@ -113,7 +113,7 @@ def test_every_motor_of_any_robot_holds_and_follows(tmp_path: Path, weighed: boo
     np.testing.assert_allclose(angles, matrix @ backend.motors.q + offset, atol=1e-4)
 
 
-def test_a_motor_that_is_too_weak_gives_way_to_the_weight(tmp_path: Path) -> None:
+def test_a_motor_that_is_too_weak_sinks_under_the_weight(tmp_path: Path) -> None:
     robot = written(tmp_path, GRIPPER)
     weak = replace(robot, motor_table=(replace(robot.motor_table[0], max_torque=3.0, home=0.3), *robot.motor_table[1:]))
     backend = body(weak)

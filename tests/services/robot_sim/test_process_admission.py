@@ -102,7 +102,7 @@ def _armed(bench: Bench, part: str, epoch: int) -> bool:
         return False
 
 
-def test_who_has_no_token_cannot_arm(bench: Bench) -> None:
+def test_a_client_without_a_token_cannot_arm(bench: Bench) -> None:
     bench.free("left_arm")
     epoch = bench.take("left_arm", "nobody")
     with pytest.raises(CallFailed, match="declare it") as caught:
@@ -110,7 +110,7 @@ def test_who_has_no_token_cannot_arm(bench: Bench) -> None:
     assert caught.value.code == "no_token"
 
 
-def test_nobody_takes_a_part_whose_owner_lives(bench: Bench) -> None:
+def test_a_part_whose_owner_runs_cannot_be_taken(bench: Bench) -> None:
     bench.free("left_arm")
     epoch = bench.arm("left_arm")
     bench.rig.token("controller", "stranger")

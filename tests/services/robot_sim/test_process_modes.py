@@ -78,7 +78,7 @@ def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench)
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
-def test_only_the_one_that_paused_it_can_let_it_go_on_while_that_one_runs(bench: Bench) -> None:
+def test_only_the_client_that_paused_can_resume_while_it_runs(bench: Bench) -> None:
     bench.rig.token("person", "p1")
     bench.rig.call(keys.sim("pause"), Empty, Done, who="person")
     for verb in ("resume", "pause"):
@@ -98,7 +98,7 @@ def test_only_the_one_that_paused_it_can_let_it_go_on_while_that_one_runs(bench:
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
-def test_a_reset_is_a_new_run_at_home_in_which_nobody_owns_anything(bench: Bench) -> None:
+def test_a_reset_is_a_new_run_at_home_without_owners(bench: Bench) -> None:
     epoch = bench.arm("left_arm")
     bench.keep("left_arm", epoch, 0.4, lambda: elbow(0.6))
     run = bench.clocks[-1].run

@@ -77,14 +77,14 @@ def test_a_new_process_is_a_new_run_in_which_no_old_epoch_fits(tmp_path: Path) -
         (["--robot", "icub_2014", "--backend", "pybullet"], "mujoco"),
     ],
 )
-def test_a_setting_that_cannot_be_used_is_told_at_once(tmp_path: Path, arguments: list[str], says: str) -> None:
+def test_a_setting_that_cannot_be_used_is_reported_at_once(tmp_path: Path, arguments: list[str], says: str) -> None:
     with rig(tmp_path, ROBOT) as bus:
         program = bus.spawn("-m", "services.robot_sim", "--endpoint", free_endpoint(), *arguments)
         assert program.wait(10.0) == 2
         assert says in program.says
 
 
-def test_a_typo_in_the_file_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_typo_in_the_file_is_reported_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "robot_sim.toml"
     file.write_text('backend = "kinematic"\nrat = 100\n')
     with rig(tmp_path, ROBOT) as bus:

@@ -30,7 +30,7 @@ def test_a_tick_holds_what_each_part_said_last(bench: Bench) -> None:
         assert state.q == tick.q[ROBOT.part(part).slice]
 
 
-def test_the_clock_is_told_a_hundred_times_a_second_at_most_and_every_tick_is(tmp_path: Path) -> None:
+def test_the_clock_is_published_at_most_a_hundred_times_per_second_and_ticks_always(tmp_path: Path) -> None:
     with rig(tmp_path, ROBOT) as bus:
         ticks, clocks = bus.record(Tick), bus.record(Clock)
         bus.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--rate", "400")
@@ -81,7 +81,7 @@ def test_the_encoders_are_noisy_as_configured(bench: Bench) -> None:
     assert np.radians(0.1) * np.sqrt(2) == pytest.approx(q.std(axis=0).mean(), rel=0.2)  # noise is given for 20 ms, this is 10
 
 
-def test_a_part_tells_what_it_is_made_of(bench: Bench) -> None:
+def test_the_metadata_of_a_part_are_its_motors_and_limits(bench: Bench) -> None:
     meta = bench.rig.call(keys.meta("left_arm"), Empty, PartMeta)
     assert tuple(meta.motors) == ROBOT.part("left_arm").motors
     assert np.allclose(np.stack([meta.lower, meta.upper], axis=1), ROBOT.limits[ROBOT.part("left_arm").slice])

@@ -87,7 +87,7 @@ def test_objects_anywhere_in_the_picture_keep_to_the_intrinsics() -> None:
     assert np.abs(np.mean(offsets, axis=0)).max() < 0.2  # px
 
 
-def test_near_things_hide_far_ones() -> None:
+def test_near_objects_hide_far_ones() -> None:
     world = World()
     world.add("ball", sphere(0.03), position=(-0.35, 0.0, -0.07), color=(1, 0, 0))
     world.add("lid", box(0.2, 0.2, 0.01), position=(-0.33, 0.0, -0.02))
@@ -129,7 +129,7 @@ def test_a_hull_is_drawn_as_the_box_that_it_is(tmp_path: Path) -> None:
     assert (pictures[2] != pictures[3]).any()
 
 
-def test_nothing_is_drawn_while_nobody_listens_and_one_tick_makes_a_pair(free_port: int) -> None:
+def test_pictures_are_drawn_in_pairs_and_only_for_subscribers(free_port: int) -> None:
     stage = Stage(free_port)
     try:
         with stage.running("services.robot_sim.renderer", "renderer"):

@@ -115,7 +115,7 @@ def test_a_row_a_tick_holds_the_joint_positions_at_its_end(tmp_path: Path) -> No
     assert np.ptp(positions(tmp_path / "new")[:, 0]) > 0.01
 
 
-def test_contacts_are_told_with_tick_pair_and_depth(tmp_path: Path) -> None:
+def test_contacts_are_recorded_with_tick_pair_and_depth(tmp_path: Path) -> None:
     body = recorded(tmp_path)
     for _ in range(3):
         body.step(DT)

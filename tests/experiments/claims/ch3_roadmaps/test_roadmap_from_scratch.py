@@ -27,7 +27,7 @@ def test_a_short_exploration_tries_edges_harms_nothing_and_is_agreed_with(values
     assert 0 < unreached(values) < SAMPLES
 
 
-def test_what_finished_counts_and_a_live_run_decides_about_contacts(values: dict) -> None:
+def test_only_finished_runs_count_and_a_live_run_decides_about_contacts(values: dict) -> None:
     open_ = findings({"a": result(values)}, None)["claims"]
     assert {claim["verdict"] for claim in open_} == {"open"} and len(open_) == len(CLAIMS)
     live = values | {"finished": True, "hours": 1.5, "touches": 3, "edges": 6, "pair": ""}

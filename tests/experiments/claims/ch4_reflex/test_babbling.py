@@ -248,7 +248,7 @@ def left_by_a_trial(folder: Path) -> None:
     CommandLog(folder / COMMANDS).note(commanded(target))
 
 
-def test_a_trial_is_measured_from_what_was_recorded(tmp_path: Path) -> None:
+def test_a_trial_is_measured_from_its_recordings(tmp_path: Path) -> None:
     left_by_a_trial(tmp_path)
     measured = measure(tmp_path, ROBOT, DT)
     assert measured.seconds == pytest.approx(TICKS * DT)

@@ -40,7 +40,7 @@ def test_an_attempt_that_takes_too_long_is_a_failure():
     assert not found.reached and found.actions == 2
 
 
-def test_each_sparser_graph_is_a_look_that_makes_the_intervals_wider():
+def test_each_further_comparison_makes_the_intervals_wider():
     def runs(failures):
         reached = [np.arange(10) >= failed for failed in (failures, *[0] * 9)]
         return [{"budgets": [1000], "reached": [one], "actions": [np.ones(10)], "fewest": np.ones(10)} for one in reached]

@@ -128,7 +128,7 @@ def test_low_goals_are_the_same_for_both_arms():
     assert 20 < left.sum() < 40
 
 
-def test_the_summary_of_a_run_holds_what_its_transitions_do(tmp_path):
+def test_the_summary_of_a_run_has_the_counts_of_its_transitions(tmp_path):
     values = trial({"explorer": "curious", "world": "table", "propagate": "tree", "transitions": 260}, 0)
     write_cell(tmp_path, Cell("a", 0), summary(values), 1.0)
     run = Run(load_cells(tmp_path)["a"])

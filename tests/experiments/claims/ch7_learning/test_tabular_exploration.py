@@ -13,7 +13,7 @@ from mobee.learning.tabular import deep_sea, river_swim
 from tests.experiments.finished_cells import Cell, finished
 
 
-def test_who_plans_to_explore_finds_the_reward_in_the_deep_sea_and_who_does_not_misses_it():
+def test_explorers_that_plan_find_the_reward_in_deep_sea_and_others_miss_it():
     settings = {"task": "return", "world": "DeepSea-10", "explorer": "curious", "number": 0.1}
     assert study.trial(settings, 0)["share"] > 0.8
     for explorer, number, span in (("count bonus", 0.1, (0.8, 1.0)), ("R-MAX", 3, (0.6, 1.0)), ("epsilon-greedy", 0.1, (-0.1, 0.1))):
@@ -58,7 +58,7 @@ def test_the_worlds_are_worlds():
     assert drawn.largest == 1.0 and np.array_equal(drawn.outcomes, rivals.random_world(3).outcomes)
 
 
-def test_coverage_counts_what_can_be_reached():
+def test_coverage_counts_reachable_points_only():
     values = study.trial({"task": "coverage", "world": "DeepSea-10", "explorer": "nearest untried", "number": 0.0}, 0)
     assert (values["pairs"], values["once"], values["often"], values["finished"]) == (110, 200, 1000, [True, True])
     stuck = study.trial({"task": "coverage", "world": "DeepSea-10", "explorer": "random", "number": 0.0}, 0)

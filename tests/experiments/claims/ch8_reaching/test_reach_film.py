@@ -31,7 +31,7 @@ def test_episodes_show_the_target_and_end_with_the_hand_at_it_and_do_not_change_
     assert run.read_bytes() == before
 
 
-def test_the_command_draws_what_a_run_has_learned(
+def test_the_command_draws_reaches_of_a_recorded_learner(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("matplotlib")

@@ -29,7 +29,7 @@ def robots(tmp_path: Path) -> Path:
     return folder
 
 
-def test_each_robot_is_measured_once_and_what_it_cannot_do_is_said(robots: Path, tmp_path: Path) -> None:
+def test_each_robot_is_measured_once_and_its_failures_are_listed(robots: Path, tmp_path: Path) -> None:
     found = run(options(robots), tmp_path)
     (one,) = read(tmp_path)
     assert (one.robot, one.motors, one.arms, one.joints, one.at_home) == ("mine/arm.urdf", 2.0, "arm", "2", 0.0)

@@ -27,7 +27,7 @@ def test_an_overshoot_is_measured_as_a_share_of_the_step() -> None:
     assert 0.05 < found.overshoot < 0.3
 
 
-def test_what_goes_on_oscillating_has_not_settled() -> None:
+def test_a_continuing_oscillation_has_not_settled() -> None:
     assert not judged(1.0 + 0.2 * np.sin(10.0 * T)).is_settled
 
 
@@ -35,7 +35,7 @@ def test_where_something_holds_a_joint_back_the_error_is_measured() -> None:
     assert judged(0.9 * (1.0 - np.exp(-T / 0.2))).error_deg == pytest.approx(np.rad2deg(0.1), abs=1e-3)
 
 
-def test_a_step_lies_around_the_middle_of_a_range() -> None:
+def test_a_step_is_around_the_middle_of_a_range() -> None:
     elbow = icub().robot.motors.index("l_elbow")
     start, end = motor_step(elbow)
     assert (start[elbow] + end[elbow]) / 2.0 == pytest.approx(icub().robot.limits[elbow].mean())

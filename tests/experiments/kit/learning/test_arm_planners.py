@@ -27,7 +27,7 @@ def roadmap():
     return Roadmap(np.array([A, B, C, D]), [(0, 1), (1, 3), (1, 2), (2, 3)], Free())
 
 
-def test_a_motion_that_fails_is_taken_out_and_the_way_planned_anew(roadmap):
+def test_a_failed_motion_is_removed_and_the_path_planned_again(roadmap):
     rival = Repaired(roadmap, {7: 3}, 1, remembers=False)
     rival.begin(7)
     aims = [rival.aim(A)]
@@ -44,7 +44,7 @@ def test_a_motion_that_fails_is_taken_out_and_the_way_planned_anew(roadmap):
 
 
 @pytest.mark.parametrize(("remembers", "second"), [(True, C), (False, D)])
-def test_what_was_taken_out_stays_out_only_for_who_remembers(roadmap, remembers, second):
+def test_removed_edges_stay_removed_only_with_memory(roadmap, remembers, second):
     rival = Repaired(roadmap, {7: 3}, 1, remembers)
     for _ in range(2):
         rival.begin(7)
@@ -55,7 +55,7 @@ def test_what_was_taken_out_stays_out_only_for_who_remembers(roadmap, remembers,
     assert np.array_equal(last, second)
 
 
-def test_when_no_way_is_left_all_motions_are_tried_again(roadmap):
+def test_when_no_path_is_left_all_motions_are_tried_again(roadmap):
     rival = Repaired(roadmap, {7: 3}, 1, remembers=True)
     rival.begin(7)
     for _ in range(20):
@@ -63,7 +63,7 @@ def test_when_no_way_is_left_all_motions_are_tried_again(roadmap):
         rival.observe(A, ELSEWHERE)
 
 
-def test_who_plans_once_passes_all_vertices_wherever_it_is_and_then_gives_up(roadmap):
+def test_a_planner_without_replanning_sends_all_vertices_and_then_gives_up(roadmap):
     rival = PlannedOnce(roadmap, {7: 3}, 1)
     rival.begin(7)
     aims = [rival.aim(q) for q in (A, ELSEWHERE, ELSEWHERE)]
@@ -111,7 +111,7 @@ def square():
     return Roadmap(vertices, [(0, 1), (1, 3), (0, 2), (2, 3)], Plane())
 
 
-def test_the_way_is_the_cheapest_and_detours_around_what_was_taken_out(square):
+def test_the_path_is_the_cheapest_without_the_removed_edges(square):
     assert square.path({0: 0.0}, 3, set()) == [0, 2, 3]
     assert square.path({0: 0.0}, 3, {edge(3, 2)}) == [0, 1, 3]
     assert square.path({0: 0.0}, 3, {edge(2, 3), edge(1, 0)}) is None
@@ -122,7 +122,7 @@ def test_where_to_begin_is_part_of_the_cost(square):
     assert square.path({0: 0.0, 2: 9.0}, 3, set()) == [0, 2, 3]
 
 
-def test_ways_cost_what_trying_all_of_them_finds():
+def test_path_costs_equal_those_found_by_trying_all_paths():
     rng = np.random.default_rng(0)
     vertices = rng.uniform(size=(6, 4))
     edges = [pair for pair in itertools.combinations(range(6), 2) if rng.uniform() < 0.6]

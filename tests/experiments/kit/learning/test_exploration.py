@@ -15,7 +15,7 @@ def explored():
     return agents, explore_together(agents, plant, 6)
 
 
-def test_every_agent_makes_that_many_transitions_and_the_faster_ones_go_on(explored):
+def test_every_agent_makes_that_many_transitions_and_the_faster_ones_continue(explored):
     agents, logs = explored
     counts = {part: len(log.seen) for part, log in logs.items()}
     assert min(counts.values()) == 6

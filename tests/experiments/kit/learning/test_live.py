@@ -58,7 +58,7 @@ def test_the_launcher_takes_the_scenario_and_its_agents_are_those_of_the_offline
         assert (config.explorer, config.discount, config.initial, config.transitions) == ("curious", 0.9, "50-50", 30)
 
 
-def test_it_goes_on_with_another_seed_until_all_parts_have_enough(tmp_path, monkeypatch):
+def test_it_continues_with_another_seed_until_all_parts_have_enough(tmp_path, monkeypatch):
     seeds, told = [], []
 
     def launched(path, ticks, runs):
@@ -105,7 +105,7 @@ def test_actions_that_miss_their_goals_and_touch_are_counted_on_each_robot(tmp_p
     assert found["mujoco"]["torso"] == Contacts(missed=1, touching=1, both=1, actions=1) and "pybullet" not in found
 
 
-def test_a_part_that_has_enough_goes_on_with_the_others_so_that_none_waits_for_it(tmp_path, monkeypatch):
+def test_a_part_with_enough_transitions_continues_so_that_no_other_waits(tmp_path, monkeypatch):
     left = []
 
     def launched(path, ticks, runs):

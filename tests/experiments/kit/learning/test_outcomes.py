@@ -81,7 +81,7 @@ def test_where_nothing_can_be_compared_there_is_no_ratio():
     assert relative_tries(np.array([6, 3]), np.array([True, False])) == 2.0
 
 
-def test_a_run_is_judged_by_what_fails_in_the_others():
+def test_a_run_is_judged_by_actions_that_fail_in_the_others():
     first, second = run([9, 3], [9, 0]), run([2, 4], [0, 4])
     assert relative_tries_of([first, second], [first, second]) == pytest.approx([3 / 9, 2 / 4])
     assert relative_tries_of([first], [first, run([5, 5], [0, 0])]) == []

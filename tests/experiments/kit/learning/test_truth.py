@@ -27,7 +27,7 @@ def test_a_walk_tries_every_action_often_enough_and_begins_where_it_ended():
     assert np.array_equal(seen[1:, 0], seen[:-1, 2])
 
 
-def test_the_truth_is_the_frequencies_of_what_was_seen():
+def test_the_truth_is_the_frequencies_of_observed_outcomes():
     truth = truth_of(SPACE, np.array([[0, 0, 1], [0, 0, 1], [0, 0, 40], [80, 3, 0], [0, 1, 1]]))
     assert truth.tries.sum() == 5 and truth.tries[0, 0] == 3 and truth.tries[80, 3] == 1
     assert dict(zip(truth.outcomes[0, 0], truth.probabilities[0, 0], strict=True)) == pytest.approx({1: 2 / 3, 40: 1 / 3})
@@ -84,7 +84,7 @@ def test_the_truth_has_no_error_and_the_order_of_bins_does_not_matter():
     assert np.isnan(l1(TRUTH, TRUTH)[1, 1])
 
 
-def test_the_error_is_told_over_all_and_over_the_stochastic_actions():
+def test_the_error_is_returned_for_all_and_for_stochastic_actions():
     beliefs = Table(np.zeros((2, 2, 1), dtype=int), np.ones((2, 2, 1)))  # all end in state 0
     overall, stochastic = model_error(beliefs, TRUTH)
     assert overall == pytest.approx((0.0 + 1.0 + 1.9) / 3)
@@ -92,7 +92,7 @@ def test_the_error_is_told_over_all_and_over_the_stochastic_actions():
     assert most_likely(TRUTH)[0, 1] == 0.5
 
 
-def test_the_error_of_a_truth_is_that_of_drawing_it_anew():
+def test_the_error_of_measured_outcomes_is_that_of_a_second_measurement():
     rng, tries, p = np.random.default_rng(0), 40, np.array([0.5, 0.3, 0.2])
     truth = Truth(np.zeros((1, 2, 3), dtype=int), np.array([[p, np.zeros(3)]]), np.array([[tries, 0]]))
     drawn = np.abs(rng.multinomial(tries, p, size=4000) / tries - p).sum(axis=1).mean()

@@ -80,7 +80,7 @@ def test_a_stop_has_a_time_to_hold_a_time_to_rest_and_a_distance() -> None:
         ([(11.0, "held", "a")], True),  # later
     ],
 )
-def test_an_action_survives_a_fault_if_it_has_an_outcome_or_goes_on(after: list[tuple[float, str, str]], expected: bool) -> None:
+def test_an_action_survives_a_fault_if_it_has_an_outcome_or_continues(after: list[tuple[float, str, str]], expected: bool) -> None:
     assert survived([(0.5, "settled", "z"), (0.9, "moving", "a"), *after], 1.0, 10.0) is expected
     assert survived([(0.5, "settled", "z"), *after], 1.0, 10.0) is None
 
@@ -123,7 +123,7 @@ def is_stopped(pid: int) -> bool:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
 
 
-def test_a_process_without_disk_writes_nothing_and_goes_on_afterwards_and_one_that_is_frozen_does_nothing(tmp_path: Path) -> None:
+def test_disk_and_freeze_faults_act_and_end(tmp_path: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path / "file")], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     try:

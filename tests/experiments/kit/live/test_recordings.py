@@ -18,6 +18,6 @@ def test_pairs_are_events_of_their_own_in_order_of_time() -> None:
     assert touches(rows, gap=5) == [Touch(ELBOW, 5, 7, 0.002), Touch(HAND, 5, 6, 0.001)]
 
 
-def test_a_record_is_read_but_not_what_a_kill_has_cut(tmp_path: Path) -> None:
+def test_a_record_is_read_except_a_last_line_that_a_kill_has_cut(tmp_path: Path) -> None:
     (tmp_path / "contacts.csv").write_text(f"k,pair,depth\n3,{HAND},0.001\n9,{ELBOW},0.002\n91,l_ha")
     assert read_touches(tmp_path / "contacts.csv", dt=0.02) == [Touch(HAND, 3, 3, 0.001), Touch(ELBOW, 9, 9, 0.002)]

@@ -41,7 +41,7 @@ def ends(apart: float) -> list[int]:
     return found
 
 
-def test_who_missed_goes_to_the_next_best_state() -> None:
+def test_after_a_miss_the_learner_goes_to_the_next_best_state() -> None:
     first, second = ends(0.0)
     assert first == 0 and second == 1
 
@@ -51,7 +51,7 @@ def test_states_one_step_from_one_that_missed_are_left_out_too_if_that_is_asked_
     assert first == 0 and second not in (0, 1, 3, 9, 27)
 
 
-def test_what_was_done_is_counted_by_the_numbers_of_the_given_problems():
+def test_tries_are_counted_by_the_numbers_of_the_given_problems():
     space, problems = reach_space(), targets_at(grid())
     agent = ReachAgent(space, ExactPlant(space), marker=MARKER, strategy="random", seed=2)
     sets = {"grid": problems, "between": targets_at(between())}

@@ -38,7 +38,7 @@ def test_goals_touch_with_the_hand_alone_and_the_poses_before_them_with_nothing(
     assert max(TARGET.missing(palm) for palm in palms) < 3e-3
 
 
-def test_what_fields_feel_is_not_sound_but_for_the_hand_at_the_target(belief):
+def test_poses_with_field_contacts_are_not_sound_except_the_hand_at_the_target(belief):
     belief.present(TARGET)
     low, high = belief.range.T
     befores = np.clip(goals(belief, TARGET, np.random.default_rng(0))[1], low, high)
@@ -51,14 +51,14 @@ def test_what_fields_feel_is_not_sound_but_for_the_hand_at_the_target(belief):
     assert belief.sound(q, "fields").tolist() == (sound & ~felt).tolist()
 
 
-def test_what_was_blocked_is_kept_away_from(belief):
+def test_blocked_poses_are_avoided(belief):
     pose = belief.limits.mean(axis=1)
     assert belief.sound(pose[None])[0]
     belief.blocked = pose[None]
     assert belief.sound(np.array([pose, pose + 0.2 * belief.span])).tolist() == [False, True]
 
 
-def test_cables_count_only_for_who_knows_them():
+def test_cables_count_only_in_beliefs_that_contain_them():
     rng = np.random.default_rng(0)
     knowing, ignorant = arm_belief(), arm_belief(cables=False)
     poses = rng.uniform(*knowing.limits.T, (500, 4))
@@ -86,7 +86,7 @@ class TestPeer:
         assert tried.ended == "there" and tried.missing > GOOD
 
     @pytest.mark.parametrize("memory", ["none", "blocked"])
-    def test_what_was_blocked_in_one_try_counts_in_the_next_only_with_memory(self, memory):
+    def test_blocked_poses_count_in_the_next_try_only_with_memory(self, memory):
         shell = World()
         for number, way in enumerate(np.concatenate([np.eye(3), -np.eye(3)])):
             shell.add(f"ball {number}", sphere(0.04), position=TARGET.position + 0.1 * way)
@@ -100,7 +100,7 @@ class TestPeer:
         assert (peer.remembered > 0) == (memory == "blocked")
 
 
-def test_a_judge_says_what_is_truly_missing():
+def test_a_judged_plant_returns_the_true_remaining_error():
     turns = np.zeros(len(body().motors))
     turns[body().motor_index("r_elbow")] = 0.1
     plant = JudgedPlant(arm_plant(0), Errors(turns, np.array([0.0, 0.0, 0.02])))
@@ -122,7 +122,7 @@ def poses(memory, target):
     return [each.tolist() for each in memory.of(target)]
 
 
-def test_what_the_target_blocked_counts_for_it_alone():
+def test_poses_blocked_by_a_target_count_for_this_target_alone():
     memory = PeerMemory(SPAN)
     memory.blocked(np.array([0.02, 0.0]), np.zeros(2), HERE, touched=True)
     memory.blocked(np.array([0.04, 0.0]), np.zeros(2), HERE, touched=False)

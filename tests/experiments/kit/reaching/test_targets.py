@@ -43,14 +43,14 @@ def test_the_place_of_the_palm_in_a_pose_is_reached_within_limits_and_cables(see
     assert all((clause.a @ found.q + clause.b).max() > -1e-5 for clause in clauses)
 
 
-def test_a_place_too_far_away_is_missed_by_what_the_arm_lacks():
+def test_a_place_too_far_away_is_missed_by_its_distance_from_the_reachable_region():
     model = Model(robot())
     near = nearest_pose(model, MARKER, np.array([-1.0, 0.2, 0.1]), RIGHT, restarts=4)
     far = nearest_pose(model, MARKER, np.array([-2.0, 0.2, 0.1]), RIGHT, restarts=4)
     assert 0.5 < near.distance < 0.7 and far.distance == pytest.approx(near.distance + 1.0, abs=0.01)
 
 
-def test_what_the_page_says_is_reachable_is():
+def test_the_targets_that_the_page_lists_as_reachable_are_reachable():
     page = PAGE.read_text()
     for count in (4, 7):
         centre, surface = counts(distances(between(), joints_of(count)))

@@ -41,7 +41,7 @@ def test_a_reach_comes_to_where_a_pose_nearby_has_the_hand_and_no_farther_than_i
     assert missing(start, far, RANGES) > 0.05
 
 
-def test_a_target_on_the_way_is_swept_and_one_that_the_arm_leaves_is_not():
+def test_a_target_on_the_path_is_swept_and_one_that_the_arm_leaves_is_not():
     start, end = BENT, BENT + [0.0, 1.0, 0.0, 0.0]
     half_way = hands((start + end) / 2.0)
     assert swept(start[None], end[None, None], half_way, 0.07).tolist() == [[True]]
@@ -57,7 +57,7 @@ def test_reaches_on_the_plant_bring_the_true_rewards_on_average():
     assert np.mean([reward_of(end) for end in ends]) == pytest.approx(true_rewards(target.position)[40])
 
 
-def test_who_knows_the_truth_reaches_nearly_all_that_can_be_reached():
+def test_a_planner_with_the_true_model_reaches_nearly_all_reachable_targets():
     problems = grid()[:9]
     best = sum(true_rewards(target.position).max() for target in problems)
     assert oracle(problems).evaluate(problems, 2).rewards.sum(axis=1).min() > 0.75 * best

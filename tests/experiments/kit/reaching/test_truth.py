@@ -74,7 +74,7 @@ def test_truth_is_read_as_it_was_written_and_rewards_are_means_over_tries(tmp_pa
     assert (again.blocked == 0.5).all() and again.places.tolist() == [PLACE.tolist()]
 
 
-def test_the_oracle_goes_around_what_is_blocked_to_the_best_reach(space):
+def test_the_oracle_avoids_blocked_transitions_on_the_path_to_the_best_reach(space):
     missing = np.full((1, 81, 1), 1.0)
     missing[0, 80] = 0.0
     plant, blocked = ExactPlant(space, closed=(77,)), np.where(np.isin(space.goals, (77,)), 1.0, 0.0)[None]

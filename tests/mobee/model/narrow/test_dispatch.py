@@ -81,7 +81,7 @@ def test_newton_steps_that_cycle_about_a_separation_end():
 @pytest.mark.parametrize(("first", "second"), SORTED)
 @settings(max_examples=30)
 @given(seed=SEEDS)
-def test_what_touches_and_how_far_the_rest_is_agree_with_coal(first, second, seed):
+def test_contacts_and_distances_agree_with_coal(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.2)
     ours, theirs = distance(a, b), coal_distance(a, b, tolerance=1e-10)
     if abs(theirs) > 1e-6:
@@ -92,7 +92,7 @@ def test_what_touches_and_how_far_the_rest_is_agree_with_coal(first, second, see
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 @settings(max_examples=30)
 @given(seed=SEEDS)
-def test_what_is_apart_gets_a_lower_bound_of_its_distance(first, second, seed):
+def test_separate_volumes_get_a_lower_bound_of_their_distance(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.3)
     depth, apart = overlap(a, b).depth, distance(a, b)
     assert (apart > 0.0) == (depth < 0.0) or abs(depth) < 1e-12

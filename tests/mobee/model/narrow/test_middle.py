@@ -7,7 +7,7 @@ import pytest
 from mobee._core.narrow import cut
 
 
-def test_a_square_loses_what_is_beyond_the_line():
+def test_a_square_is_clipped_by_the_line():
     square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     left = cut(square, [0.5, 0.0, 1.0, 0.0], room=5)
     assert left == pytest.approx(np.array([[0.5, 0], [1, 0], [1, 1], [0.5, 1]]))

@@ -78,7 +78,7 @@ def test_parallel_capsules_are_met_in_the_middle_of_the_part_beside_each_other()
     assert point("parallel capsules") == pytest.approx([0.025, 0.0, 0.03])
 
 
-def test_faces_are_met_in_the_middle_of_what_they_share():
+def test_the_contact_point_of_faces_is_the_middle_of_their_common_area():
     assert point("box face on face") == pytest.approx([0.075, 0.025, 0.095])
     assert point("cylinder standing on a cylinder") == pytest.approx([0.015, 0.0, 0.095])
     assert point("cylinder lying on a box") == pytest.approx([0.05, 0.0, 0.045])

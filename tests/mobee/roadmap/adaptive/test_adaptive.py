@@ -82,7 +82,7 @@ def test_probabilities_sum_to_one_for_every_edge_and_to_zero_where_there_is_none
     assert roadmap.beliefs.probabilities.sum(axis=-1) == pytest.approx(exists.astype(float))
 
 
-def test_targets_are_drawn_in_proportion_to_untried_edges_among_what_can_be_reached():
+def test_targets_are_drawn_in_proportion_to_untried_edges_of_reachable_vertices():
     roadmap = square()
     for action in range(2):
         roadmap.observe(0, action, roadmap.space.goal(0, action))
@@ -114,7 +114,7 @@ def test_a_joined_path_repairs_a_vertex_without_usable_edges():
     assert roadmap.stuck.tolist() == []
 
 
-def test_pruning_takes_out_what_cannot_be_reached_and_what_failed():
+def test_pruning_removes_unreachable_vertices_and_failed_edges():
     roadmap = square()
     for state, goal in ((1, 2), (3, 2), (0, 3)):
         roadmap.observe(state, roadmap.action(state, goal), state)

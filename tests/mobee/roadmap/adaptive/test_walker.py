@@ -20,7 +20,7 @@ def test_after_a_failed_edge_the_part_moves_back_and_takes_another_path():
     assert np.array_equal(plant.acted, [B, A, D, C, B])
 
 
-def test_it_can_go_on_at_once_where_it_was_stopped_without_going_back():
+def test_it_can_continue_at_once_from_the_stop_without_moving_back():
     plant = BlockedPlant(A, wall(A, B))
     assert Walker(square(), plant, back=False).go(1).arrived
     assert np.array_equal(plant.acted, [B, D, C, B])
@@ -97,7 +97,7 @@ def test_without_a_query_it_stays_where_it_is_stuck():
     assert explorer.explore() and explorer.here == 0
 
 
-def test_an_explorer_that_is_started_again_goes_on_with_the_map_as_it_was(tmp_path):
+def test_an_explorer_that_is_started_again_continues_with_its_map(tmp_path):
     def started():
         store = MapStore(tmp_path / "map.sqlite", "arm")
         return MapExplorer(square(), BlockedPlant(A, wall(A, B)), store=store)

@@ -92,7 +92,7 @@ def test_motors_keep_the_margin_from_their_limits(method: str, model: mobee.Mode
         _build(model, margin=-0.1)
 
 
-def test_the_same_seed_gives_the_same_map_whatever_the_number_of_threads(
+def test_the_same_seed_gives_the_same_map_for_any_number_of_threads(
     model: mobee.Model, whole: mobee.Roadmap, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(build, "MAX_THREADS", 1)

@@ -118,7 +118,7 @@ def test_a_place_is_covered_where_one_of_the_simplices_has_it_inside(seed: int, 
     assert np.array_equal(region.covers(places), [oracle(place) for place in places])
 
 
-def test_all_simplices_of_a_triangulation_cover_what_scipy_finds_in_them() -> None:
+def test_simplices_cover_the_points_that_scipy_finds_in_them() -> None:
     rng = np.random.default_rng(3)
     mesh = Delaunay(rng.uniform(0.0, 4.0, (40, 2)))
     region = SimplexRegion(2)

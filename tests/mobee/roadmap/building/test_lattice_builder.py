@@ -35,7 +35,7 @@ def gaps(of: np.ndarray, to: np.ndarray) -> np.ndarray:
     return np.linalg.norm((of[:, None] - to[None]) / SPACING, axis=2).min(axis=1)
 
 
-def test_what_is_reachable_is_covered_by_valid_poses_at_their_spacing(arm: mobee.Model) -> None:
+def test_the_reachable_region_is_covered_by_valid_poses_at_their_spacing(arm: mobee.Model) -> None:
     problem, q, y = built(arm, TIP)
     _, good = problem.evaluate(q)
     assert good.all()

@@ -85,7 +85,7 @@ def test_least_squares_meets_a_value_at_once(free: mobee.Model, icub: mobee.Robo
         np.testing.assert_allclose(task.of(free.evaluate(met))[0], y, rtol=0.0, atol=1e-9)
 
 
-def test_a_function_has_no_aims_nor_has_what_contains_one(icub: mobee.Robot) -> None:
+def test_a_function_has_no_aims_nor_has_a_task_that_contains_one(icub: mobee.Robot) -> None:
     task = tasks.place(MARKER, "xy", BOX) + tasks.function(len, *ONE)
     assert task.aims(icub, np.zeros(3)) is None
 
@@ -103,7 +103,7 @@ def test_a_box_is_from_low_to_high(box: tuple[float, float]) -> None:
             make()
 
 
-def test_what_is_no_task_space_is_refused() -> None:
+def test_an_invalid_task_space_is_refused() -> None:
     for make, words in (
         (lambda: tasks.place(MARKER, "xyz", BOX), "2 ranges"),
         (lambda: tasks.place(MARKER, "xx", BOX), "at most once"),

@@ -143,7 +143,7 @@ def test_an_infinite_cost_is_the_worst() -> None:
         lambda: NES([0.0], 1.0).tell([1.0] * 4),
     ],
 )
-def test_what_is_not_valid_is_refused(make) -> None:
+def test_invalid_arguments_are_refused(make) -> None:
     with pytest.raises(InvalidValue):
         make()
 

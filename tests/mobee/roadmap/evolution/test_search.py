@@ -45,7 +45,7 @@ def two_holes(x: np.ndarray) -> np.ndarray:
 BOX = np.tile([0.0, 1.0], (2, 1))
 
 
-def test_restarts_find_what_one_start_misses() -> None:
+def test_restarts_find_a_minimum_that_one_start_misses() -> None:
     stuck = minimize(two_holes, [0.2, 0.2], 0.05, BOX, target=0.1, evaluations=20_000)
     found = minimize(two_holes, [0.2, 0.2], 0.05, BOX, target=0.1, evaluations=20_000, restart=Restart())
     assert stuck.cost == pytest.approx(1.0) and stuck.starts == 1
@@ -114,7 +114,7 @@ def test_a_restart_needs_a_box() -> None:
         Search([0.0], 1.0, restart=Restart())
 
 
-def test_each_of_several_searches_does_what_one_alone_does() -> None:
+def test_simultaneous_searches_equal_separate_ones() -> None:
     d, count, std = 7, 3, 0.3
     rng = np.random.default_rng(2)
     means = rng.uniform(-1.0, 1.0, (count, d))
@@ -137,7 +137,7 @@ def test_each_of_several_searches_does_what_one_alone_does() -> None:
     assert (searches.age == [15, 0, 15, 15]).all()
 
 
-def test_a_search_that_begins_anew_forgets_the_one_before() -> None:
+def test_a_search_that_begins_again_forgets_the_previous_one() -> None:
     searches = Searches(1, 4, 8)
     which = np.array([0])
     rng = np.random.default_rng(0)

@@ -39,7 +39,7 @@ def test_orientation_is_the_angle_of_the_normal(free: mobee.Model, postures: np.
     assert costs.orientation("right_palm", 7.0 * turn(across, angle) @ normal).residual(pose)[0] == pytest.approx(angle, abs=1e-9)
 
 
-def test_hold_is_what_the_distance_misses(free: mobee.Model, postures: np.ndarray) -> None:
+def test_the_residual_of_hold_is_the_error_of_the_distance(free: mobee.Model, postures: np.ndarray) -> None:
     pose = free.evaluate(postures)
     apart = np.linalg.norm(pose.position("left_palm") - pose.position("right_palm"), axis=1)
     np.testing.assert_allclose(costs.hold("left_palm", "right_palm", 0.3).residual(pose), np.abs(apart - 0.3), atol=1e-15)
@@ -95,7 +95,7 @@ def test_balance_needs_masses() -> None:
         costs.balance().residual(mobee.Model(katana).evaluate(katana.home[None]))
 
 
-def test_constraints_are_what_the_clauses_miss(free: mobee.Model, icub: mobee.Robot, postures: np.ndarray) -> None:
+def test_the_constraints_term_sums_the_violations_of_clauses(free: mobee.Model, icub: mobee.Robot, postures: np.ndarray) -> None:
     missing = costs.constraints().residual(free.evaluate(np.concatenate([icub.home[None], postures])))
     by_hand = [sum(max(0.0, -(c.a @ q + c.b).max()) for c in icub.clauses) for q in [icub.home, *postures]]
     np.testing.assert_allclose(missing, by_hand, atol=1e-12)
@@ -110,7 +110,7 @@ def test_collisions_are_those_of_solids(free: mobee.Model, postures: np.ndarray)
     np.testing.assert_allclose(costs.collision().residual(pose), [sum(depths) for depths in solid])
 
 
-def test_every_term_says_of_a_batch_what_it_says_of_each_pose(free: mobee.Model, postures: np.ndarray) -> None:
+def test_every_term_has_the_same_values_for_a_batch_and_for_each_pose(free: mobee.Model, postures: np.ndarray) -> None:
     palms = "left_palm", "right_palm"
     terms = [
         costs.position(palms[0], [-0.3, 0.0, 0.1]),
@@ -140,7 +140,7 @@ def test_every_term_says_of_a_batch_what_it_says_of_each_pose(free: mobee.Model,
         lambda: costs.term(3.0),
     ],
 )
-def test_what_is_not_valid_is_refused(make) -> None:
+def test_invalid_arguments_are_refused(make) -> None:
     with pytest.raises(InvalidValue):
         make()
 
@@ -205,7 +205,7 @@ def test_plane_is_the_distance_to_it_on_either_side_and_at_most_that_beyond_it(f
 
 
 @pytest.mark.parametrize("goal", [np.diag([1.0, 1.0, -1.0]), np.eye(2), [[np.nan] * 3] * 3])
-def test_what_is_no_rotation_is_refused(goal: np.ndarray) -> None:
+def test_an_invalid_rotation_is_refused(goal: np.ndarray) -> None:
     with pytest.raises(InvalidValue, match="goal is no rotation"):
         costs.relative_orientation("right_palm", "left_palm", goal)
 

@@ -95,7 +95,7 @@ def test_only_the_free_motors_move_and_all_stay_within_their_limits(free: mobee.
     assert (ends >= icub.limits[:, 0]).all() and (ends <= icub.limits[:, 1]).all()
 
 
-def test_what_cannot_be_met_ends_soon(free: mobee.Model) -> None:
+def test_a_search_for_impossible_costs_ends_soon(free: mobee.Model) -> None:
     problem = Problem(free, [costs.position("right_palm", [2.0, 0.0, 0.0])], None, None)
     assert least_squares(problem, np.random.default_rng(0)) is None
     assert problem.evaluations <= 41 * 61
@@ -131,7 +131,7 @@ def test_without_aims_there_is_nothing_to_do(free: mobee.Model) -> None:
     assert problem.evaluations == 0
 
 
-def test_what_moves_no_aim_stays_where_it_was(free: mobee.Model, icub: mobee.Robot) -> None:
+def test_motors_that_move_no_aim_stay(free: mobee.Model, icub: mobee.Robot) -> None:
     """Nothing would ever move a finger back from where a restart put it."""
     place = free.evaluate(icub.limits.mean(axis=1)).position("right_palm")
     terms = [costs.position("right_palm", place), costs.orientation("right_palm", [0.0, 1.0, 0.0])]
@@ -204,7 +204,7 @@ def test_starts_and_goals_of_other_shapes_are_refused(free: mobee.Model, icub: m
         {"length": np.nan},
     ],
 )
-def test_aims_at_what_there_is_not_are_refused(free: mobee.Model, icub: mobee.Robot, wrong: dict[str, object]) -> None:
+def test_aims_at_links_or_motors_that_do_not_exist_are_refused(free: mobee.Model, icub: mobee.Robot, wrong: dict[str, object]) -> None:
     aim = dataclasses.replace(level(icub.marker("right_palm"), np.array([1.0, 0.0, 0.0]), 0.1), **wrong)
     term = dataclasses.replace(costs.position("right_palm", [0.2, 0.0, 0.0]), aims=lambda robot: (aim,))
     with pytest.raises(InvalidValue, match="an aim"):

@@ -54,7 +54,7 @@ def test_the_same_seed_gives_the_same_pose(table: mobee.Model, goal: list, metho
     assert one.evaluations == two.evaluations
 
 
-def test_what_may_not_move_stays(table: mobee.Model, goal: list) -> None:
+def test_motors_that_may_not_move_stay(table: mobee.Model, goal: list) -> None:
     robot = table.robot
     start = robot.home.copy()
     start[robot.part("left_arm").slice] += 0.01
@@ -80,7 +80,7 @@ def test_plain_functions_are_terms(free: mobee.Model) -> None:
     assert set(ik.residuals) == {"height", "elbow_down", "collision"}
 
 
-def test_what_least_squares_misses_evolution_finds(free: mobee.Model) -> None:
+def test_evolution_finds_a_pose_that_least_squares_misses(free: mobee.Model) -> None:
     """A residual without a derivative that hardly any solution of the rest meets: three motors, each within 5 mrad."""
     robot = free.robot
     goal = robot.limits.mean(axis=1)
@@ -95,7 +95,7 @@ def test_what_least_squares_misses_evolution_finds(free: mobee.Model) -> None:
     assert mobee.solve_ik(free, both, motors=ARM).reached
 
 
-def test_what_cannot_be_reached_ends_with_the_nearest(free: mobee.Model) -> None:
+def test_an_unreachable_target_ends_with_the_nearest_pose(free: mobee.Model) -> None:
     far = [costs.position("right_palm", [-3.0, 0.0, 0.0])]
     ik = mobee.solve_ik(free, far, motors=ARM, method="nes", evaluations=2000)
     assert not ik.reached and ik.evaluations <= 2000
@@ -123,7 +123,7 @@ def test_the_world_is_that_of_the_call(icub: mobee.Robot) -> None:
     assert ik.reached and ik.evaluations > 1 and model.evaluate(ik.q).count == 0
 
 
-def test_without_tolerances_it_goes_on_until_it_has_converged(free: mobee.Model) -> None:
+def test_without_tolerances_it_ends_when_it_has_converged(free: mobee.Model) -> None:
     ik = mobee.solve_ik(free, [costs.comfort()], motors=["torso"])
     middle = free.robot.limits[:3].mean(axis=1)
     assert ik.reached
@@ -147,6 +147,6 @@ def test_terms_with_equal_names_get_numbers(free: mobee.Model) -> None:
         ({"evaluations": 3}, InvalidValue),
     ],
 )
-def test_what_is_not_valid_is_refused(free: mobee.Model, arguments: dict, error: type) -> None:
+def test_invalid_arguments_are_refused(free: mobee.Model, arguments: dict, error: type) -> None:
     with pytest.raises(error):
         mobee.solve_ik(free, **({"costs": [costs.home()]} | arguments))

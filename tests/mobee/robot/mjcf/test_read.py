@@ -145,7 +145,7 @@ def test_excluded_bodies_are_not_tested(tmp_path: Path) -> None:
     assert frozenset(("lower", "post")) in without and frozenset(("upper", "chest")) not in with_all
 
 
-def test_what_is_held_is_said_once(tmp_path: Path) -> None:
+def test_held_joints_are_reported_once(tmp_path: Path) -> None:
     ball = '<worldbody><body><joint type="ball" name="neck" range="0 90"/><geom size=".1"/></body></worldbody>'
     loop = '<equality><connect body1="finger_1" body2="finger_2" anchor="0 0 0"/></equality>'
     with pytest.warns(Simplified) as caught:

@@ -40,7 +40,7 @@ def test_every_primitive_holds_all_points(seed: int, count: int, size: float) ->
         assert min(primitive.size) > 0
 
 
-def test_what_has_a_shape_is_bounded_by_that_shape() -> None:
+def test_points_of_a_primitive_are_bounded_by_this_primitive() -> None:
     rng = np.random.default_rng(6)
     directions = rng.normal(size=(2000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

@@ -33,7 +33,7 @@ def own(mass: str, inertia: str = "") -> str:
     return OWN.replace("MASS", mass).replace("INERTIA", inertia)
 
 
-def test_the_mass_of_a_fixed_link_counts_with_what_carries_it(tmp_path: Path) -> None:
+def test_the_mass_of_a_fixed_link_is_added_to_its_parent(tmp_path: Path) -> None:
     (body,) = robot(tmp_path, own("2")).bodies
     assert (body.link, body.mass) == (1, 4.0)
     np.testing.assert_allclose(body.centre, [0, 0.75, 1.05], atol=1e-12)
@@ -47,7 +47,7 @@ def test_moments_of_inertia_are_turned_into_the_root_frame(tmp_path: Path) -> No
     np.testing.assert_allclose(body.inertia, turned, atol=1e-12)
 
 
-def test_a_negative_mass_is_refused_and_zero_is_none(tmp_path: Path) -> None:
+def test_a_negative_mass_is_refused_and_zero_counts_as_no_mass(tmp_path: Path) -> None:
     (body,) = robot(tmp_path, own("0", INERTIA)).bodies
     assert body.mass == 2.0  # the tool's
     with pytest.raises(RobotFileError, match=r"arm.urdf:3: <mass> value: -2 is negative. Write the mass in kilograms"):

@@ -165,7 +165,7 @@ def test_broken_collada_is_refused_with_its_line(tmp_path: Path, change: dict[st
         read_mesh(dae(tmp_path, **change))
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+def test_a_path_without_a_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError, match="cannot be read .No such file"):
         read_mesh(tmp_path / "m.stl")
     os.mkfifo(tmp_path / "pipe.stl")

@@ -64,7 +64,7 @@ def test_a_velocity_of_zero_means_unknown(tmp_path: Path) -> None:
     assert robot.motor_table[0].max_torque == 40
 
 
-def test_one_motor_drives_what_mimics_its_joint(tmp_path: Path) -> None:
+def test_one_motor_drives_the_joints_that_mimic_its_joint(tmp_path: Path) -> None:
     robot = fingers(tmp_path, WIDE, f'<mimic joint="j0" multiplier="-0.5" offset="0.1"/>{WIDE}')
     assert robot.motors == ("j0",)
     assert robot.motor_table[0].joints == ((0, 1.0, 0.0), (1, -0.5, 0.1))

@@ -113,7 +113,7 @@ def test_jacobians_are_the_slopes_of_the_motion(name: str, seed: int) -> None:
         assert np.abs([turn[2, 1], turn[0, 2], turn[1, 0]] - jacobian[3:, k]).max() < 1e-8
 
 
-def test_a_fixed_link_is_part_of_what_carries_it(tmp_path: Path) -> None:
+def test_a_fixed_link_is_merged_into_its_parent(tmp_path: Path) -> None:
     tip = (
         '<link name="tip"/><joint name="t" type="fixed"><parent link="upper"/><child link="tip"/><origin xyz="0 2 0" rpy="1 0 0"/></joint>'
     )
@@ -151,7 +151,7 @@ def test_shapes_of_one_name_are_numbered(tmp_path: Path) -> None:
     assert [shape.name for shape in read_urdf(path).shapes] == ["tip", "tip_0", "tip_1"]
 
 
-def test_what_stands_on_the_base_is_not_tested_against_the_world() -> None:
+def test_shapes_on_the_base_are_not_tested_against_the_world() -> None:
     robot = read_urdf(foreign("kuka_iiwa/model.urdf"), UrdfOptions(field=0.03))
     assert {robot.shapes[index].link for index in robot.base_shapes} == {0}
     assert len(robot.base_shapes) == sum(shape.link == 0 for shape in robot.shapes) == 2
@@ -166,7 +166,7 @@ def test_a_field_without_reach_is_refused(options: UrdfOptions) -> None:
 
 
 @pytest.mark.parametrize("corners", [7, 0, -1, 64.0, True, "64", "exact", None])
-def test_a_number_of_corners_that_is_none_is_refused(corners: Any) -> None:
+def test_an_invalid_number_of_corners_is_refused(corners: Any) -> None:
     with pytest.raises(InvalidValue, match="is no number of corners. Give a whole number from 8 on, or "):
         read_urdf(foreign("r2d2.urdf"), UrdfOptions(corners=corners))
 

@@ -67,7 +67,7 @@ def test_groups_may_name_links_and_hold_themselves(tmp_path: Path) -> None:
     assert read(tmp_path, *lines).parts["a"].motors == ("shoulder", "elbow")
 
 
-def test_a_chain_leads_from_one_branch_to_another_through_what_carries_both(tmp_path: Path) -> None:
+def test_a_chain_between_two_branches_passes_the_link_that_carries_both(tmp_path: Path) -> None:
     lines = (
         '<group name="hands"><chain base_link="left" tip_link="right"/></group>',
         '<group name="arm"><chain base_link="palm" tip_link="base"/></group>',
@@ -120,7 +120,7 @@ def test_fields_meet_the_fields_of_other_parts_only(tmp_path: Path) -> None:
     assert pairs == {frozenset(f"{name}_field" for name in pair) for pair in wanted}
 
 
-def test_links_without_solids_at_one_place_do_not_part_what_they_join(tmp_path: Path) -> None:
+def test_links_without_solids_at_one_place_count_as_one_joint(tmp_path: Path) -> None:
     wrist = (BODY.format("a"), '<link name="x"/><link name="y"/>', BODY.format("b"))
     turn = '<joint name="{0}" type="continuous"><parent link="{1}"/><child link="{2}"/>{3}</joint>'
     joints = [turn.format("j1", "a", "x", ""), turn.format("j2", "x", "y", ""), turn.format("j3", "y", "b", '<origin xyz="{0} 0 0"/>')]
