@@ -130,7 +130,10 @@ def _end(workers: Sequence[_Worker]) -> None:
 
 @contextmanager
 def _worker_environment() -> Iterator[None]:
-    """While entered, started processes ignore Ctrl-C (this one handles it) and use one thread each for linear algebra."""
+    """Let processes started in this context ignore Ctrl-C, and use one thread each for linear algebra.
+
+    The starting process handles Ctrl-C.
+    """
     before = {name: os.environ.get(name) for name in _THREAD_LIMITS}
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
     os.environ.update(dict.fromkeys(_THREAD_LIMITS, "1"))

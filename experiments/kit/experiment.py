@@ -53,10 +53,11 @@ _PAIR = " / "  # between the names of two settings that vary together
 
 
 def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = True) -> Verdict:
-    """Return the verdict; `untested`: something that the publications leave open, and that could explain a failure, was not varied.
+    """Return the verdict from the outcome in each setting.
 
-    A claim that holds in some settings and fails in others depends on them.  One that fails in all is refuted if they are two or more
-    and nothing is `untested`, else it is not reproduced.  An aim is not met if it is not met in one setting.
+    A claim that holds in some settings and fails in others depends on the settings.  A claim that fails in all settings is refuted if
+    there are at least two settings and `untested` is false, else it is not reproduced; `untested` is true if the experiment did not
+    vary something that the publications leave open and that could explain a failure.  An aim that fails in one setting is not met.
     """
     each = list(holds.holds.values()) if isinstance(holds, Envelope) else [holds]
     fails, undecided = False in each, None in each or not each

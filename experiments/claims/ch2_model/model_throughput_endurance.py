@@ -287,7 +287,7 @@ class Endurance:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Run all threads while entered."""
+        """Run all threads for the duration of this context."""
         end = threading.Event()
         crew = [threading.Thread(target=self._edit, args=(editor, end), daemon=True) for editor in self.editors]
         with fast_thread_switching(), self.moving:

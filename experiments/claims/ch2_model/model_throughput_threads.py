@@ -46,7 +46,7 @@ class Oscillator:
 
 
 class MovingModel:
-    """Moves the robot and evaluates the model, each in its own thread, while entered; `check` raises their exceptions.
+    """In its context, one thread moves the robot and another evaluates the model; `check` raises their exceptions.
 
     `watch` is called in the model's thread with every pose.
     """
@@ -97,7 +97,7 @@ class MovingModel:
 
 @contextmanager
 def fast_thread_switching() -> Iterator[None]:
-    """Let threads that compute in Python switch every SWITCH_INTERVAL seconds while entered."""
+    """Let Python threads switch every SWITCH_INTERVAL seconds in this context."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
