@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot is: parts, motors, limits, markers, shapes."""
+"""Load a robot and print its parts, motors, limits, markers and shapes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ print(f"\nmarkers: {', '.join(robot.markers)}")
 print(f"shapes: {len(solids)} solids (the body) and {len(fields)} fields (larger volumes that only generate force)")
 print(f"linear constraints (shoulder cables, forearms): {len(robot.clauses)}")
 
-# A wrong name is answered with the nearest valid one.
+# The error for a wrong name gives the nearest valid name.
 try:
     robot.motor_index("l_elbw")
 except mobee.UnknownName as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the hand is and how it moves: poses and Jacobians, of one q or of a thousand."""
+"""Compute the pose of the hand and its Jacobian, for one q or for a thousand."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ model = mobee.Model(robot)
 pose = model.evaluate(robot.home)
 print(f"left palm at home: {pose.position('left_palm')} m, its normal points to {pose.normal('left_palm')}")
 
-# Its Jacobian: three linear rows, then three angular ones, a column a motor.
+# Its Jacobian: three linear rows, then three angular rows; one column for each motor.
 jacobian = model.jacobian(robot.home, "left_palm")
 pitch = robot.motor_index("torso_pitch")
 print(f"Jacobian: {jacobian.shape}; torso_pitch moves the palm by {jacobian[:3, pitch]} m a rad")
 
-# The same by finite differences.
+# The same Jacobian by finite differences.
 step = 1e-6
 moved = robot.home.copy()
 moved[pitch] += step
 difference = (model.evaluate(moved).position("left_palm") - pose.position("left_palm")) / step
 print(f"finite differences say {difference}")
 
-# A batch: any leading shape.
+# A batch of poses: q may have any leading shape.
 rng = np.random.default_rng(0)
 many = rng.uniform(*robot.limits.T, size=(1000, len(robot.motors)))
 start = time.perf_counter()

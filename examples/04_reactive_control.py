@@ -2,7 +2,7 @@
 """The reactive layer: an attractor inside the table pulls, the contact's force stops the hand above it.
 
 The controller is a dynamical system, M q" + C q' + L(K (q - q*)) = sum of forces (thesis eq. 5.7). The motors here follow it
-exactly; example 05 has real ones, with lag, delay, backlash and noise.
+exactly; the motors of example 05 have lag, delay, backlash and noise.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ target[robot.motor_index("l_elbow")] = np.deg2rad(25)
 
 
 def depth_in_table(pose: mobee.Pose) -> float:
-    """How deep the deepest solid of the robot is in the table, in m."""
+    """Return the depth of the deepest contact between a solid of the robot and the table, in m."""
     return max((contact.depth for contact in pose.contacts if contact.kind == "solid" and contact.second == "table"), default=0.0)
 
 
@@ -33,7 +33,7 @@ print(f"the attractor: left palm {100 * below:.1f} cm below the table's top, fin
 
 
 def press(contact_forces: bool) -> float:
-    """Run the controller towards the attractor; returns how deep the solid hand got into the table, in m."""
+    """Run the controller towards the attractor; return the largest depth of the solid hand in the table, in m."""
     controller = mobee.Controller(model, gains=mobee.Gains.default(), contact_forces=contact_forces)
     controller.reset(robot.home)
     controller.attractor = target

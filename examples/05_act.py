@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One action on a plant: go there, and say where you got.
+"""Perform one action on a plant: move to a target, and print the outcome.
 
-An agent acts through `plant.act(part, target) -> Outcome` and does not know what answers: the OfflinePlant here (motors,
-model and controller in this process), or BusPlant, its live twin, in example 08's system.
+An agent acts through `plant.act(part, target) -> Outcome`, and need not know which plant it has: the OfflinePlant here (motors,
+model and controller in this process), or BusPlant, which has the same methods and acts on the live system of example 08.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ target = robot.home[arm.slice].copy()
 target[pitch] = np.deg2rad(-50)
 show("up", target)
 
-# A target inside the table is a fair thing to ask for: the forces stop the arm, and that outcome is an observation too.
+# A target inside the table is valid: the forces stop the arm, and the agent learns from this outcome too.
 into = robot.home[arm.slice].copy()
 into[pitch] = np.deg2rad(-5)
 show("into the table", into)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A curious agent learns where its actions lead, forgets nothing, and goes on where it was.
+"""A curious agent learns the outcomes of its actions, stores each on disk, and continues after a restart.
 
 States are cells around 27 poses of the torso, actions go towards a neighbouring pose. Each outcome is rewarded by how much
-it changed the agent's transition model; value iteration turns these rewards into where to go next (thesis chapter 6).
+it changed the agent's transition model; from these rewards, value iteration computes the next action (thesis chapter 6).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ print(space)
 
 
 def agent_on(store: TransitionStore) -> mobee.CuriousAgent:
-    """A robot at home, and an agent that knows what the store knows."""
+    """Return a robot at home, and an agent with the transitions of the store."""
     plant = mobee.OfflinePlant(mobee.Model(robot, mobee.load_world("table")), seed=0)
     return mobee.CuriousAgent(space, plant, explorer="curious", seed=0, store=store)
 

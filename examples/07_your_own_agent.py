@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Your own agent: anything that decides, acts through a plant, and observes.
+"""Write your own agent: a class that decides, acts through a plant, and observes.
 
 This one is not curious: it goes to the state that it visited least, and counts its arrivals. It uses the lattice, the
 transition model and the plant, and it would run on the live robot unchanged.
@@ -23,7 +23,7 @@ class Wanderer:
         self.visits = np.zeros(len(space), dtype=int)
 
     def decide(self, state: int) -> int:
-        """The action to take in a state: an index into space.actions(state)."""
+        """Return the next action in a state, as an index into space.actions(state)."""
         visits = self.visits[self.space.actions(state)]
         return int(self.rng.choice(np.flatnonzero(visits == visits.min())))
 

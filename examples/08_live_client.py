@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client on the live bus: reads the state of the left arm while the system runs.
 
-Without options it starts a system of its own for a few seconds; with `--endpoint tcp/127.0.0.1:7447` it looks at the one that
-`./launch` started.
+Without options it starts a system of its own for a few seconds; with `--endpoint tcp/127.0.0.1:7447` it connects to the system
+that `./launch` started.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from services.common.config import ServiceConfig
 from services.common.service import Service
 from services.common.session import BusUnreachable
 
-LOOKS, EVERY, PATIENCE = 5, 1.0, 30.0  # times, s, s
+SAMPLES, EVERY, PATIENCE = 5, 1.0, 30.0  # times, s, s
 
 robot = mobee.load_robot("icub")
 elbow = robot.parts["left_arm"].motors.index("l_elbow")
@@ -35,7 +35,7 @@ elbow = robot.parts["left_arm"].motors.index("l_elbow")
 
 @contextmanager
 def own_system() -> Iterator[str]:
-    """`mobee launch kinematic` on a free port, ended by SIGTERM or after a minute; gives the endpoint."""
+    """`mobee launch kinematic` on a free port, ended by SIGTERM or after a minute; yields the endpoint."""
     with socket.socket() as probe, tempfile.TemporaryDirectory() as runs:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -50,16 +50,16 @@ def own_system() -> Iterator[str]:
 
 
 def watch(endpoint: str) -> None:
-    """Connect, wait until the left arm moves, and print what it says."""
+    """Connect, wait until the left arm moves, and print its state."""
     with Service(f"client_{os.getpid()}", ServiceConfig(endpoint=endpoint), robot) as service:
         states: deque[State] = deque(maxlen=1000)
 
         service.on_newest(State, states.append, "left_arm")
-        service.on_clock(lambda clock: None)  # tells which run it is: messages of another one are refused
+        service.on_clock(lambda clock: None)  # gives the run: messages of another run are refused
         service.spin(time.monotonic() + PATIENCE, lambda: len(states) > 0 and np.ptp([states[0].q, states[-1].q], axis=0).max() > 0.1)
         if not states:
             raise SystemExit(f"nothing from the left arm within {PATIENCE:g} s: is a robot running at {endpoint}?")
-        for _ in range(LOOKS):
+        for _ in range(SAMPLES):
             service.spin(time.monotonic() + EVERY)
             state = states[-1]
             angle, speed = np.rad2deg(state.q[elbow]), np.rad2deg(np.abs(state.dq).max())

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hand is drawn to a point: once as a path in advance, once as a force while everything else acts too (thesis Algorithm 5).
+"""A hand is pulled to a point: first as a path in advance, then by a force while all other forces act too (thesis Algorithm 5).
 
-`reach_path` is kinematics alone. A `Reacher` has the controller draw the marker with the whole body, tick by tick, and the limits,
-constraints and contacts of example 04 act as ever. Out of reach it rests where no small motion brings it nearer.
+`reach_path` is kinematics alone. A `Reacher` pulls the marker with the whole body, tick by tick, through the controller; the limits,
+constraints and contacts of example 04 still act. If the point is out of reach, the marker rests where no small motion brings it nearer.
 """
 
 from __future__ import annotations

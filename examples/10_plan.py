@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was learned by curiosity is a planner: from anywhere to anywhere, around what does not work (thesis 6.5, 7.4.1).
+"""The transition model that curiosity has learned is a planner from any state to any other (thesis 6.5, 7.4.1).
 
-The cables of the shoulder keep the arm from some poses, which no model told the agent: it has tried. A plan over what actions aim at
-runs into them; a plan over where they were seen to end goes round.
+The cables of the shoulder keep the arm from some poses. No model contains them: the agent has learned them by trying. A plan over the
+goals of actions fails there; a plan over the observed outcomes avoids them.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import mobee
 
 ARM = ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"]
-START, TARGET = 63, 24  # 24 is where the cables pull hardest: pitch low, roll and yaw high
-TRIES, PATIENCE = 5, 25  # walks, and actions until one is given up
+START, TARGET = 63, 24  # in state 24 the cables pull hardest: pitch low, roll and yaw high
+TRIES, PATIENCE = 5, 25  # number of walks, and largest number of actions of a walk
 
 robot = mobee.load_robot("icub_2014")
 model = mobee.Model(robot)
@@ -24,7 +24,7 @@ print(f"{agent.transitions} transitions: each of {space.state_actions} state-act
 
 
 def walk(planner: mobee.Planner) -> int:
-    """Do what the planner says, asked anew wherever an action ends, until a target is reached; how many actions it took."""
+    """Perform the planned action and plan again after each, until the target is reached; return the number of actions."""
     state = space.state_of(plant.measure(space.part))
     for taken in range(PATIENCE):
         if state in planner.targets:
@@ -35,7 +35,7 @@ def walk(planner: mobee.Planner) -> int:
 
 
 learned = agent.model.debiased()  # without the failures that curiosity imagines
-naive = mobee.TransitionModel(space).debiased()  # of who has tried nothing
+naive = mobee.TransitionModel(space).debiased()  # the beliefs of an agent without experience
 for name, beliefs in (("naive", naive), ("learned", learned)):
     planner = mobee.Planner(space, beliefs, [TARGET])
     plan = planner.plan(START)

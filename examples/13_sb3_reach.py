@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An agent of Stable-Baselines3 learns to reach: SAC with hindsight experience replay on MoBeE/Reach-v0, here with steps of half a second.
 
-Needs `pip install stable-baselines3`.  Whatever the agent tries, the controller keeps the arm from collisions: the reports say how deep
-the deepest contact of solids was so far.  An argument gives the number of steps to train.
+Needs `pip install stable-baselines3`.  The controller keeps the arm from collisions under all actions of the agent: the reports give the
+depth of the deepest contact of solids so far.  An argument gives the number of steps to train.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class Watched(gymnasium.Wrapper):
     deepest = 0.0
 
     def step(self, action: np.ndarray) -> Any:
-        """Do a step."""
+        """Perform one step, and note the deepest contact."""
         result = self.env.step(action)
         self.deepest = max(self.deepest, result[4]["solid_depth"])
         return result
 
 
 def success(agent: SAC) -> float:
-    """The share of test episodes, all at once and with goals of their own, at whose end the palm is at the goal."""
+    """Return the share of test episodes (all at once, each with its own goal) that end with the palm at the goal."""
     test = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=EPISODES, **TASK)
     seen, info = test.reset(seed=10_000)
     for _ in range(LENGTH):

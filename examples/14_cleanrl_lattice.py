@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Q-learning in one file and in NumPy alone, in the style of CleanRL: the arm learns to bring its hand to a state of its lattice.
 
-Eight robots act at once.  Each action that the state has is tried as if its value were 1 until it is known better.
+Eight robots act at once.  The value of each action of a state begins at 1, so that each is tried.
 """
 
 from __future__ import annotations

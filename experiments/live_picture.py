@@ -64,7 +64,7 @@ def find_chromium() -> str | None:
 
 
 def take(url: str, chromium: str, folder: Path, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
-    """Yield screenshots of the page at `url`, `gap` seconds apart, `warm_up` seconds after it tells a story."""
+    """Yield screenshots of the page at `url`, `gap` seconds apart, `warm_up` seconds after it shows text about the agents."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -86,7 +86,7 @@ def _wait_until_told(page: Any, url: str) -> None:
     give_up = time.monotonic() + STORY_TIMEOUT
     while not page.evaluate(IS_TOLD):
         if time.monotonic() > give_up:
-            raise SystemExit(f"live picture: the page at {url} tells no story within {STORY_TIMEOUT:g} s")
+            raise SystemExit(f"live picture: the page at {url} shows no text about the agents within {STORY_TIMEOUT:g} s")
         time.sleep(POLL_PERIOD)
 
 

@@ -195,11 +195,11 @@ def test_the_environment_is_made_once_and_again_when_the_lock_changes(bare_clone
 
 def test_stages_are_announced_before_they_start_and_a_pipe_gets_no_progress(bare_clone: Path) -> None:
     fake_interpreter(bare_clone)
-    told = ensure(bare_clone).stderr.splitlines()
-    assert [line[: len("launch: 1 of 3")] for line in told[:3]] == [f"launch: {stage} of 3" for stage in (1, 2, 3)]
-    assert re.search(r"1 of 3: \d+ packages into .venv, \d+ MB to download and 1 GB on disk", told[0])
-    assert len(told) == 4
-    assert "installed in" in told[-1]
+    reports = ensure(bare_clone).stderr.splitlines()
+    assert [line[: len("launch: 1 of 3")] for line in reports[:3]] == [f"launch: {stage} of 3" for stage in (1, 2, 3)]
+    assert re.search(r"1 of 3: \d+ packages into .venv, \d+ MB to download and 1 GB on disk", reports[0])
+    assert len(reports) == 4
+    assert "installed in" in reports[-1]
 
 
 def test_the_newest_python_runs_it_and_the_tests_take_3_11(bare_clone: Path) -> None:

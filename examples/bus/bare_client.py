@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A client that knows nothing but Zenoh and msgpack: reads a stream, makes a call, and reads which services are alive.
+"""A client that uses Zenoh and msgpack only: it reads a stream, makes a call, and lists which services are alive.
 
 It imports no package of this project, so the same lines can be written in any language that has Zenoh. `mobee topic schema KEY` prints
 the fields of each message. It needs a running system, such as `mobee launch kinematic --headless`; `--endpoint` names its address.
@@ -46,7 +46,7 @@ def call(session: zenoh.Session, key: str, request: str = "Empty", **fields: Any
 
 
 def main(endpoint: str) -> None:
-    """Print who is alive, the motors of a part, and where they are for a second."""
+    """Print the services that are alive, the motors of a part, and their positions for a second."""
     with connect(endpoint) as session:
         alive = [str(token.ok.key_expr).split("/")[1] for token in session.liveliness().get("alive/*/*") if token.ok is not None]
         print(f"alive: {', '.join(sorted(alive))}")

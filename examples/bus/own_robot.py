@@ -6,7 +6,7 @@ of parts and the emergency stop are those of the shipped robot_sim, and must sta
 
     mobee router                                             # each in a terminal of its own
     python examples/bus/own_robot.py --robot my_arm.xml
-    mobee conform --robot my_arm.xml                         # plays the controller, and prints what breaks the contract
+    mobee conform --robot my_arm.xml                         # plays the controller, and prints violations of the contract
 
 In a scenario it takes the place of the shipped one: `[services.robot_sim]` with `module = "my_package"`, a package that has this file as
 `__main__.py`, and its `Config` in `config.py`. docs/hardware.md explains the contract.
@@ -51,25 +51,25 @@ class Servos:
 
     def __init__(self, robot: Robot, config: Config) -> None:
         limits = [Limits.of(robot, part) for part in robot.parts]
-        self._slowing = np.concatenate([one.acceleration for one in limits]) / config.rate  # rad/s a tick, when a part has to hold
+        self._slowing = np.concatenate([one.acceleration for one in limits]) / config.rate  # rad/s per tick, when a part has to hold
         self._low, self._high = robot.limits.T
         self._lag = config.lag
-        self.q = robot.home.copy()  # where the servos are: read it from them
+        self.q = robot.home.copy()  # present positions of the servos: read them from the servos
         self.motor_velocities = np.zeros(len(self.q))
         self.efforts = np.zeros(len(self.q))  # N m; 0 if the servos do not measure it
-        self._target, self._speed = self.q.copy(), np.zeros(len(self.q))  # rad, rad/s: what the servos are told
+        self._target, self._speed = self.q.copy(), np.zeros(len(self.q))  # rad, rad/s: the command of the servos
         self._orders: dict[int, tuple[slice, str, np.ndarray | None]] = {}  # by the first motor of the part
 
     def command(self, part: slice, mode: str, reference: np.ndarray | None) -> None:
-        """Note what the gate lets through for a part in this tick; `reference` is None on hold."""
+        """Store the command that the gate admits for a part in this tick; `reference` is None on hold."""
         self._orders[part.start] = (part, mode, reference)
 
     def encoders(self, k: int, dt: float) -> np.ndarray:
-        """Return the positions as the encoders say them."""
+        """Return the positions that the encoders measure."""
         return self.q.copy()
 
     def step(self, dt: float) -> None:
-        """Turn the orders into positions for the servos, send these, and read where they are."""
+        """Compute positions for the servos from the commands, send them, and read the measured positions."""
         for part, mode, reference in self._orders.values():
             if mode == "position":
                 self._speed[part] = (reference - self._target[part]) / dt
@@ -106,7 +106,7 @@ class OwnRobot:
             service.on_request(keys.meta(part), Empty, lambda request, key: part_meta(robot, key.split("/")[0]))
 
     def reset(self, request: Empty, key: str) -> Done:
-        """Begin a new run: all parts are idle, nobody owns them, and the tick is 0."""
+        """Begin a new run: all parts are idle and without an owner, and the tick is 0."""
         self.service.bus.run, self.service.bus.k, self.service.bus.t = f"run_{secrets.token_hex(4)}", 0, 0
         self.guard.reset()
         self.sensors.reset()
@@ -124,7 +124,7 @@ class OwnRobot:
             self.tick()
 
     def tick(self) -> None:
-        """Let the commands in force act, then publish where the motors are."""
+        """Let the commands in force act, then publish the positions of the motors."""
         bus = self.service.bus
         bus.k, bus.t = bus.k + 1, bus.t + self.dt_ns
         self.guard.tick(bus.k)

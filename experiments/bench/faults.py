@@ -37,7 +37,7 @@ QUIET = 1.0  # load of the machine up to which times are judged; the system itse
 _BACK_PATIENCE = 40.0  # s
 _ENDED = {"agent": "an agent", "model": "the model"}
 _NOTICED = 0.5  # s; a process that is frozen for less may be late only
-_ALONE = 1.0  # s between a fault and the next, so that its effect can be told from that of the next
+_ALONE = 1.0  # s between two faults, so that their effects can be distinguished
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,8 +62,8 @@ class Player:
             self._at, self._plays = self.story.length, False
 
 
-def replay(run: Path, port: int, tell: Callable[[str], None]) -> None:
-    """Serve the page of a run until the user interrupts; `tell` is called with its address.  Raises MobeeError."""
+def replay(run: Path, port: int, report: Callable[[str], None]) -> None:
+    """Serve the page of a run until the user interrupts; `report` is called with its address.  Raises MobeeError."""
     story = Story(run)
     player, board = Player(story), Board()
     with tempfile.TemporaryDirectory(prefix="mobee-page-") as private:
@@ -72,7 +72,7 @@ def replay(run: Path, port: int, tell: Callable[[str], None]) -> None:
         files, surfaces = ViewerFiles(Path(private)).path, surfaces_of(story.robot)
         site = Site(board, "", NoControls(), frames, files, lambda: player.now()[0], seek=player.seek, surfaces=surfaces)
         server = serve(site, HOST, port)
-        tell(f"http://{HOST}:{server.port}/")
+        report(f"http://{HOST}:{server.port}/")
         begin = time.monotonic()
         try:
             while True:

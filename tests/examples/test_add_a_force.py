@@ -22,8 +22,8 @@ goal = plant.robot.home.copy()
 goal[plant.robot.part("left_arm").slice][:4] = -0.2, 0.3, 0.5, 0.9
 plant.controller.attractor = alone.attractor = goal
 trace = plant.run(80)
-told = [alone.step(q, plant.dt).velocity for q in trace.encoders]
-print(np.array_equal(told, trace.velocity), np.array_equal(alone.last_forces["viscous"], plant.controller.last_forces["viscous"]))
+commanded = [alone.step(q, plant.dt).velocity for q in trace.encoders]
+print(np.array_equal(commanded, trace.velocity), np.array_equal(alone.last_forces["viscous"], plant.controller.last_forces["viscous"]))
 print(bool(np.abs(alone.last_forces.viscous).max() > 0.01), list(alone.last_forces))
 
 from bus_schema import VERSION, decode, encode, encoding_of

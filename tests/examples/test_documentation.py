@@ -90,9 +90,9 @@ def test_the_findings_of_a_robot_are_as_documented(tmp_path: Path) -> None:
     ]
     printed = re.search(r"^\$ mobee check slips\.xml\n(.*?)^\.\.\.$", (ROOT / "docs/robots.md").read_text(), re.DOTALL | re.MULTILINE)
     assert printed
-    told = subprocess.run([sys.executable, "-m", "mobee_cli", "check", "slips.xml"], cwd=tmp_path, capture_output=True, text=True)
-    assert told.returncode == 1
-    assert told.stdout.startswith(printed[1])
+    done = subprocess.run([sys.executable, "-m", "mobee_cli", "check", "slips.xml"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stdout.startswith(printed[1])
 
 
 def test_the_readers_own_robot_gets_a_map_of_its_own_task(tmp_path: Path) -> None:
@@ -171,8 +171,8 @@ def test_the_readme_is_short() -> None:
 
 def test_the_page_of_commands_names_every_command_and_no_other() -> None:
     page = (ROOT / "docs/commands.md").read_text()
-    told = subprocess.run([sys.executable, "-m", "mobee_cli", "--help"], capture_output=True, text=True).stdout
-    verbs = set(re.findall(r"^  (\w+) ", told, re.MULTILINE))
+    done = subprocess.run([sys.executable, "-m", "mobee_cli", "--help"], capture_output=True, text=True).stdout
+    verbs = set(re.findall(r"^  (\w+) ", done, re.MULTILINE))
     named = set(re.findall(r"`mobee ([a-z]+)", page + (ROOT / "README.md").read_text()))
     assert named <= verbs
     assert [verb for verb in verbs if not re.search(rf"`(mobee )?{verb}\b", page)] == []

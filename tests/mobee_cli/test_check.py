@@ -46,10 +46,10 @@ def test_a_warning_has_problem_reason_and_remedy(bad: Path, capsys: pytest.Captu
 
 def test_as_json(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(bad), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert told["robot"] == "toy"
-    assert [finding["check"] for finding in told["findings"]] == ["name-case"]
-    assert ["base", "bend"] in next(group["links"] for group in told["untested"] if "part" in group["reason"])
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["robot"] == "toy"
+    assert [finding["check"] for finding in printed["findings"]] == ["name-case"]
+    assert ["base", "bend"] in next(group["links"] for group in printed["untested"] if "part" in group["reason"])
 
 
 def test_pairs_are_counted_and_on_request_named(good: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -137,9 +137,9 @@ def test_write_srdf_prints_the_written_pairs_and_the_file(touching: Path, capsys
 def test_write_srdf_to_a_file_of_ones_own_and_as_json(touching: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "own.srdf"
     assert main(["check", str(touching), "--json", "--write-srdf", str(out)]) == 0
-    told = json.loads(capsys.readouterr().out)["srdf"]
-    assert (told["path"], told["touching"], told["found"]) == (str(out), 0, False)
-    assert [(pair["first"], pair["second"], pair["reason"]) for pair in told["pairs"]] == [("base", "fore", "Always")]
+    printed = json.loads(capsys.readouterr().out)["srdf"]
+    assert (printed["path"], printed["touching"], printed["found"]) == (str(out), 0, False)
+    assert [(pair["first"], pair["second"], pair["reason"]) for pair in printed["pairs"]] == [("base", "fore", "Always")]
 
 
 def test_write_srdf_that_cannot_is_one_line(touching: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

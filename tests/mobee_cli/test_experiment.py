@@ -184,12 +184,12 @@ def test_resume_without_a_name_continues_the_newest_run(tmp_path, capsys):
 
 def test_claims_are_printed_as_on_the_page(capsys):
     assert main(["experiment", "claims", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert {"experiment", "source", "text", "published", "ours", "verdict", "p", "settings"} == set(told[0])
+    entries = json.loads(capsys.readouterr().out)
+    assert {"experiment", "source", "text", "published", "ours", "verdict", "p", "settings"} == set(entries[0])
     assert main(["experiment", "claims"]) == 0
     said = capsys.readouterr().out
     assert all(len(line) <= 80 for line in said.splitlines())
-    assert told[0]["text"] in " ".join(said.split())
+    assert entries[0]["text"] in " ".join(said.split())
 
 
 def test_cells_that_fail_fail_the_command_and_are_named(tmp_path, capsys, monkeypatch):

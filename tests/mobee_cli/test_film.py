@@ -33,7 +33,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ]
     told += [(0.0, "left", {"arm": {"left": [1.0, 0.1], "here": 0, "path": [1], "untried": [1, 0], "actions": [1, 1]}})]
     lines = [json.loads(line) for line in (folder / "story.jsonl").read_text().splitlines()]
-    lines = [*told, *(one for one in lines if one[1] == "q")]
+    lines = [*logged, *(one for one in lines if one[1] == "q")]
     (folder / "story.jsonl").write_text("".join(json.dumps(one) + "\n" for one in lines))
     return folder
 

@@ -168,8 +168,8 @@ def answer(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, s
         code = main(words)
     except SystemExit as ended:  # of argparse
         code = int(ended.code or 0)
-    told = capsys.readouterr()
-    return code, " ".join(f"{told.out} {told.err}".split()) if code else ""
+    printed = capsys.readouterr()
+    return code, " ".join(f"{printed.out} {printed.err}".split()) if code else ""
 
 
 def check(mistake: Mistake, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:

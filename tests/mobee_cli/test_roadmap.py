@@ -66,9 +66,9 @@ def say(capsys: pytest.CaptureFixture[str]) -> Say:
             code = main(["roadmap", *map(str, words)])
         except SystemExit as end:
             code = int(end.code or 0)
-        told = capsys.readouterr()
-        assert all(len(line) <= 80 for line in told.out.splitlines() if not line.lstrip().startswith(('"', "{", "[")))
-        return code, told.out, told.err
+        printed = capsys.readouterr()
+        assert all(len(line) <= 80 for line in printed.out.splitlines() if not line.lstrip().startswith(('"', "{", "[")))
+        return code, printed.out, printed.err
 
     return run
 
@@ -208,7 +208,7 @@ def test_tasks_are_listed_with_their_figures(say: Say) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("x = (\n", r"task.py:1: SyntaxError"),
         ("import mobee\n1 / 0\n", r"task.py:2: ZeroDivisionError"),
@@ -216,10 +216,10 @@ def test_tasks_are_listed_with_their_figures(say: Say) -> None:
         ("def example():\n    return 1\n", "example() returned int"),
     ],
 )
-def test_an_invalid_task_file_is_refused_with_its_line(say: Say, tmp_path: Path, text: str, told: str) -> None:
+def test_an_invalid_task_file_is_refused_with_its_line(say: Say, tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "task.py").write_text(text)
     code, out, err = say("build", tmp_path / "task.py")
-    assert code == 2 and out == "" and told in err and err.count("\n") == 1
+    assert code == 2 and out == "" and message in err and err.count("\n") == 1
 
 
 TASK = """

@@ -21,10 +21,10 @@ def test_every_robot_and_world_is_listed_within_80_columns(capsys: pytest.Captur
 
 def test_json_has_parts_counts_and_origin(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robots", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    icub, robot = told["robots"]["icub"], load_robot("icub")
+    printed = json.loads(capsys.readouterr().out)
+    icub, robot = printed["robots"]["icub"], load_robot("icub")
     assert icub["parts"]["left_arm"] == list(robot.parts["left_arm"].motors)
     assert icub["counts"]["solids"] + icub["counts"]["fields"] == len(robot.shapes)
-    assert told["worlds"]["table"]["objects"] == {"table": "obstacle", "ball": "target"}
-    assert all(entry["about"] for kind in ("robots", "worlds") for entry in told[kind].values())
-    assert all(Path(path).is_file() for path in told["readme"])
+    assert printed["worlds"]["table"]["objects"] == {"table": "obstacle", "ball": "target"}
+    assert all(entry["about"] for kind in ("robots", "worlds") for entry in printed[kind].values())
+    assert all(Path(path).is_file() for path in printed["readme"])

@@ -38,9 +38,9 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mobee_cli", "view", str(robot)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as shown:
         assert shown.stdout and shown.stderr
-        told = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/viewer\.html\?recording=view\.rrd)\n", shown.stdout.readline())
-        assert told
-        with urllib.request.urlopen(told[1], timeout=30.0) as answer:
+        address = re.fullmatch(r"toy at (http://127\.0\.0\.1:\d+/viewer\.html\?recording=view\.rrd)\n", shown.stdout.readline())
+        assert address
+        with urllib.request.urlopen(address[1], timeout=30.0) as answer:
             assert b"<html" in answer.read(2000).lower()
         shown.send_signal(signal.SIGINT)
         try:

@@ -97,7 +97,7 @@ class FakeSim:
             give_up = time.monotonic() + 0.25
             while not answered(k) and time.monotonic() < give_up:
                 time.sleep(0.0002)
-        return wait_for(until, f"{what}, after {ticks} ticks")  # what is told of the last tick may still be on its way
+        return wait_for(until, f"{what}, after {ticks} ticks")  # messages about the last tick may arrive later
 
     def hold(self, part: str) -> None:
         """As the gate does when something is wrong."""

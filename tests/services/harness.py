@@ -127,7 +127,7 @@ class Rig:
         self._tokens[who, instance] = self.session.liveliness().declare_token(keys.alive(who, instance))
 
     def holds(self, who: str, instance: str) -> bool:
-        """Whether the test itself has declared that token, and not dropped it: what the bus tells of it may come later."""
+        """Whether the test itself has declared that token and not dropped it; the bus may report a change later."""
         return (who, instance) in self._tokens
 
     def drop_token(self, who: str, instance: str) -> None:

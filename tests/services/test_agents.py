@@ -54,7 +54,7 @@ class Stage:
     def made(self, n: int) -> list[Transition]:
         return wait_for(lambda: len(self.transitions) >= n and list(self.transitions), f"{n} transitions")
 
-    def told(self, code: str) -> list[str]:
+    def texts(self, code: str) -> list[str]:
         return [e.text for e in self.events if e.code == code]
 
 
@@ -88,16 +88,16 @@ def test_every_transition_is_on_disk_before_the_next_goal_and_published_as_store
     program = stage.agent("--transitions", "12")
     assert program.wait(30.0) == 0
     assert stored == list(range(12))
-    told, kept = stage.made(12), stage.rows()
-    assert [t.n for t in told] == list(range(1, 13))
-    for message, row, goal in zip(told, kept, stage.controller.goals, strict=True):
+    published, kept = stage.made(12), stage.rows()
+    assert [t.n for t in published] == list(range(1, 13))
+    for message, row, goal in zip(published, kept, stage.controller.goals, strict=True):
         same = ("n", "s", "a", "s_next", "reward", "settled", "duration")
         assert [getattr(message, name) for name in same] == [row[name] for name in same]
         assert (message.agent, row["agent"], message.touched) == ("torso", "torso", ["table"])
         assert message.goal == TORSO.goal(message.s, message.a)
         np.testing.assert_allclose(goal.q, TORSO.target(message.goal), atol=1e-12)
         assert message.duration == pytest.approx(0.05)  # the five ticks of the controller
-    for before, after in zip(told, told[1:], strict=False):
+    for before, after in zip(published, published[1:], strict=False):
         assert after.s == before.s_next
     assert stage.controller.takes == 1
 
@@ -120,13 +120,13 @@ def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_continues_later(s
     agent = stage.agent()
     stage.made(2)
     stage.controller.ending = "held"
-    wait_for(lambda: stage.told("interrupted"), "the event")
-    assert "in hold" in stage.told("interrupted")[0]
+    wait_for(lambda: stage.texts("interrupted"), "the event")
+    assert "in hold" in stage.texts("interrupted")[0]
     before, goals = len(stage.rows()), len(stage.controller.goals)
     ticks = stage.rig.bus.k
     wait_for(lambda: stage.rig.bus.k > ticks + 50, "time to pass")
     assert (len(stage.rows()), len(stage.controller.goals)) == (before, goals)
-    assert len(stage.told("interrupted")) == 1
+    assert len(stage.texts("interrupted")) == 1
     stage.controller.ending = "settled"
     stage.controller.q = TORSO.target(0)  # it may have been moved meanwhile
     stage.controller.resume()
@@ -150,7 +150,7 @@ def test_a_new_controller_is_asked_again(stage: Stage) -> None:
     assert stage.controller.epoch > old
     numbers = [row["n"] for row in stage.rows()]
     assert numbers == list(range(1, len(numbers) + 1))
-    wait_for(lambda: stage.told("interrupted"), "the event")
+    wait_for(lambda: stage.texts("interrupted"), "the event")
 
 
 def test_a_new_run_ends_the_action_without_an_observation(stage: Stage) -> None:
@@ -163,7 +163,7 @@ def test_a_new_run_ends_the_action_without_an_observation(stage: Stage) -> None:
     stage.controller.lasts = 5
     stage.controller.new_run()
     stage.made(before + 2)
-    assert "new run" in wait_for(lambda: stage.told("interrupted"), "the event")[0]
+    assert "new run" in wait_for(lambda: stage.texts("interrupted"), "the event")[0]
     assert stage.controller.action_id != lost
     assert stage.controller.takes == 1  # the goal is still its own
 
@@ -172,7 +172,7 @@ def test_an_answer_that_gets_lost_does_not_make_a_second_action(stage: Stage) ->
     stage.controller.loses_answers = 2
     stage.agent("--transitions", "3").wait(30.0)
     assert len(stage.made(3)) == len(stage.controller.goals) == 3
-    assert stage.told("interrupted") == []
+    assert stage.texts("interrupted") == []
 
 
 def test_after_each_kill_it_continues(stage: Stage, rng: np.random.Generator) -> None:
@@ -184,8 +184,9 @@ def test_after_each_kill_it_continues(stage: Stage, rng: np.random.Generator) ->
         assert agent.stop(signal.SIGKILL) == -signal.SIGKILL
         before, first = first, stage.rows()
         assert first[: len(before)] == before and len(first) >= len(before) + 3
-        told = [t.n for t in stage.transitions]
-        assert told == sorted(set(told)) and set(told) <= {row["n"] for row in first}  # the last of each may not have been told any more
+        published = [t.n for t in stage.transitions]
+        assert published == sorted(set(published))
+        assert set(published) <= {row["n"] for row in first}  # the kill may come before the last row is published
     count = len(stage.transitions)
     again = stage.agent("--transitions", str(len(first) + 4))
     assert again.wait(30.0) == 0
@@ -194,7 +195,7 @@ def test_after_each_kill_it_continues(stage: Stage, rng: np.random.Generator) ->
     assert [row["n"] for row in both] == list(range(1, len(first) + 5))
     last = [len(first) + n for n in range(1, 5)]
     wait_for(lambda: [t.n for t in stage.transitions[count:]][-4:] == last, "the last four transitions")
-    wait_for(lambda: any(f"continues after {len(first)} transitions" in text for text in stage.told("resumed")), "the event")
+    wait_for(lambda: any(f"continues after {len(first)} transitions" in text for text in stage.texts("resumed")), "the event")
 
 
 def test_a_resumed_agent_has_learnt_what_the_one_before_had(stage: Stage, tmp_path: Path) -> None:
@@ -264,7 +265,7 @@ def test_its_numbers_count_from_the_mark(stage: Stage) -> None:
     stage.agent("--transitions", "0")
     stage.made(3)
     stage.controller.hold()
-    wait_for(lambda: stage.told("interrupted"), "the hold")
+    wait_for(lambda: stage.texts("interrupted"), "the hold")
     numbers = stage.rig.stat("agent_torso").numbers
     assert numbers["transitions"] == numbers["transitions_ever"] == len(stage.rows())
     assert numbers["action_time_mean"] == pytest.approx(0.05)
@@ -274,7 +275,7 @@ def test_its_numbers_count_from_the_mark(stage: Stage) -> None:
     assert numbers["transitions_ever"] == len(stage.rows())
 
 
-# What it is told, and how it ends
+# Messages and settings, and how an agent ends
 
 
 def test_an_absent_run_directory_is_reported_in_one_line(stage: Stage) -> None:
@@ -367,7 +368,7 @@ def test_an_agent_that_is_asked_to_rest_releases_its_goal_and_continues_later(st
     before = len(stage.transitions)
     time.sleep(1.0)
     assert len(stage.transitions) == before
-    assert "agent rests" in stage.told("rests")[0]
+    assert "agent rests" in stage.texts("rests")[0]
     stage.rig.call(keys.service_rpc("agent_torso", "go_on"), Empty, Done)
     assert len(stage.made(before + 1)) > n
     agent.stop()

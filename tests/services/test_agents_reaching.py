@@ -56,9 +56,9 @@ class FakeReaches(FakeController):
         super()._become(status)
         if status == "settled" and self.reaches and self.reaches[-1].action_id == self.action_id:
             asked, k = self.reaches[-1], self.rig.bus.k
-            told = {"action_id": asked.action_id, "phase": "over", "marker": asked.marker, "object": asked.object, "settled": True}
+            over = {"action_id": asked.action_id, "phase": "over", "marker": asked.marker, "object": asked.object, "settled": True}
             q, at = self.q.tolist(), asked.position
-            self._reach.put(end_k=k - 1, target=at, q=q, position=at, missing=MISSING, touched=["table"], **told)
+            self._reach.put(end_k=k - 1, target=at, q=q, position=at, missing=MISSING, touched=["table"], **over)
 
 
 @pytest.fixture
@@ -105,17 +105,17 @@ def test_transitions_are_published_with_the_model_of_them(stage: tuple[Rig, Fake
     learned = made.record(Learned, "right_arm")
     assert agent(made, "--tries", "4", "--strategy", "random").wait(60.0) == 0
     kept = [row for row in steps(made) if row["a"] >= 0]
-    wait_for(lambda: len(transitions) >= len(kept) > 0 and learned, "what was done to be told")
+    wait_for(lambda: len(transitions) >= len(kept) > 0 and learned, "the published transitions")
     assert [(seen.n, seen.s, seen.a, seen.s_next, seen.reward, seen.settled) for seen in transitions] == [
         (n, row["s"], row["a"], row["s_next"], row["reward"], bool(row["settled"])) for n, row in enumerate(kept, 1)
     ]
-    told = learned[0]
-    tries, value = np.frombuffer(told.tries, "<u4").reshape(81, 16), np.frombuffer(told.value, "<f4").reshape(81, 16)
+    first = learned[0]
+    tries, value = np.frombuffer(first.tries, "<u4").reshape(81, 16), np.frombuffer(first.value, "<f4").reshape(81, 16)
     expected = np.zeros((81, 16), dtype=int)
-    for row in kept[: told.n]:
+    for row in kept[: first.n]:
         expected[row["s"], row["a"]] += 1
     np.testing.assert_array_equal(tries, expected)
-    assert value.max() > 0.0 and told.agent == "right_arm"
+    assert value.max() > 0.0 and first.agent == "right_arm"
 
 
 def test_a_killed_agent_continues_with_its_model(stage: tuple[Rig, FakeReaches]) -> None:

@@ -56,9 +56,9 @@ def test_an_agent_killed_again_and_again_has_learnt_what_one_never_killed_has(tm
     for _ in range(KILLS):
         live_and_die(file, reports, rng)
         now = stored(file)
-        told = [int(n) for n, _ in REPORT.findall(reports.read_text())] if reports.exists() else []
+        reported = [int(n) for n, _ in REPORT.findall(reports.read_text())] if reports.exists() else []
         assert now[: len(before)] == before
-        assert len(now) - max(told, default=0) in (0, 1)  # all that was observed, and perhaps one that could not be told any more
+        assert len(now) - max(reported, default=0) in (0, 1)  # the kill may have prevented the report of the last observation
         before = now
 
     one = curious_agent(None)

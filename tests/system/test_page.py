@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page in browsers: it tells the story, acts on the robot, stays near it, and says when it was stopped and when all has ended."""
+"""The page in browsers: it shows the agents, acts on the robot, keeps it in view, and reports an emergency stop and the end of the run."""
 
 from __future__ import annotations
 

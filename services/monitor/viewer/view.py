@@ -83,13 +83,13 @@ def view(
     robot: Robot,
     world: World | None,
     save: Path | None,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     stretches: Sequence[Stretch] | None = None,
     solids: bool = False,
 ) -> None:
     """Show a motion on a page until the user interrupts, or save it to a file.
 
-    `tell` is called with the page's address when all data are logged.  `stretches`: of the motion, RATE poses a second; None: a sweep
+    `report` is called with the page's address when all data are logged.  `stretches`: of the motion, RATE poses a second; None: a sweep
     through the ranges of all motors.  `solids`: show the solids in place of what the file draws.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
@@ -101,7 +101,7 @@ def view(
         if save is None:
             site = Site(Board(), "", NoControls(), None, ViewerFiles(Path(private)).path, lambda: 0.0, {"view.rrd": file})
             server = PageServer(site, HOST, 0)
-            tell(f"http://{HOST}:{server.port}/viewer.html?recording=view.rrd")
+            report(f"http://{HOST}:{server.port}/viewer.html?recording=view.rrd")
             while True:
                 time.sleep(3600.0)
 

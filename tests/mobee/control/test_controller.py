@@ -26,7 +26,7 @@ def arm_controller(**options: Any) -> Controller:
 
 
 def follow(controller: Controller, q: np.ndarray, seconds: float) -> np.ndarray:
-    """The path of a robot that does exactly what it is told."""
+    """The path of a robot that follows its commands exactly."""
     path = [q]
     for _ in range(round(seconds / DT)):
         path.append(path[-1] + DT * controller.step(path[-1], DT).velocity)

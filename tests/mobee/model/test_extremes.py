@@ -24,7 +24,7 @@ PAIRS = [(first, second) for i, first in enumerate(KINDS) for second in KINDS[i:
 SCALES = (SMALLEST, 1e-4, 1.0, LARGEST)
 FORMS = ((1.0, 1.0, 1.0), (1.0, 1e-3, 1.0), (1e-3, 1.0, 1e-3), (1.0, 1e-9, 1.0), (1e-9, 1.0, 1e-9))  # also flat and thin ones
 NUMBERS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
-EXACT = 2e-9  # m: nothing is told more exactly
+EXACT = 2e-9  # m: no reference is more exact
 COARSE = 1e-8  # of the size of a hull: how exactly the direction to something round beside it is known, which may be far smaller
 
 

@@ -77,7 +77,7 @@ def test_the_encoders_read_this(seed: int) -> None:
 
 
 def run(parameters: MotorParameters, mode: str, reference_: float, seconds: float, q: Array | None = None) -> reference.MotorState:
-    """All motors told the same for some time."""
+    """Return the state of the motors after the same command for some time."""
     s = reference.at_rest(ROBOT, parameters, np.zeros(3) if q is None else q, STEP)
     reference.command(s, slice(None), mode, np.full(3, reference_))
     for _ in range(round(seconds / STEP)):

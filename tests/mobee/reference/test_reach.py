@@ -97,7 +97,7 @@ def tip_target(x: float, y: float) -> ReachTarget:
 
 
 def drawn_to(target: ReachTarget, start: np.ndarray, seconds: float = 8.0) -> np.ndarray:
-    """Where the tip is at the end, of motors that do at once what they are told."""
+    """Return the position of the tip at the end, for motors that follow their commands without delay."""
     robot, gains, q = planar_arm(), Gains.default(), start
     motion, mine = at_rest(robot, gains, q), reach.begin(planar_arm(), gains, "arm", "tip", target)
     for _ in range(round(seconds / 0.01)):

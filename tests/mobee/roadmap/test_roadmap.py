@@ -130,9 +130,9 @@ def test_a_file_that_is_no_roadmap_is_refused_in_one_line(tmp_path: Path) -> Non
     np.save(tmp_path / "array.npy", np.zeros(3))
     write(tmp_path / "partial.npz", {"q": np.zeros((1, 41))}, {"settings": {}, "world": []})
     for name in ("cut.npz", "text.npz", "other.npz", "array.npy", "partial.npz"):
-        with pytest.raises(MobeeError, match=name) as told:
+        with pytest.raises(MobeeError, match=name) as error:
             load_roadmap(tmp_path / name, table())
-        assert "\n" not in str(told.value)
+        assert "\n" not in str(error.value)
     with pytest.raises(MobeeError, match="no such file"):
         load_roadmap(tmp_path / "none.npz")
 

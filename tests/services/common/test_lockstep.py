@@ -39,8 +39,8 @@ class FakeService:
 
 class Bench:
     def __init__(self) -> None:
-        self.service, self.told = FakeService(), []
-        self.barrier = Barrier(self.service, ("model", "controller", "agent"), lambda who, why: self.told.append((who, why)))
+        self.service, self.removed = FakeService(), []
+        self.barrier = Barrier(self.service, ("model", "controller", "agent"), lambda who, why: self.removed.append((who, why)))
 
     def done(self, who: str, k: int, **fields: Any) -> None:
         header = {"v": VERSION, "run": "r", "src": who, "seq": 0, "k": k, "t": 0, "tw": 0}
@@ -65,7 +65,7 @@ def test_it_begins_when_everybody_has_come(bench: Bench) -> None:
     assert bench.barrier.absent() == ["agent"]
     bench.done("agent", 0)
     assert bench.barrier.absent() == []
-    assert bench.told == []
+    assert bench.removed == []
 
 
 def test_a_participant_that_is_not_busy_gets_its_turn_and_must_answer(bench: Bench) -> None:
@@ -103,8 +103,8 @@ def test_an_answer_to_an_older_tick_does_not_count(bench: Bench) -> None:
 def test_a_late_participant_is_dropped_reported_and_returns_with_its_next_answer(bench: Bench) -> None:
     bench.begun().service.waits = lambda: bench.done("model", 1)
     assert bench.barrier.wait(1) == ["agent", "controller"]
-    assert [who for who, _ in bench.told] == ["agent", "controller"]
-    assert "within 2 s" in bench.told[0][1]
+    assert [who for who, _ in bench.removed] == ["agent", "controller"]
+    assert "within 2 s" in bench.removed[0][1]
     bench.service.bus.k = 2
     bench.service.waits = lambda: bench.done("model", 2)
     assert bench.barrier.wait(2) == []
@@ -119,13 +119,13 @@ def test_a_process_that_ends_releases_the_barrier_and_is_reported(bench: Bench) 
     bench.done("agent", 1)
     bench.service.note_alive("controller", "i1", False)
     assert bench.barrier.missing(1) == []
-    assert bench.told == [("controller", "is gone")]
+    assert bench.removed == [("controller", "is gone")]
 
 
 def test_one_of_two_instances_that_goes_is_no_loss(bench: Bench) -> None:
     bench.begun().service.alive["agent"] = {"i2"}
     bench.service.note_alive("agent", "i1", False)
-    assert bench.told == []
+    assert bench.removed == []
 
 
 def test_without_a_controller_all_are_asked(bench: Bench) -> None:
@@ -143,13 +143,13 @@ def test_a_participant_may_leave_with_its_last_answer(bench: Bench) -> None:
     bench.done("controller", 1)
     assert bench.barrier.missing(1) == []
     bench.service.note_alive("agent", "i1", False)
-    assert bench.told == []
+    assert bench.removed == []
     assert bench.barrier.absent() == []
 
 
 def test_an_answer_without_an_input_is_reported(bench: Bench) -> None:
     bench.begun().done("controller", 1, ok=False)
-    assert bench.told == [("controller", "lacked an input at tick 1")]
+    assert bench.removed == [("controller", "lacked an input at tick 1")]
 
 
 def test_a_process_that_answers_becomes_a_participant(bench: Bench) -> None:

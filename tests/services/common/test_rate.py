@@ -8,7 +8,7 @@ from services.common.rate import Rate
 
 
 class Watch:
-    """A clock that goes when it is told to."""
+    """A clock that advances only when the test calls it."""
 
     def __init__(self) -> None:
         self.now = 100.0

@@ -255,11 +255,11 @@ def test_a_refusal_is_reported_on_the_bus_at_most_once_per_second(bus: Rig, cloc
         bus.session.put(WorldObject.stream.key("ball"), b"nonsense", encoding=encoding_of(Clock))
         wait_for(lambda n=n: rejected(bus).get("type", 0) == n + 1, "the refusal")
 
-    def told() -> list[Event]:
+    def reports() -> list[Event]:
         bus.session.put(WorldObject.stream.key("ball"), b"nonsense", encoding=encoding_of(Clock))
         return [e for e in events if e.code == "refused" and "world/ball" in e.text]
 
-    assert 1 <= len(wait_for(told, "an event")) <= 2 + time.monotonic() - start
+    assert 1 <= len(wait_for(reports, "an event")) <= 2 + time.monotonic() - start
 
 
 def test_random_bytes_on_every_key_do_no_harm(bus: Rig, clock: Any, rng: np.random.Generator) -> None:

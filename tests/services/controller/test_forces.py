@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces from outside in a live controller: at the contacts that the model tells, and told to the monitor."""
+"""Forces from outside in a live controller act at the contacts that the model publishes; the controller publishes the forces."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def test_published_contacts_push_as_those_of_a_model_with_the_world(least_lever:
     robot = replace(ROBOT, least_lever=least_lever)
     model, blind = Model(robot, load_world("table")), Model(robot)
     for q in rng.uniform(*ROBOT.limits.T, (20, len(ROBOT.motors))):
-        seen, told = model.evaluate(q), blind.evaluate(q)
-        told.compute_contacts(PublishedContacts(told, [item(contact) for contact in seen.contacts]))
-        assert [item(contact) for contact in told.contacts] == [item(contact) for contact in seen.contacts]
-        np.testing.assert_allclose(told.projection, seen.projection, atol=1e-12)
+        seen, published = model.evaluate(q), blind.evaluate(q)
+        published.compute_contacts(PublishedContacts(published, [item(contact) for contact in seen.contacts]))
+        assert [item(contact) for contact in published.contacts] == [item(contact) for contact in seen.contacts]
+        np.testing.assert_allclose(published.projection, seen.projection, atol=1e-12)
 
 
 def item(c: object) -> ContactItem:
@@ -74,7 +74,7 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 
 
 def test_a_live_controller_adds_and_publishes_user_defined_terms(lifted: Stage) -> None:
-    told: list[Forces] = lifted.rig.record(Forces, "controller")
+    published: list[Forces] = lifted.rig.record(Forces, "controller")
     lifted.model.contacts = TOUCHES
     lifted.under_control()
     velocity = np.concatenate([lifted.motion(part).dq for part in ROBOT.parts])
@@ -82,7 +82,7 @@ def test_a_live_controller_adds_and_publishes_user_defined_terms(lifted: Stage) 
     pose = Model(ROBOT).evaluate(lifted.sim.q)
     pose.compute_contacts(PublishedContacts(pose, TOUCHES))
     expected = lift(State(ROBOT, lifted.sim.q, velocity, 0.01, lambda: pose))
-    said = wait_for(lambda: [one for one in told if one.re_k == k], "the forces")[-1]
+    said = wait_for(lambda: [one for one in published if one.re_k == k], "the forces")[-1]
     assert list(said.terms) == ["lift"]
     np.testing.assert_allclose(said.terms["lift"], expected, atol=1e-12)
     assert np.abs(expected).max() > 0.1

@@ -141,12 +141,12 @@ def test_it_does_not_answer_while_a_part_is_being_armed(bench: Bench) -> None:
 def test_a_moving_part_is_published_at_intervals_and_its_end_at_once(bench: Bench) -> None:
     _, epoch = bench.stage.own("torso", "agent_torso")
     bench.stage.goal("torso", epoch, ROBOT.home[ROBOT.part("torso").slice])
-    told: list[Motion] = bench.stage.motions["torso"]
+    reported: list[Motion] = bench.stage.motions["torso"]
     first = bench.answers[-1].re_k
     while "agent_torso" in (done := bench.tick()).busy:
         pass
-    wait_for(lambda: told[-1].status == "settled" and told[-1].k == done.re_k, "its end")
-    under_way = [motion.k for motion in told if motion.status == "moving" and motion.k > first]
+    wait_for(lambda: reported[-1].status == "settled" and reported[-1].k == done.re_k, "its end")
+    under_way = [motion.k for motion in reported if motion.status == "moving" and motion.k > first]
     assert under_way[0] == first + 1
     assert all(k % 10 == 0 for k in under_way[1:])
 

@@ -31,54 +31,54 @@ def reach(stage: Stage, epoch: int, position: Array, action: str = "r", **how: A
 
 
 @pytest.fixture
-def told(run: Stage) -> list[Reach]:
+def reports(run: Stage) -> list[Reach]:
     return run.rig.record(Reach, "right_arm")
 
 
-def newest(told: list[Reach]) -> Reach | None:
-    return told[-1] if told else None
+def newest(reports: list[Reach]) -> Reach | None:
+    return reports[-1] if reports else None
 
 
-def phase(told: list[Reach]) -> str:
-    return told[-1].phase if told else ""
+def phase(reports: list[Reach]) -> str:
+    return reports[-1].phase if reports else ""
 
 
-def test_a_reach_is_drawn_to_its_target_and_back_and_settles_twice(run: Stage, told: list[Reach]) -> None:
+def test_a_reach_is_drawn_to_its_target_and_back_and_settles_twice(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     before, at = run.sim.q[ARM].copy(), palm(run.sim.q)
     target = at + [-0.03, 0.02, 0.05]
     run.model.touched = {"right_arm": ["thing"]}
     started = reach(run, epoch, target)
-    run.play(lambda: phase(told) == "returning", "the force's end")
-    end = next(one for one in told if one.phase == "returning")
+    run.play(lambda: phase(reports) == "returning", "the force's end")
+    end = next(one for one in reports if one.phase == "returning")
     assert (end.action_id, end.marker, end.object, end.touched, end.settled) == ("r", "right_palm", "thing", ["thing"], True)
     assert (end.end_k - started.k) * 0.01 >= SETTLE.first_check
     assert end.missing == pytest.approx(np.linalg.norm(np.array(end.position) - target))
     assert end.missing < np.linalg.norm(at - target)
     assert run.motion("right_arm").status == "moving"
     drawn = np.abs(np.array(end.q) - before).max()
-    run.play(lambda: phase(told) == "over", "the return")
+    run.play(lambda: phase(reports) == "over", "the return")
     motion = run.motion("right_arm")
     assert (motion.status, motion.action_id, motion.start_k) == ("settled", "r", started.k)
     assert (motion.since_k - end.end_k) * 0.01 >= SETTLE.first_check
     assert np.abs(np.array(motion.q) - before).max() < 0.3 * drawn
     np.testing.assert_allclose(motion.goal, before, atol=1e-15)  # the attractor has not moved
-    assert (told[-1].q, told[-1].position) == (end.q, end.position)
+    assert (reports[-1].q, reports[-1].position) == (end.q, end.position)
 
 
-def test_a_reach_that_is_to_stay_ends_where_its_force_does(run: Stage, told: list[Reach]) -> None:
+def test_a_reach_that_is_to_stay_ends_where_its_force_does(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     started = reach(run, epoch, palm(run.sim.q) + [-0.03, 0.02, 0.05], stay=True)
-    run.play(lambda: phase(told) == "over", "the end")
+    run.play(lambda: phase(reports) == "over", "the end")
     motion = run.motion("right_arm")
     assert (motion.status, motion.start_k) == ("settled", started.k)
-    assert motion.goal == told[-1].q
+    assert motion.goal == reports[-1].q
     before = palm(run.sim.q)
     run.ticks(100)
     np.testing.assert_allclose(palm(run.sim.q), before, atol=0.01)
 
 
-def test_it_follows_its_target_where_the_model_has_it(run: Stage, told: list[Reach]) -> None:
+def test_it_follows_its_target_where_the_model_has_it(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     at = palm(run.sim.q)
     there = at + [-0.02, 0.03, 0.04]
@@ -88,43 +88,45 @@ def test_it_follows_its_target_where_the_model_has_it(run: Stage, told: list[Rea
     targets.put(re_k=run.rig.bus.k, positions={"another": [1.0, 1.0, 1.0]})
     targets.put(re_k=run.rig.bus.k, positions={"thing": [1e200, 0.0, 0.0]})
     run.ticks(3)
-    assert told[-1].target == at.tolist()
+    assert reports[-1].target == at.tolist()
     targets.put(re_k=run.rig.bus.k, positions={"thing": there.tolist()})
-    run.play(lambda: told[-1].target == there.tolist(), "the move", ticks=10)
-    run.play(lambda: phase(told) == "returning", "the force's end")
-    assert np.linalg.norm(np.array(told[-1].position) - there) < 0.8 * np.linalg.norm(at - there)
+    run.play(lambda: reports[-1].target == there.tolist(), "the move", ticks=10)
+    run.play(lambda: phase(reports) == "returning", "the force's end")
+    assert np.linalg.norm(np.array(reports[-1].position) - there) < 0.8 * np.linalg.norm(at - there)
 
 
-def test_a_reach_ends_without_outcome_in_hold_by_another_goal_and_with_its_owner(run: Stage, told: list[Reach]) -> None:
+def test_a_reach_ends_without_outcome_in_hold_by_another_goal_and_with_its_owner(run: Stage, reports: list[Reach]) -> None:
     instance, epoch = run.own("right_arm")
     far = palm(run.sim.q) + [-0.1, 0.1, 0.3]
 
     def begin(action: str) -> None:
         reach(run, epoch, far, action)
-        run.play(lambda: told and told[-1].action_id == action and np.abs(run.motion("right_arm").dq).max() > 0.05, "its motion", ticks=200)
+        run.play(
+            lambda: reports and reports[-1].action_id == action and np.abs(run.motion("right_arm").dq).max() > 0.05, "its motion", ticks=200
+        )
 
     begin("held")
     run.sim.hold("right_arm")
-    run.play(lambda: phase(told) == "interrupted", "the end by a hold", ticks=20)
+    run.play(lambda: phase(reports) == "interrupted", "the end by a hold", ticks=20)
     run.play(lambda: run.motion("right_arm").status == "idle", "its return")
     run.ticks(30)
     assert np.abs(run.motion("right_arm").dq).max() < 0.01
 
     begin("replaced")
     run.goal("right_arm", epoch, near("right_arm"), "goal")
-    wait_for(lambda: phase(told) == "interrupted", "the end by a goal")
+    wait_for(lambda: phase(reports) == "interrupted", "the end by a goal")
     run.play(lambda: run.motion("right_arm").status == "settled", "the goal")
     assert run.motion("right_arm").action_id == "goal"
 
     begin("owner")
     run.leave("agent_test", instance)
-    wait_for(lambda: phase(told) == "interrupted", "the end with its owner")
+    wait_for(lambda: phase(reports) == "interrupted", "the end with its owner")
     run.ticks(60)
     assert (run.motion("right_arm").status, run.motion("right_arm").epoch) == ("idle", 0)
     assert np.abs(run.motion("right_arm").dq).max() < 0.02
 
 
-def test_other_forces_come_and_go_while_it_reaches(run: Stage, told: list[Reach]) -> None:
+def test_other_forces_come_and_go_while_it_reaches(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     _, other = run.own("left_arm", "agent_left_arm")
     at = palm(run.sim.q)
@@ -133,11 +135,11 @@ def test_other_forces_come_and_go_while_it_reaches(run: Stage, told: list[Reach]
     run.force("left_arm", other, f=[1.0] + [0.0] * 15)
     run.ticks(5)
     run.force("left_arm", other)
-    run.play(lambda: phase(told) == "returning", "the force's end")
-    assert told[-1].missing < 0.8 * np.linalg.norm(at - target)
+    run.play(lambda: phase(reports) == "returning", "the force's end")
+    assert reports[-1].missing < 0.8 * np.linalg.norm(at - target)
 
 
-def test_an_invalid_reach_is_refused_with_the_valid_values(run: Stage, told: list[Reach]) -> None:
+def test_an_invalid_reach_is_refused_with_the_valid_values(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     here = palm(run.sim.q)
     assert "Did you mean 'right_palm'?" in refused("reach", lambda: reach(run, epoch, here, marker="right_plam"))
@@ -147,10 +149,10 @@ def test_an_invalid_reach_is_refused_with_the_valid_values(run: Stage, told: lis
     refused("value", lambda: reach(run, epoch, [np.nan, 0.0, 0.0]))
     refused("epoch", lambda: reach(run, epoch - 1, here))
     refused("decode", lambda: reach(run, epoch, here, radius=0.0))
-    assert (told, run.motion("right_arm").status) == ([], "idle")
+    assert (reports, run.motion("right_arm").status) == ([], "idle")
 
 
-def test_its_first_command_does_not_wait_for_the_next_tick(run: Stage, told: list[Reach]) -> None:
+def test_its_first_command_does_not_wait_for_the_next_tick(run: Stage, reports: list[Reach]) -> None:
     _, epoch = run.own("right_arm")
     run.ticks(3)
     k = run.rig.bus.k

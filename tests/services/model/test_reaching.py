@@ -22,7 +22,7 @@ from tests.services.model.stage import BALL, UPRIGHT, Stage, library
 
 @dataclass
 class Reacher:
-    """One who presents a target at the left palm, and tells of reaches as the controller does."""
+    """A client that places a target at the left palm, and publishes reaches as the controller does."""
 
     stage: Stage
     at: list[float]
@@ -38,8 +38,8 @@ class Reacher:
         bus = self.stage.rig.bus
         stream = self.streams.setdefault(part, bus.publisher(Reach, part))
         q = [0.0] * bus.part_sizes[part]
-        told = {"action_id": "a", "marker": marker, "object": TARGET, "end_k": bus.k, "target": self.at, "position": self.at}
-        stream.put(phase=phase, q=q, missing=0.0, settled=False, touched=[], **told)
+        both = {"action_id": "a", "marker": marker, "object": TARGET, "end_k": bus.k, "target": self.at, "position": self.at}
+        stream.put(phase=phase, q=q, missing=0.0, settled=False, touched=[], **both)
 
     def touches_target(self) -> bool:
         """By the hand, with the fields that the palm is inside."""

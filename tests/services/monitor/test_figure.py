@@ -58,9 +58,9 @@ def test_a_solid_is_red_while_it_touches(robot: Robot) -> None:
     notebook = Notebook()
     poses = np.array([robot.home, [np.pi / 2, robot.home[1]], robot.home])
     Figure(notebook.stream, robot, world).move(0.0, 1.0, poses)
-    told = [(when, color(shape)) for when, shape in notebook.logged["robot/bend/solids/fore"]]
+    shown = [(when, color(shape)) for when, shape in notebook.logged["robot/bend/solids/fore"]]
     grey = packed(*palette.SOLIDS[0], 255)
-    assert told == [(0.0, grey), (1.0, packed(*palette.COLLIDING)), (2.0, grey)]
+    assert shown == [(0.0, grey), (1.0, packed(*palette.COLLIDING)), (2.0, grey)]
     events = [what.text.as_arrow_array().to_pylist()[0] for _, what in notebook.logged["events"]]
     assert "solid: fore meets ball" in events
 

@@ -54,7 +54,7 @@ STEP = Transition(
 )
 
 
-def told(model: TransitionModel, **changes: Any) -> Learned:
+def learned(model: TransitionModel, **changes: Any) -> Learned:
     numbers = {"tries": model.tries.astype("<u4").tobytes(), "reward": model.reward.astype("<f4").tobytes()}
     fields = {"agent": "left_arm", "n": 3, "s": 0, "space": json.dumps(SPACE.settings), "value": numbers["reward"]}
     return Learned(**(HEADER | numbers | fields | {"surprises": surprises(model)} | changes))
@@ -75,7 +75,7 @@ def test_the_knowledge_of_an_agent_of_another_robot_is_shown_too(tmp_path: Path)
     space = Lattice(robot, ["pan", "bend"], neighbours=4)
     model, notebook = TransitionModel(space), Notebook()
     model.observe(0, 0, space.goal(0, 0))
-    Learning(notebook, robot).log("arm", told(model, agent="arm", space=json.dumps(space.settings)))
+    Learning(notebook, robot).log("arm", learned(model, agent="arm", space=json.dumps(space.settings)))
     assert set(notebook.logged) >= {"learning/arm/tries", "learning/arm/reward", "learning/arm/value"}
 
 
@@ -83,7 +83,7 @@ def test_what_surprised_is_an_arrow_and_what_worked_another() -> None:
     model, notebook = TransitionModel(SPACE), Notebook()
     model.observe(15, 2, 3)
     model.observe(0, 0, SPACE.goal(0, 0))
-    Learning(notebook, ROBOT).log("left_arm", told(model))
+    Learning(notebook, ROBOT).log("left_arm", learned(model))
     assert len(notebook.logged["learning/left_arm/space/surprising"].vectors) == 1
     assert len(notebook.logged["learning/left_arm/space/sound"].vectors) == 1
     assert len(notebook.logged["learning/left_arm/space/states"].positions) == 81
@@ -94,7 +94,7 @@ def test_what_surprised_is_an_arrow_and_what_worked_another() -> None:
 @pytest.mark.parametrize("wrong", [{"space": "{}"}, {"space": "no json"}, {"tries": b"12345"}, {"surprises": [Surprise(500, 0, 1, 1.0)]}])
 def test_what_does_not_fit_is_not_drawn_and_does_no_harm(wrong: dict[str, Any]) -> None:
     notebook = Notebook()
-    Learning(notebook, ROBOT).log("left_arm", told(TransitionModel(SPACE), **wrong))
+    Learning(notebook, ROBOT).log("left_arm", learned(TransitionModel(SPACE), **wrong))
     arrows = notebook.logged.get("learning/left_arm/space/surprising")
     assert arrows is None or len(arrows.vectors) == 0
 
@@ -102,7 +102,7 @@ def test_what_does_not_fit_is_not_drawn_and_does_no_harm(wrong: dict[str, Any]) 
 def test_a_space_that_is_too_large_is_not_drawn_and_said_so_once() -> None:
     notebook = Notebook()
     learning = Learning(notebook, ROBOT)
-    huge = told(TransitionModel(SPACE), tries=bytes(4 * (MAX_DRAWN + 1)))
+    huge = learned(TransitionModel(SPACE), tries=bytes(4 * (MAX_DRAWN + 1)))
     learning.log("left_arm", huge)
     assert list(notebook.logged) == ["events"] and notebook.logged.pop("events").text
     learning.log("left_arm", huge)

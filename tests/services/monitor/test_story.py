@@ -173,19 +173,19 @@ def test_the_story_of_an_agent_from_its_messages() -> None:
     teller, model = Teller(ROBOT, colors_of_all(ROBOT.parts)), TransitionModel(SPACE)
     teller.note_learned(learned(model, n=0))
     teller.note_decision(decision(tries=0, reached=0.5))
-    told = teller.values()
-    (card,) = told["cards"]
+    values = teller.values()
+    (card,) = values["cards"]
     assert card["title"] == "left arm" and "1st try from here" in card["now"] and "last" not in card
-    assert told["left"]["left_arm"]["path"] == [67, 67] and len(told["places"]["left_arm"]["points"]) == 81
+    assert values["left"]["left_arm"]["path"] == [67, 67] and len(values["places"]["left_arm"]["points"]) == 81
     model.observe(40, 3, 3)
     teller.note_transition(transition(s_next=3, touched=["table"]))
     teller.note_learned(learned(model, n=1, s=3))
-    told = teller.values()
-    (card,) = told["cards"]
+    values = teller.values()
+    (card,) = values["cards"]
     assert "now" not in card and card["last"]["outcome"] == "It ended against the table, not where it wanted."
-    assert [point[0] for point in told["curves"]["left_arm"]] == [0, 1]
+    assert [point[0] for point in values["curves"]["left_arm"]] == [0, 1]
     assert teller.values() == {}
-    json.dumps(told)
+    json.dumps(values)
 
 
 def test_a_decision_that_arrives_before_the_outcome_of_the_one_before_stays() -> None:

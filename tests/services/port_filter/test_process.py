@@ -133,7 +133,7 @@ class Client:
         self.commands.put(epoch=self.epoch, re_k=self.bus.k, mode=mode, ref=reference, ttl=1000)
         self.sent += 1
 
-    def told(self, code: str) -> Callable[[], bool]:
+    def has_event(self, code: str) -> Callable[[], bool]:
         return lambda: any(event.code == code for event in self.events)
 
 
@@ -192,8 +192,8 @@ def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Ca
     with pytest.raises(CallFailed, match="reflex") as refused:
         mine.call(keys.drive("torso", "take"), Take, Taken, instance="c1")
     assert refused.value.code == "reflex"
-    mine.until(mine.told("motion_failed"), "the end of the reflex")
-    assert mine.told("reflex")()
+    mine.until(mine.has_event("motion_failed"), "the end of the reflex")
+    assert mine.has_event("reflex")()
     begun = np.deg2rad([4.0, 0.0, 0.0])  # where this move began, not the one before
     mine.until(lambda: bool(np.abs(mine.q - begun).max() < NEAR), "the robot back where it came from")
     mine.arm()
@@ -209,7 +209,7 @@ def test_in_another_modality_the_reflex_goes_back_to_a_waypoint_set_by_a_call(cl
     here = mine.q
     mine.answer()
     mine.drive(PITCH, FAST, lambda: False)
-    mine.until(mine.told("motion_failed"), "the end of the reflex")
+    mine.until(mine.has_event("motion_failed"), "the end of the reflex")
     mine.until(lambda: bool(np.abs(mine.q - here).max() < NEAR), "the robot back at its waypoint")
 
 

@@ -59,12 +59,12 @@ class Bench:
         wait_for(lambda: states[-1].run == run and states[-1].k > k, f"a state of {part} after tick {k}")
         return next(state for state in states if state.run == run and state.k > k)
 
-    def told(self, since: int, part: str = "") -> list[Event]:
+    def events_since(self, since: int, part: str = "") -> list[Event]:
         """Events of this run from tick `since` on, which may come late; those that begin with the part's name."""
         return [e for e in list(self.events) if e.run == self.rig.bus.run and e.k >= since and e.text.startswith(part)]
 
     def hears(self, code: str, since: int, says: str = "") -> Event:
-        return wait_for(lambda: next((e for e in self.told(since) if e.code == code and says in e.text), None), f"the event {code}")
+        return wait_for(lambda: next((e for e in self.events_since(since) if e.code == code and says in e.text), None), f"the event {code}")
 
     def drive(self, part: str, verb: str, epoch: int) -> str:
         return str(self.rig.call(keys.drive(part, verb), WithEpoch, Driven, who="controller", epoch=epoch).gate)

@@ -27,8 +27,8 @@ class Gated:
 
     def __init__(self, parameters: MotorParameters | None = None, dt: float = 0.01) -> None:
         self.dt, self.k, self.now, self.seq = dt, 0, 0, -1
-        self.told: list[tuple[str, str]] = []
-        self.gate = Gate(PART, LIMITS, dt, report=lambda code, text, values: self.told.append((code, text)))
+        self.events: list[tuple[str, str]] = []
+        self.gate = Gate(PART, LIMITS, dt, report=lambda code, text, values: self.events.append((code, text)))
         self.motors = Motors(ROBOT, parameters or MotorParameters.ideal(), seed=0, q=ROBOT.home)
         self.drive = Drive("hold")
 

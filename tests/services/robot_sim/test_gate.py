@@ -58,7 +58,7 @@ def test_the_gate_says_what_the_motors_do() -> None:
     gate.hold(gate.epoch)
     gated.tick()
     assert (gate.state, gate.mode, gate.seq, gate.age) == ("hold", "hold", -1, -1)
-    assert gated.told == [("hold", f"{PART}: requested by its owner")]
+    assert gated.events == [("hold", f"{PART}: requested by its owner")]
 
 
 def test_each_owner_has_the_next_epoch_and_a_released_part_none() -> None:
@@ -172,8 +172,8 @@ def test_nothing_is_replayed_after_a_hold() -> None:
     gated.gate.arm(gated.gate.epoch)
     gated.tick()
     assert gated.drive.mode == "hold"
-    assert gated.told[0][0] == "hold"
-    assert "ttl 100 ms" in gated.told[0][1]
+    assert gated.events[0][0] == "hold"
+    assert "ttl 100 ms" in gated.events[0][1]
 
 
 def test_the_loss_of_the_owner_holds_and_its_epoch_is_worth_nothing() -> None:
@@ -183,7 +183,7 @@ def test_the_loss_of_the_owner_holds_and_its_epoch_is_worth_nothing() -> None:
     gated.gate.lose_owner()
     gated.tick()
     assert gated.drive.mode == "hold"
-    assert gated.told == [("hold", f"{PART}: its owner controller is gone")]
+    assert gated.events == [("hold", f"{PART}: its owner controller is gone")]
     with pytest.raises(Refused, match="no client does"):
         gated.gate.arm(gated.gate.epoch)
 
@@ -328,7 +328,7 @@ def test_a_torque_that_drives_a_motor_into_its_limit_ends_in_a_hold_before_it(pa
             break
         gated.command("torque", [20.0, 0.0, 0.0])
         gated.tick()
-    assert "torque" in gated.told[-1][1]
+    assert "torque" in gated.events[-1][1]
     assert gated.gate.mode == "hold"
     for _ in range(50):
         gated.tick()
@@ -338,19 +338,19 @@ def test_a_torque_that_drives_a_motor_into_its_limit_ends_in_a_hold_before_it(pa
 
 
 def test_in_lockstep_a_command_is_in_force_for_three_ticks() -> None:
-    told: list[tuple[str, dict[str, float]]] = []
-    gate = Gate(PART, LIMITS, 0.05, report=lambda code, text, values: told.append((text, values)), ttl_ticks=LOCKED_TTL)
+    events: list[tuple[str, dict[str, float]]] = []
+    gate = Gate(PART, LIMITS, 0.05, report=lambda code, text, values: events.append((text, values)), ttl_ticks=LOCKED_TTL)
     epoch, still = gate.take("controller", "c1"), np.zeros(N)
     gate.arm(epoch)
     gate.admit(Order("controller", epoch, 0, 10, "velocity", np.zeros(N), 100), 10, 0, still)
     for k in (11, 12, 13):
         assert gate.tick(k, 10**12, still, still).mode == "velocity"
     assert gate.tick(14, 10**12, still, still).mode == "hold"
-    assert (gate.state, told) == ("hold", [(f"{PART}: no valid command for 4 ticks, limit 3", {"age": 4.0})])
+    assert (gate.state, events) == ("hold", [(f"{PART}: no valid command for 4 ticks, limit 3", {"age": 4.0})])
 
 
 def test_the_report_of_a_command_that_is_too_old_says_by_how_much() -> None:
     gated = Gated().owned()
     gated.command(ref=0.05, ttl=100)
     gated.gate.tick(1, 120_000_000, gated.q, gated.velocity)
-    assert gated.told == [("hold", f"{PART}: no valid command for 120 ms, ttl 100 ms")]
+    assert gated.events == [("hold", f"{PART}: no valid command for 120 ms, ttl 100 ms")]

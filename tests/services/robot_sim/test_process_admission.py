@@ -57,7 +57,7 @@ def test_a_second_token_of_the_model_that_comes_and_goes_holds_nothing_and_the_f
     bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.1))
     bench.rig.drop_token("model", "ghost")
     bench.keep("left_arm", epoch, 0.3, lambda: elbow(0.1))
-    assert not [event for event in bench.told(since) if event.code == "hold"]
+    assert not [event for event in bench.events_since(since) if event.code == "hold"]
     bench.rig.drop_token("model", "first")
     bench.hears("hold", since, "model is gone")
 
@@ -88,9 +88,9 @@ def test_the_arm_holds_at_once_when_a_token_is_gone(bench: Bench, who: str) -> N
     bench.hears("stopped", since)
     if who == "router":
         bench.rig.token(who, instance)  # in time: without any, the service ends
-    told = bench.told(since, "left_arm")
-    assert [event.code for event in told[:2]] == ["hold", "stopped"]
-    assert who in told[0].text
+    events = bench.events_since(since, "left_arm")
+    assert [event.code for event in events[:2]] == ["hold", "stopped"]
+    assert who in events[0].text
     assert bench.next_state("left_arm").gate == "hold"
 
 

@@ -21,7 +21,7 @@ def main() -> None:
         raise RuntimeError("no hardware at all")
     marks = []
     with Service(config.name, config) as service:
-        service.describe = lambda: told(service, config, marks)
+        service.describe = lambda: description(service, config, marks)
         service.mark = lambda: marks.append(1)
         if config.behaviour == "talk":
             say(service)
@@ -38,7 +38,7 @@ def main() -> None:
             print(f"over at {time.monotonic()}")
 
 
-def told(service: Service, config: Config, marks: list[int]) -> tuple[str, dict[str, float]]:
+def description(service: Service, config: Config, marks: list[int]) -> tuple[str, dict[str, float]]:
     """What it is; one that freezes does so some time after it was first asked, as before that it is not ready to anybody."""
     if config.behaviour == "freeze":
         service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))

@@ -5,7 +5,7 @@ from services.common.config import ServiceConfig
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """What the script is told."""
+    """Settings of the script."""
 
     run_dir: str = ""
     """Folder for what came of it."""

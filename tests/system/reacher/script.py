@@ -18,15 +18,15 @@ def perform(plant: ReachPlant) -> Iterator[dict[str, Any]]:
     """Act, reach free and near the table, with and without being drawn back; what each came to."""
     where = plant.robot.part(PART).slice
     home, middle = plant.robot.home[where], plant.robot.limits[where].mean(axis=1)
-    yield told(plant.act(PART, home + 0.5 * (middle - home)))
+    yield fields(plant.act(PART, home + 0.5 * (middle - home)))
     plant.present(ReachTarget(np.array([-0.25, 0.2, 0.05])))
     yield reached(plant.reach(PART, MARKER))
     plant.present(ReachTarget(np.array([-0.35, 0.15, 0.15]), aim="surface"))
     yield reached(plant.reach(PART, MARKER, stay=True))
-    yield told(plant.act(PART, home + 0.4 * (middle - home)))
+    yield fields(plant.act(PART, home + 0.4 * (middle - home)))
 
 
-def told(outcome: Outcome) -> dict[str, Any]:
+def fields(outcome: Outcome) -> dict[str, Any]:
     return {
         "q": outcome.q.tolist(),
         "settled": outcome.settled,
@@ -43,5 +43,5 @@ def reached(outcome: ReachOutcome) -> dict[str, Any]:
         "settled": outcome.settled,
         "duration": round(outcome.duration, 9),
         "touched": list(outcome.touched),
-        "after": told(outcome.after),
+        "after": fields(outcome.after),
     }

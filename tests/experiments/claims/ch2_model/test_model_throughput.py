@@ -85,9 +85,9 @@ def short(objects, evaluations, seconds=0.01):
 
 def test_records_too_short_for_a_rate_are_pooled_with_the_nearest():
     records = [short(number, 0 if number % 2 else 20) for number in range(1, 61)]
-    told = dict(rates(records))
-    assert 1 not in told and set(told.values()) <= {900, 950, 1000, 1050, 1100}
-    assert 50 in told
+    found = dict(rates(records))
+    assert 1 not in found and set(found.values()) <= {900, 950, 1000, 1050, 1100}
+    assert 50 in found
 
 
 def test_a_flood_too_short_in_all_has_no_rate():

@@ -59,7 +59,7 @@ def test_the_launcher_takes_the_scenario_and_its_agents_are_those_of_the_offline
 
 
 def test_it_continues_with_another_seed_until_all_parts_have_enough(tmp_path, monkeypatch):
-    seeds, told = [], []
+    seeds, reported = [], []
 
     def launched(path, ticks, runs):
         scenario = read_scenario(path)
@@ -69,8 +69,8 @@ def test_it_continues_with_another_seed_until_all_parts_have_enough(tmp_path, mo
         return {}
 
     monkeypatch.setattr(live_learning, "summary_of", launched)
-    learn_live("arms", "kinematic", 0, 25, tmp_path, told.append)
-    assert told == [0, 7, 17] and len(set(seeds)) == 3
+    learn_live("arms", "kinematic", 0, 25, tmp_path, reported.append)
+    assert reported == [0, 7, 17] and len(set(seeds)) == 3
 
 
 def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_others(tmp_path):
