@@ -20,7 +20,7 @@ hypothesis.settings.load_profile("mobee")
 
 @pytest.fixture(scope="session", autouse=True)
 def nothing_left_running() -> Iterator[None]:
-    """No process that a test started outlives the tests, however it was detached: what is left is named and killed."""
+    """No process that a test started outlives the tests, even if it was detached: remaining processes are named and killed."""
     name, mark = "MOBEE_STARTED_BY_TESTS", secrets.token_hex(8)
     os.environ[name] = mark  # inherited by all that the tests start
     yield
@@ -46,7 +46,7 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on."""
+    """A TCP port of the loopback interface on which no process listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -80,7 +80,7 @@ def pytest_runtest_setup() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What was left out, and what ./test found before pytest, just above the closing line."""
+    """Print skipped tests, and the findings of ./test before pytest, just above the closing line."""
     if any("live picture" in str(report.longrepr) for report in terminalreporter.stats.get("skipped", ())):
         terminalreporter.write_line("skipped: live picture")
     if summary := os.environ.get("MOBEE_CHECKS"):

@@ -159,9 +159,9 @@ def _overlap(first: Any, second: Any) -> tuple[float, ...] | None:
         result = fcl.DistanceResult()
         depth = -fcl.distance(one, other, _DISTANCE, result)
         if depth > 0.0:
-            deepest, surface = (np.array(point) for point in result.nearest_points)  # of `one`: inside the other, and where it must go
-            way = (surface - deepest) / np.linalg.norm(surface - deepest)
-            return depth, *(way if one is first else -way), *(deepest + surface) / 2.0
+            deepest, surface = (np.array(point) for point in result.nearest_points)  # of `one`: inside the other, and separated
+            normal = (surface - deepest) / np.linalg.norm(surface - deepest)
+            return depth, *(normal if one is first else -normal), *(deepest + surface) / 2.0
     return _contact(first, second)  # they touch without overlap
 
 

@@ -67,18 +67,18 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
 def rounded(corners: ArrayLike, rounding: float) -> Array:
     """Return points along a path (K, n), about STEP apart, (S, n): straight lines with a parabola at each corner."""
     points = real_array("corners", corners)
-    ways = np.diff(points, axis=0)
-    far = np.linalg.norm(ways, axis=1)
-    ways = ways / far[:, None]
+    steps = np.diff(points, axis=0)
+    far = np.linalg.norm(steps, axis=1)
+    directions = steps / far[:, None]
     found, here = [points[:1]], points[0]
     for k in range(1, len(points)):
         last = k == len(points) - 1
         cut = 0.0 if last else min(rounding, 0.5 * far[k - 1], 0.5 * far[k])
-        before = points[k] - cut * ways[k - 1]
+        before = points[k] - cut * directions[k - 1]
         found.append(_line(here, before))
         here = before
         if cut > 0.0:
-            behind = points[k] + cut * ways[k]
+            behind = points[k] + cut * directions[k]
             share = np.linspace(0.0, 1.0, max(4, int(2.0 * cut / STEP)) + 1)[1:, None]
             found.append((1.0 - share) ** 2 * before + 2.0 * share * (1.0 - share) * points[k] + share**2 * behind)
             here = behind
@@ -98,12 +98,12 @@ def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tup
     """Return the fastest motion over points (S, n) within the limits: q, velocity and acceleration (T, n), one row per dt s."""
     from scipy.interpolate import CubicHermiteSpline
 
-    ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(ways)])
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
     tangent = np.gradient(places, along, axis=0)
     bend = np.gradient(tangent, along, axis=0)
-    speed = _speeds(ways, tangent, bend, speeds, accelerations)
-    spans = 2.0 * ways / (speed[1:] + speed[:-1])  # s, of even acceleration
+    speed = _speeds(lengths, tangent, bend, speeds, accelerations)
+    spans = 2.0 * lengths / (speed[1:] + speed[:-1])  # s, of even acceleration
     when, gains = np.concatenate([[0.0], np.cumsum(spans)]), np.diff(speed) / spans
     where = CubicHermiteSpline(along, places, tangent)
     stretch = 1.0
@@ -125,7 +125,7 @@ def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tup
         stretch *= 1.01 * excess
 
 
-def _speeds(ways: Array, tangent: Array, bend: Array, speeds: Array, accelerations: Array) -> Array:
+def _speeds(lengths: Array, tangent: Array, bend: Array, speeds: Array, accelerations: Array) -> Array:
     """Return the largest speed at each point of the path (S,): half of each acceleration is used for bends, half for changes of speed."""
     half = 0.5 * accelerations
     with np.errstate(divide="ignore"):
@@ -133,10 +133,10 @@ def _speeds(ways: Array, tangent: Array, bend: Array, speeds: Array, acceleratio
         gain = 2.0 * (half / np.abs(tangent)).min(axis=1)
     squared = limit.copy()
     squared[0] = squared[-1] = 0.0
-    for k in range(len(ways)):
-        squared[k + 1] = min(squared[k + 1], squared[k] + gain[k] * ways[k])
-    for k in range(len(ways) - 1, -1, -1):
-        squared[k] = min(squared[k], squared[k + 1] + gain[k + 1] * ways[k])
+    for k in range(len(lengths)):
+        squared[k + 1] = min(squared[k + 1], squared[k] + gain[k] * lengths[k])
+    for k in range(len(lengths) - 1, -1, -1):
+        squared[k] = min(squared[k], squared[k + 1] + gain[k + 1] * lengths[k])
     found: Array = np.sqrt(squared)
     return found
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every message survives the wire; whatever is not right about one is refused with its reason."""
+"""Every message is decoded as it was encoded; an invalid message is refused with the reason."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""core/build.py: what it builds with, when it does nothing, and what it says when it cannot."""
+"""core/build.py: the compiler that it chooses, when it need not build, and its errors."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that are made when a test needs them: too large to be committed, or readable although they look odd."""
+"""Files that are made when a test needs them: too large to be committed, or readable although they are unusual."""
 
 from __future__ import annotations
 

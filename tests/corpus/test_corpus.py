@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that must not be read: robots, worlds and URDFs, each broken in one way, and some too large to be committed."""
+"""Files that must not be read: robots, worlds and URDFs, each with one fault, and some too large to be committed."""
 
 from __future__ import annotations
 

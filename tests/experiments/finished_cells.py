@@ -15,7 +15,7 @@ def finished(work: Callable[[Cell], dict[str, Any]], cells: Iterable[Cell]) -> d
     found = {}
     for cell in cells:
         found[cell.name] = CellResult(cell, 1.0, Path())
-        vars(found[cell.name])["values"] = work(cell)  # where the property keeps what it has read
+        vars(found[cell.name])["values"] = work(cell)  # the cache of the property
     return found
 
 

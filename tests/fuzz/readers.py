@@ -31,7 +31,7 @@ OPTIONS = (UrdfOptions(), UrdfOptions(field=0.03), UrdfOptions(field=0.03, meshe
 
 
 def feed_xml(content: bytes, folder: Path) -> bool:
-    """Read `content` as a robot and as a world; True if one of them accepts it. Raises whatever is no RobotFileError."""
+    """Read `content` as a robot and as a world; True if one of them accepts it. Raises all errors except RobotFileError."""
     path = folder / "given.xml"
     path.write_bytes(content)
     with warnings.catch_warnings():
@@ -52,7 +52,7 @@ def feed_xml(content: bytes, folder: Path) -> bool:
 
 
 def feed_urdf(content: bytes, folder: Path) -> bool:
-    """Read `content`, a URDF and the files beside it, as a robot; True if it is one. Raises whatever is no RobotFileError."""
+    """Read `content`, a URDF and the files beside it, as a robot; True if it is one. Raises all errors except RobotFileError."""
     parts = content.split(DIVIDER)
     for name, part in zip(URDF_FILES, parts, strict=False):
         (folder / name).write_bytes(part)
@@ -128,7 +128,7 @@ def check_poses(robot: Robot, world: World) -> None:
 
 
 def check_contacts(model: Model, q: Array) -> None:
-    """Raise AssertionError unless all that the model says of a pose is finite, normals are unit vectors, and depths are not negative."""
+    """Raise AssertionError unless all results of the model for a pose are finite, normals are unit vectors, and depths are not negative."""
     pose = model.evaluate(q)
     normals = pose.table.normal
     sound = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Typical mistakes of new users: each is answered in a few lines with what, where, what is valid and what to do next.
+"""Typical mistakes of new users: each error has a few lines: the fault, its place, the valid values, and the remedy.
 
 A second launch, Ctrl-C, a missing compiler and a store of other settings need processes: tests/services/launcher/test_run.py,
 test_main.py, tests/core/test_build.py and tests/services/test_agents.py.

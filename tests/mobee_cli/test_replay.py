@@ -46,7 +46,7 @@ def test_a_run_is_seen_again_at_any_time(tmp_path: Path) -> None:
                 return bytes(answer.read())
 
         def news_at(moment: float) -> dict[str, Any]:
-            """All values when the body is that of a moment."""
+            """All values at the moment at which the pages show the body."""
             give_up = time.monotonic() + 30.0
             while (seen := json.loads(get("news?after=0")))["body"]["t"] != moment:
                 assert time.monotonic() < give_up, seen["player"]

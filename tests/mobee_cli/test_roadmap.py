@@ -59,7 +59,7 @@ Say = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def say(capsys: pytest.CaptureFixture[str]) -> Say:
-    """Run `mobee roadmap`; its exit code, what it printed, and its errors."""
+    """Run `mobee roadmap`; return its exit code, its output and its errors."""
 
     def run(*words: object) -> tuple[int, str, str]:
         try:

@@ -62,7 +62,7 @@ def mutants(source: str) -> list[Mutant]:
     """Return all mutants of a module in the order of its lines.
 
     Changed are comparisons, arithmetic, `and` and `or`, numbers, True and False, min and max; conditions are negated, statements removed.
-    Texts, type annotations, decorators, imports and what is raised (the texts of errors) stay as they are.
+    Texts, type annotations, decorators, imports and the texts of errors are not changed.
     """
     tree = ast.parse(source)
     found = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wheel, installed into an environment of its own: what it brings, and that the library and the live system work from it."""
+"""The wheel, installed into an environment of its own: its content, and that the library and the live system work with it."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class FakeController:
         self.miss = 0.0  # rad by which every motor misses its goal
         self.touched: list[str] = []
         self.goals: list[Goal] = []
-        self.loses_answers = 0  # how many answers to goals get lost on the way
+        self.loses_answers = 0  # how many answers to goals are lost
         self.on_goal: Callable[[Goal], None] = lambda goal: None
         self.takes = 0
         limits = rig.robot.limits[rig.robot.part(part).slice]
@@ -58,7 +58,7 @@ class FakeController:
             self.resume()
 
     def restart(self) -> None:
-        """As a controller that died and came back: another instance, nobody owns anything."""
+        """Act as a controller that was restarted: another instance, and no part has an owner."""
         self.rig.drop_token("controller", self.instance)
         with self._lock:
             self.instance = f"c{self.epoch}"

@@ -24,7 +24,7 @@ class FakeModel:
         self.rig, self.collision = rig, np.zeros(n)
         self.silent, self.behind = False, 0  # ticks by which re_k lags
         self.touched: dict[str, list[str]] = {}
-        self.contacts: list[ContactItem] | None = []  # which only a controller with terms of its own looks at
+        self.contacts: list[ContactItem] | None = []  # which only a controller with user-defined terms reads
         self.part_age = dict.fromkeys(rig.robot.parts, 0)  # ns
         self._forces = rig.bus.publisher(Forces, "model")
         rig.listen(Tick.stream.key(), self._answer)

@@ -49,7 +49,7 @@ class FakeSim:
         self.commands: dict[str, list[Command]] = {part: [] for part in rig.robot.parts}
         self._lock = threading.Lock()
         self.answers_along: list[tuple[int, Answer]] = []  # lockstep: ticks that were answered with the commands
-        self.before_tick: Callable[[int], None] = lambda k: None  # what others put before anybody hears of tick k, free mode
+        self.before_tick: Callable[[int], None] = lambda k: None  # messages of others before tick k is published, free mode
         self._measured = self.q.copy()
         self.statuses: dict[str, PartStatus] = {}
         self._tick = rig.bus.publisher(Tick)
@@ -60,7 +60,7 @@ class FakeSim:
         self.new_run()
 
     def new_run(self) -> None:
-        """As after a restart: home, nobody owns anything, k from 0."""
+        """Act as after a restart: at home, no part has an owner, k from 0."""
         bus = self.rig.bus
         bus.run, bus.k, bus.t = f"run_{secrets.token_hex(3)}", 0, 0
         self.q = self.robot.home.copy()
@@ -69,7 +69,7 @@ class FakeSim:
             gate.state, gate.owner, gate.velocity = "idle", "", 0.0 * gate.velocity
 
     def tick(self, skip: int = 0, mode: str = "free", dt_ns: int | None = None) -> int:
-        """Samples at the end of a tick, then the start of the next; `skip`: ticks of which nobody hears before."""
+        """Samples at the end of a tick, then the start of the next; `skip`: ticks before it that are not published."""
         bus = self.rig.bus
         bus.k += skip
         bus.t += skip * self.dt_ns
@@ -81,7 +81,7 @@ class FakeSim:
         return bus.k
 
     def begin(self, mode: str = "free", dt_ns: int | None = None, whole: bool = True) -> None:
-        """The tick begins; nobody hears of it before every part was sampled, unless it need not be the `whole` body."""
+        """Begin the tick; it is published only if every part was sampled, unless it need not have the `whole` body."""
         if mode == "free":
             self.before_tick(self.rig.bus.k)
         if len(self.statuses) == len(self.gates) or not whole:

@@ -42,7 +42,7 @@ def wait_for(condition: Callable[[], Any], what: str, timeout: float = 10.0) -> 
 
 
 class Program:
-    """A Python process under test and what it says."""
+    """A Python process under test and its output."""
 
     def __init__(self, log: Path, arguments: Sequence[str]) -> None:
         self.log = log

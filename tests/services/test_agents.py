@@ -128,7 +128,7 @@ def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_continues_later(s
     assert (len(stage.rows()), len(stage.controller.goals)) == (before, goals)
     assert len(stage.texts("interrupted")) == 1
     stage.controller.ending = "settled"
-    stage.controller.q = TORSO.target(0)  # it may have been moved meanwhile
+    stage.controller.q = TORSO.target(0)  # it may have moved since
     stage.controller.resume()
     resumed = stage.made(before + 2)[before]
     assert (resumed.n, resumed.s) == (before + 1, 0)
@@ -349,7 +349,7 @@ def test_random_bytes_do_it_no_harm(stage: Stage, rng: np.random.Generator) -> N
     targets = [(Motion.stream.key("torso"), Motion), (Clock.stream.key(), Clock)]
 
     def are_refused() -> int:
-        """Send more: of what comes between two looks the agent sees the newest alone, which may be a sound one."""
+        """Send more messages: the agent reads only the newest of those between two reads, which may be a valid one."""
         for n in range(200):
             key, cls = targets[n % 2]
             stage.rig.session.put(key, rng.bytes(int(rng.integers(0, 300))), encoding=encoding_of(cls if n % 3 else Goal))

@@ -14,7 +14,7 @@ from tests.mobee.learning.toys import arm
 
 
 def curious_agent(store: TransitionStore | None) -> CuriousAgent:
-    """An agent in a world where some actions are uncertain, which goes on where the agent of the store was."""
+    """An agent in a world where some actions are uncertain, which continues from the state of the stored agent."""
     space = arm(neighbours="equidistant")
     plant = TabularPlant(space, *half_space(space), seed=7, start=40)
     agent = CuriousAgent(space, plant, seed=5, store=store, beliefs="debiased")
@@ -25,14 +25,14 @@ def curious_agent(store: TransitionStore | None) -> CuriousAgent:
 
 
 def digest(agent: CuriousAgent) -> str:
-    """Of all that the agent knows, and plans."""
+    """Hash of the agent's beliefs and plans."""
     model = agent.model
     known = (model.counts, model.outcomes, model.probabilities, model.reward, model.tries, agent.beliefs.probabilities, *agent.plan())
     return hashlib.sha256(b"".join(array.tobytes() for array in known)).hexdigest()
 
 
 def learn(file: Path, reports: Path) -> None:
-    """Learn indefinitely; one line a transition is written when it is observed, the first for what was on disk."""
+    """Learn indefinitely; one line is written for each observed transition; the first line is for the transitions on disk."""
     with TransitionStore(file, "left_arm") as store, reports.open("a") as lines:
         agent = curious_agent(store)
         lines.write("\n")  # the one before may have been killed in a line

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""After an emergency stop nothing moves before its reset, whatever ends, freezes, starts or is sent meanwhile."""
+"""After an emergency stop nothing moves before its reset, even if processes end, freeze or start, or commands are sent."""
 
 from __future__ import annotations
 

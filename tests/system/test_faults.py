@@ -9,7 +9,7 @@ from experiments.bench.faults import Settings, measure, report
 
 pytestmark = pytest.mark.system
 
-SCHEDULE = 146  # an agent without disk for 2 s, a kill of the model meanwhile, a kill of another agent
+SCHEDULE = 146  # an agent without disk for 2 s, a kill of the model during these, a kill of another agent
 
 
 def test_under_a_schedule_of_faults_nothing_is_lost_and_every_part_is_back() -> None:

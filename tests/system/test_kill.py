@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kill -9 of each service while its parts move: who holds, how fast, and what is left (DESIGN section 5)."""
+"""kill -9 of each service while its parts move: which parts hold, how fast, and the remaining state."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
     def is_back() -> bool:
         try:
             return watcher.stat(who).pid != old_pid
-        except CallFailed:  # nobody answers yet
+        except CallFailed:  # no answer yet
             return False
 
     until(is_back, 20.0, f"{who} is back")
@@ -62,7 +62,7 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
     before = transitions(system.run_dir)
     until(lambda: any(watcher.speed(part) > 0.15 for part in AGENTS), 40.0, "a part moves")
     k, pid = kill(watcher, who)
-    held, rested, way = [], [], []
+    held, rested, turned = [], [], []
     for part in PARTS:
         first = until(lambda part=part: next((s for s in watcher.states[part] if s.k > k and s.gate == "hold"), None), 5.0, f"{part} holds")
         rest = until(
@@ -73,8 +73,8 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
         start = next(s for s in watcher.states[part] if s.k >= k)
         held.append((first.k - k) * 0.01)
         rested.append((rest.k - k) * 0.01)
-        way.append(float(np.abs(np.subtract(rest.q, start.q)).max()))
-    degrees = np.rad2deg(way)
+        turned.append(float(np.abs(np.subtract(rest.q, start.q)).max()))
+    degrees = np.rad2deg(turned)
     print(
         f"{who} killed (median, worst): holds after {np.median(held):.3f}, {max(held):.3f} s; at rest after {np.median(rested):.3f}, "
         f"{max(rested):.3f} s; stopping distance {np.median(degrees):.2f}, {max(degrees):.2f} deg"

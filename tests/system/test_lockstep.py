@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lockstep with all services: the same run whatever the scheduling, and the one that the offline plant makes."""
+"""Lockstep with all services: the same run under any scheduling, equal to the run of the offline plant."""
 
 from __future__ import annotations
 

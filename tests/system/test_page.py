@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page in browsers: it shows the agents, acts on the robot, keeps it in view, and reports an emergency stop and the end of the run."""
+"""The page in browsers: it shows agents and robot with little delay, acts on the robot, reports a stop and the end of the run."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_the_ball_is_dragged_and_a_hand_reaches_for_it(page: Page, live: tuple[L
     session = live[1].session
     ball = {"name": "ball", "geometry": Geometry("sphere", [0.03]), "position": [-0.35, 0.0, 0.0], "quaternion": [1.0, 0.0, 0.0, 0.0]}
     rpc.call(session, "test", keys.world_rpc("add"), AddObject, Done, tries=9, **ball, role="target")
-    page.press("3")  # from above: what is dragged moves horizontally
+    page.press("3")  # from above: a dragged object moves horizontally
     targets = "JSON.parse(document.querySelector('#body').dataset.targets || '{}')"
     page.until(f"{targets}.ball", "the ball in the picture")
     time.sleep(0.5)  # the picture turns

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee play FILE` from the file of a robot to agents that go on live with what they have learned offline."""
+"""`mobee play FILE` from the file of a robot to agents that continue live with the model that they have learned offline."""
 
 from __future__ import annotations
 

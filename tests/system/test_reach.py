@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaching with all services: as offline, to the bit; what is left when who reaches is killed; and a map that is played."""
+"""Reaching with all services: bit-equal to offline; the state after the reaching client is killed; playback of a roadmap."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_live_reaches_in_lockstep_are_those_of_the_offline_plant_to_the_bit(tmp_
     assert summary["lockstep"]["repeatable"]
     live = json.loads((Path(summary["run"]) / "reaches.json").read_text())
     robot, world = load_robot("icub"), load_world("table")
-    world.remove("ball")  # live, nobody sees it without cameras
+    world.remove("ball")  # live, it is not seen without cameras
     plant = OfflinePlant(Model(robot, world), seed=SEED, gains=Gains.default(), dt=TICK)
     offline = list(perform(plant))
     assert live == offline
@@ -133,5 +133,5 @@ def command(*words: str) -> dict[str, Any]:
 
 
 def objects(watcher: Watcher) -> set[str]:
-    """What is in the model's world."""
+    """The objects of the model's world."""
     return {thing.name for thing in rpc.call(watcher.session, "test", keys.world_rpc("list"), Empty, World, timeout=2.0).objects}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The real processes: a ball turns solid before the hand, and the way around it is under way at once."""
+"""The real processes: a ball becomes solid in front of the hand, and the hand moves around it at once."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def on_the_bus(folder: Path) -> list[Row] | None:
 def offline() -> list[Row]:
     robot = load_robot("icub")
     world = load_world("table")
-    world.remove("ball")  # nobody sees it in this scenario
+    world.remove("ball")  # no camera sees it in this scenario
     space = Lattice(robot, ["l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow"])
     plant = OfflinePlant(Model(robot, world), gains=Gains.named(GAINS), motors=MotorParameters(encoder_noise=0.0))
     agent = CuriousAgent(space, plant, seed=SEED)

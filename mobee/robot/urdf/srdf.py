@@ -125,11 +125,11 @@ def _chain(node: Node, tree: Tree) -> list[str]:
 
 def _to_root(link: str, tree: Tree) -> list[UrdfJoint]:
     above = {joint.child: joint for joint in tree.joints.values()}
-    way: list[UrdfJoint] = []
+    joints: list[UrdfJoint] = []
     while link in above:
-        way.append(above[link])
+        joints.append(above[link])
         link = above[link].parent
-    return way
+    return joints
 
 
 def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:

@@ -26,12 +26,12 @@ WITHOUT_PLAN = {"random": "it chooses at random", "least_tried": "it chooses wha
 
 def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:
     """Return what the agent tries now: "elbow +32°: its hand goes 12 cm up. 4th try from here."."""
-    way = "" if places is None else displacement(places[decision.goal] - places[decision.s], space.robot.name)
-    return f"{action_words(space, decision.s, decision.goal)}{f': {way}' if way else ''}. {ordinal(decision.tries + 1)} try from here."
+    shift = "" if places is None else displacement(places[decision.goal] - places[decision.s], space.robot.name)
+    return f"{action_words(space, decision.s, decision.goal)}{f': {shift}' if shift else ''}. {ordinal(decision.tries + 1)} try from here."
 
 
 def expects_sentence(decision: Decision) -> str:
-    """Return what the agent expects of the action under way."""
+    """Return what the agent expects of the present action."""
     if decision.tries == 0:
         return f"It cannot know what will happen; it gives getting there {percent(decision.reached)}."
     if decision.expected == decision.goal:

@@ -52,16 +52,16 @@ def listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def displacement(way: Array, robot: str) -> str:
-    """Describe how a hand moves by `way` (3,) m, by its main directions: "12 cm up and forward"; empty if it hardly moves.
+def displacement(motion: Array, robot: str) -> str:
+    """Describe how a hand moves by `motion` (3,) m, by its main directions: "12 cm up and forward"; empty if it hardly moves.
 
     For robots of the iCub's family the directions are those of the body, such as forward; for others, the axes of the root frame.
     """
-    length = float(np.linalg.norm(way))
+    length = float(np.linalg.norm(motion))
     if length < SHORTEST:
         return ""
-    main = [axis for axis in np.argsort(-np.abs(way)).tolist() if abs(way[axis]) >= SHARE * np.abs(way).max()]
-    return f"{100 * length:.0f} cm {listed([_direction(axis, float(way[axis]), robot) for axis in main])}"
+    main = [axis for axis in np.argsort(-np.abs(motion)).tolist() if abs(motion[axis]) >= SHARE * np.abs(motion).max()]
+    return f"{100 * length:.0f} cm {listed([_direction(axis, float(motion[axis]), robot) for axis in main])}"
 
 
 def _direction(axis: int, along: float, robot: str) -> str:

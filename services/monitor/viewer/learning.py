@@ -110,9 +110,9 @@ class Learning:
 
     def _arrows(self, path: str, drawn: Drawn, states: Ints, ends: Ints, radii: float | list[float], colors: Rgba | list[Rgba]) -> None:
         """Log arrows between states; one that stays in its state is a dot beside it."""
-        start, way = drawn.places[states], drawn.places[ends] - drawn.places[states]
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        unit = np.divide(way, length, out=np.full_like(way, 0.7), where=length > 0.0)
+        start, motion = drawn.places[states], drawn.places[ends] - drawn.places[states]
+        length = np.linalg.norm(motion, axis=1, keepdims=True)
+        unit = np.divide(motion, length, out=np.full_like(motion, 0.7), where=length > 0.0)
         self._stream.log(
             path,
             rr.Arrows2D(

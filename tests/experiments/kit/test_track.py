@@ -100,7 +100,7 @@ def test_learn_writes_curves_and_new_ones_when_it_continues(tmp_path: Path, caps
     assert capsys.readouterr().out.endswith(f"tensorboard --logdir {tmp_path / 'out-tensorboard'}\n")
     written = events(tmp_path / "out-tensorboard" / "arm")
     first, last = (max(k for k, event in enumerate(written) if what(event)) for what in (begins, lambda event: event.step == 1))
-    assert first < last  # TensorBoard drops what is before
+    assert first < last  # TensorBoard drops earlier values
     assert sorted(curves(tmp_path / "out-tensorboard" / "arm")["tried"]) == list(range(1, 8))
 
 

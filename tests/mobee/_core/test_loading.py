@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which build of the core is loaded, and what is said when that cannot be done."""
+"""Which build of the core is loaded, and the error if none can be loaded."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An arm of which nothing is wrong, and ways to spoil it."""
+"""An arm without a fault, and functions that add faults."""
 
 from __future__ import annotations
 

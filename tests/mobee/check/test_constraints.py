@@ -9,7 +9,7 @@ from tests.mobee.check.arm import arm, named
 
 
 def clauses(folder: Path, *lists: str) -> list[str]:
-    """What is said of constraint lists; pan is 0 within -90..90 at home, bend 30 within 10..100."""
+    """The findings about constraint lists; pan is 0 within -90..90 at home, bend 30 within 10..100."""
     text = "".join(f"<constraintList>{rows}</constraintList>" for rows in lists)
     findings = named(arm(folder, ("</bodypart>", f"{text}</bodypart>")), "constraint")
     return [f"{finding.severity}: {finding.what}" for finding in findings]

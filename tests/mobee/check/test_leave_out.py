@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `mobee check --write-srdf` writes, and what it never does."""
+"""The file that `mobee check --write-srdf` writes, and the cases in which it writes none."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is promised of the forces and of the system, for any pose and motion."""
+"""Guaranteed properties of the forces and of the system, for any pose and motion."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def energy(robot: Robot, gains: Gains, q: Array, velocity: Array, attractor: Arr
 @BOTH
 @given(seed=seeds, share=st.floats(0.01, 0.7))
 def test_the_energy_of_the_unforced_system_never_grows(gains: Gains, seed: int, share: float) -> None:
-    """Its motors fast enough that their limits do not bind: what they cannot do is a force from outside."""
+    """The robot with motors so fast that their speed limits have no effect, since these would act as a force from outside."""
     rng = np.random.default_rng(seed)
     arm = two_part_arm()
     strong = tuple(replace(m, max_velocity=1e9, max_acceleration=1e9) for m in arm.motor_table)

@@ -68,8 +68,8 @@ def test_a_step_goes_where_the_error_falls_fastest() -> None:
 
     def error(q: Array) -> float:
         pose = ARM.evaluate(q)
-        way = position - pose.position("tip")
-        return float(way @ way / 2.0 + 0.1**2 * (1.0 - pose.normal("tip") @ [0.0, 1.0, 0.0]))
+        offset = position - pose.position("tip")
+        return float(offset @ offset / 2.0 + 0.1**2 * (1.0 - pose.normal("tip") @ [0.0, 1.0, 0.0]))
 
     slope = np.array([(error(BENT + step) - error(BENT - step)) / 2e-6 for step in 1e-6 * np.eye(3)])
     step = np.diff(reach_path(ARM, "tip", position, BENT, normal, steps=1).q, axis=0)[0]

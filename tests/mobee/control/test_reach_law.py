@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled reach law against the Jacobian of the model and against what it is to do."""
+"""The compiled reach law against the Jacobian of the model and against its specification."""
 
 from __future__ import annotations
 

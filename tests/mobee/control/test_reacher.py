@@ -24,7 +24,7 @@ BENT = np.array([0.3, 0.7, 0.4])
 
 @dataclass
 class Drawn:
-    """What became of a reach: where the marker was at every tick, and what was said."""
+    """The record of a reach: the position of the marker at every tick, and the reported states."""
 
     path: Array  # (ticks, 3) m
     said: list[str]
@@ -68,8 +68,8 @@ def test_a_target_in_reach_is_reached_without_overshoot(motors: MotorParameters)
     assert drawn.said[-1] == "reached"
     assert drawn.distance(position)[-1] < 2e-3
     assert drawn.swing(1.0) < 1e-3
-    way = position - drawn.path[0]
-    assert np.all((drawn.path - drawn.path[0]) @ way < (np.linalg.norm(way) + 2e-3) * np.linalg.norm(way))
+    line = position - drawn.path[0]
+    assert np.all((drawn.path - drawn.path[0]) @ line < (np.linalg.norm(line) + 2e-3) * np.linalg.norm(line))
 
 
 @EACH_MOTOR

@@ -163,7 +163,7 @@ def test_without_a_history_it_is_stuck_until_the_pose_is_accepted() -> None:
     reflex.accept(at(1), WALL)
     for _ in range(5):
         assert reflex.tick(at(1), WALL) is None
-    assert reflex.tick(at(1), (*WALL, *OTHER)) is not None  # only what was there is accepted
+    assert reflex.tick(at(1), (*WALL, *OTHER)) is not None  # only contacts that existed before are accepted
 
 
 def test_an_accepted_violation_counts_again_after_it_was_absent() -> None:

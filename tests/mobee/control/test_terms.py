@@ -108,7 +108,7 @@ def test_a_pose_that_no_term_asks_for_is_not_evaluated() -> None:
             return self.model.evaluate(q)
 
     model = Counting()
-    controller = Controller(model, terms=[TERMS[1]])  # type: ignore[arg-type]  # a model of one's own
+    controller = Controller(model, terms=[TERMS[1]])  # type: ignore[arg-type]  # a user-defined model
     free = Forces(np.zeros(3), np.zeros(3), np.zeros(3))
     controller.step(STRETCHED, DT, free)
     assert model.asked == 0

@@ -74,7 +74,7 @@ def test_a_reward_of_the_user_sees_the_outcome() -> None:
 
 
 def episodes(env: Any, seed: int, actions: np.ndarray) -> list[Any]:
-    """What is seen of one environment by these actions, episodes beginning again where they end, as in a vector."""
+    """The observations of one environment under these actions; a new episode begins where one ends, as in a vector environment."""
     seen = [env.reset(seed=seed)[0]]
     over = False
     for action in actions.tolist():

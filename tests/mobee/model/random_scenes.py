@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random robots and worlds with everything that the engine knows, and its contacts found the plain way: pair by pair, no broad phase."""
+"""Random robots and worlds with every feature of the engine, and their contacts computed pair by pair, without a broad phase."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def random_robot(rng: Rng, joints: int, shapes: int) -> Robot:
     drives: list[list[tuple[int, float, float]]] = [[] for _ in range(motors)]
     for j in range(joints):
         if rng.random() < 0.1:
-            continue  # nobody drives it
+            continue  # no motor drives it
         offset = float(rng.uniform(-0.5, 0.5))  # of the joint, so all of its motors say the same
         for motor in rng.choice(motors, min(motors, int(rng.integers(1, 4))), replace=False):
             drives[motor].append((j, float(rng.uniform(-1.5, 1.5)), offset))

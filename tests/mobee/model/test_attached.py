@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a link carries is felt like a shape of that link."""
+"""An object that a link carries has contacts like a shape of that link."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ PROJECTION = {0: 0.03, 100: 0.1}  # m^2/rad
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Every pair that touches before or after a step: depths (s, 2), forces (s, 2, 3) in the second's frame, what it moved (s,)."""
+    """Every pair that touches before or after a step: depths (s, 2), forces (s, 2, 3) in the second's frame, distance moved (s,)."""
 
     depth: Array
     force: Array
@@ -45,9 +45,9 @@ def steps(request: pytest.FixtureRequest) -> tuple[int, Steps]:
     rng = np.random.default_rng(2014)
     low, high = robot.limits.T
     ends = rng.uniform(low, high, (2, PATHS, len(low)))
-    way = ends[1] - ends[0]
-    way *= STEP / abs(way).max(axis=1, keepdims=True)
-    q = ends[0][:, None] + np.arange(POSES)[:, None] * way[:, None]
+    motion = ends[1] - ends[0]
+    motion *= STEP / abs(motion).max(axis=1, keepdims=True)
+    q = ends[0][:, None] + np.arange(POSES)[:, None] * motion[:, None]
     pose = Model(robot, world).evaluate(q)
     return request.param, walked(pose, (*robot.shapes, *world.objects.values()))
 

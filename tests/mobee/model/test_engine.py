@@ -18,7 +18,7 @@ ROUNDING = 1e-9  # m: what overlaps by less may count or not
 
 
 def who_reaches(rng: np.random.Generator, robot: Robot) -> Hands:
-    """Nobody to two hands, each with the fields of some link before it."""
+    """No hand to two hands, each with the fields of some link before it."""
     found = []
     for _ in range(rng.integers(MAX_HANDS + 1)):
         link = fields = int(rng.integers(len(robot.links)))

@@ -40,14 +40,14 @@ def test_for_volumes_of_any_size_the_depth_is_the_smallest_separation(first: str
     touching = 0
     for scales, deep in product(product(SCALES, SCALES), [False, True] * 4):
         a, b = drawn(rng, first, scales[0]), drawn(rng, second, scales[1])
-        way = rng.normal(size=3)
-        way /= np.linalg.norm(way)
-        reaches = farthest(a, way[None])[0], farthest(b, -way[None])[0]
-        b = b.moved(way * (0.3 * min(reaches) if deep else sum(reaches) - 0.3 * min(reaches)))
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        reaches = farthest(a, axis[None])[0], farthest(b, -axis[None])[0]
+        b = b.moved(axis * (0.3 * min(reaches) if deep else sum(reaches) - 0.3 * min(reaches)))
         found, rounding = overlap(a, b), EXACT + 1e-12 * max(scales)
         turned = COARSE * max(scales) if second == "convex" and first in ("sphere", "capsule") else 0.0
         assert np.isfinite(found.depth)
-        shortest = min(sampled_depth(a, b, np.random.default_rng(0)), overlap_along(a, b, np.array([way, -way])).min())
+        shortest = min(sampled_depth(a, b, np.random.default_rng(0)), overlap_along(a, b, np.array([axis, -axis])).min())
         assert found.depth <= max(shortest, 0.0) + rounding + 1e-6 * min(scales)  # cylinders: as near to the shortest as is searched
         if found.depth > 0.0:
             touching += 1

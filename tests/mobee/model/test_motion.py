@@ -41,6 +41,6 @@ def test_no_point_moves_farther_than_the_joints_between_allow(seed: int) -> None
             link = robot.shapes[shape].link
             for other in range(links):
                 base, bound = common_link(robot, link, other), bounds[place, other]
-                way = seen(robot, q1, shape, base) - seen(robot, q0, shape, base)
-                assert np.linalg.norm(way) <= bound + 1e-9
+                motion = seen(robot, q1, shape, base) - seen(robot, q0, shape, base)
+                assert np.linalg.norm(motion) <= bound + 1e-9
                 assert bound == pytest.approx(0.0, abs=1e-12) or base != link

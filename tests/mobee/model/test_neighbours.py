@@ -10,7 +10,7 @@ import mobee
 from mobee.model.track import Track
 from tests.mobee.model.random_scenes import loaded, posed
 
-POSE, LIST = 1, 2  # what is remembered
+POSE, LIST = 1, 2  # the remembered state
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def model() -> mobee.Model:
 
 
 def state(track: Track) -> tuple[int, int, int]:
-    """What is remembered, how many pairs are listed, how many poses the list has served."""
+    """The remembered state, the number of listed pairs, the number of poses for which the list was used."""
     assert track._neighbours is not None
     return track._neighbours._core.state()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One pose a call: its results are those of a batch, belong to whoever has them, and never change."""
+"""One pose a call: its results are those of a batch, belong to the caller, and never change."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tests.mobee.model.random_scenes import loaded, random_robot
 
 
 def pairs_of(robot: Robot, carried: list[Carried]) -> set[frozenset[int]]:
-    """The pairs that are tested, by index of the shape, then of what the robot carries."""
+    """The pairs that are tested, by index of the shape, then of the object that the robot carries."""
     tables = robot_tables(robot, carried)
     assert np.array_equal(tables.tested, tables.tested.T)
     return {frozenset((int(tables.name[a]), int(tables.name[b]))) for a, b in np.argwhere(tables.tested)}

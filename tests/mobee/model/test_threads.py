@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One model, many threads: each evaluation is that of one consistent world, and the same as alone."""
+"""One model, many threads: each evaluation uses one consistent world, and equals the evaluation in a single thread."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ class Edits(RuleBasedStateMachine):
 
     @rule(q=st.tuples(*[st.floats(-3.0, 3.0)] * 3))
     def evaluate_elsewhere(self, q):
-        """What is attached goes with its link, which the dictionary does by hand."""
+        """An attached object moves with its link; the dictionary computes this separately."""
         before, self.q = self.links, np.array(q)
         pose = self.model.evaluate(self.q)
         self.world.follow(pose)

@@ -84,7 +84,7 @@ def test_the_next_evaluation_has_the_edits_of_another_thread():
 
 @pytest.mark.parametrize("what", ["transforms", "contacts"])
 def test_edits_and_other_evaluations_do_not_wait_for_an_evaluation(monkeypatch, what):
-    """An evaluation that does not come to its end holds up nobody."""
+    """An evaluation that does not end delays no other thread."""
     model = mobee.Model(planar_arm())
     model.world.add("ball", mobee.sphere(0.1), position=TIP)
     inside, end = threading.Event(), threading.Event()

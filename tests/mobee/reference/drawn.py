@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots and gains drawn at random, with everything that the law looks at."""
+"""Robots and gains drawn at random, with everything that the law uses."""
 
 from __future__ import annotations
 

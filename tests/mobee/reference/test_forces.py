@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The forces of the definition: what is promised of each, and that the controller's are the same."""
+"""The forces of the definition: the guaranteed properties of each, and equality with the forces of the controller."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def test_contacts_with_a_least_lever_push_as_defined(rng: np.random.Generator) -
 
 def test_with_a_least_lever_the_push_undoes_a_contact_by_the_smallest_motion() -> None:
     robot = replace(planar_arm(), least_lever=1e-6)
-    q = np.array([0.0, 0.3, 2.6])  # the tip's field meets that of the first link
+    q = np.array([0.0, 0.3, 2.6])  # the fields of the tip and of the first link overlap
     (contact,) = (one for one in Model(robot).evaluate(q).contacts if one.kind == "field")
     motion = Model(robot).evaluate(q).projection / LEVER**2
     (after,) = (one for one in Model(robot).evaluate(q + 0.01 * motion).contacts if one.kind == "field")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sum of the forces and its steps: the controller moves as the definition says, and a force of one's own goes in beside the others."""
+"""The sum of the forces and its steps: the controller moves as the definition, and a user-defined force is added to the others."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROUNDING, OF_ACCELERATIONS = 1e-12, 1e-10
 
 @given(SEEDS)
 def test_the_controllers_motion_is_this(seed: int) -> None:
-    """Of any robot, in any modality, whatever its clients do; a part is put in hold on the way."""
+    """For any robot, modality and client commands; one part is put in hold during the motion."""
     rng = np.random.default_rng(seed)
     robot, gains = drawn_robot(rng), drawn_gains(rng)
     scale = float(rng.uniform(0.1, 1.0))

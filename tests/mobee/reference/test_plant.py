@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plant of the definition: the compiled loop goes the same way, and a force of one's own can be tried on it."""
+"""The plant of the definition: the compiled loop has the same trajectory, and a user-defined force can be tried on it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reach force of the definition: what it is to do, and that the controller's is the same."""
+"""The reach force of the definition: its specification, and equality with the force of the controller."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thesis Algorithms 3 and 4 to the letter over a plane, q = y, for what becomes of them; each reading of notes and docs is a switch."""
+"""Thesis Algorithms 3 and 4 as printed, over a plane, q = y, to see their results; each interpretation in the docs is a switch."""
 
 from __future__ import annotations
 

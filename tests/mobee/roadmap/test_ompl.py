@@ -23,22 +23,22 @@ def model() -> mobee.Model:
     return mobee.Model(planar_arm(), world)
 
 
-def between(way: np.ndarray) -> np.ndarray:
-    return np.concatenate([one + np.linspace(0, 1, 30)[:, None] * (other - one) for one, other in zip(way, way[1:], strict=False)])
+def between(path: np.ndarray) -> np.ndarray:
+    return np.concatenate([one + np.linspace(0, 1, 30)[:, None] * (other - one) for one, other in zip(path, path[1:], strict=False)])
 
 
 def test_rrt_connect_finds_a_path_around_an_obstacle_and_the_same_for_a_seed():
     known = model()
     assert known.evaluate(between(np.array([HOME, BEHIND]))).count.any()
-    way = rrt_connect(known, HOME, BEHIND, seed=1)
-    assert np.allclose(way[0], HOME) and np.allclose(way[-1], BEHIND)
-    assert not known.evaluate(between(way)).count.any()
-    assert np.array_equal(way, rrt_connect(known, HOME, BEHIND, seed=1))
+    path = rrt_connect(known, HOME, BEHIND, seed=1)
+    assert np.allclose(path[0], HOME) and np.allclose(path[-1], BEHIND)
+    assert not known.evaluate(between(path)).count.any()
+    assert np.array_equal(path, rrt_connect(known, HOME, BEHIND, seed=1))
 
 
 def test_motors_that_may_not_move_stay_where_they_are():
-    way = rrt_connect(model(), [0.0, 0.2, 0.0], [[0.4, 0.2, 1.0], [0.3, 0.2, -1.0]], motors=["m0", "m2"])
-    assert np.allclose(way[:, 1], 0.2)
+    path = rrt_connect(model(), [0.0, 0.2, 0.0], [[0.4, 0.2, 1.0], [0.3, 0.2, -1.0]], motors=["m0", "m2"])
+    assert np.allclose(path[:, 1], 0.2)
 
 
 def test_without_a_path_the_result_is_none():
@@ -62,8 +62,8 @@ def test_roadmaps_hold_only_poses_and_motions_without_contacts(planner):
 
 
 def test_a_query_is_over_the_joints_alone():
-    way = query(model(), ["m0", "m1"], HOME)(np.zeros(2), np.array([[1.6, 0.0]]))
-    assert way.shape[1] == 2 and np.allclose(way[-1], [1.6, 0.0])
+    path = query(model(), ["m0", "m1"], HOME)(np.zeros(2), np.array([[1.6, 0.0]]))
+    assert path.shape[1] == 2 and np.allclose(path[-1], [1.6, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_with_d_taken_from_every_coordinate_the_map_is_a_diagonal() -> None:
 
 
 def test_without_the_test_against_all_vertices_they_pile_up() -> None:
-    """Reading 3: the two nearest are repelled, and whoever is in nobody's simplex is added however near."""
+    """Reading 3: the two nearest are repelled, and a sample outside all simplices is added at any distance."""
     printed, ours = (run(scalar, weight_kept=True, separated=one, half_width=2.0, loops=150) for one in (False, True))
     assert _nearest(printed.places).min() < 0.3 * D
     assert _nearest(ours.places).min() >= 0.8 * D

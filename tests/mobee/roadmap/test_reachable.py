@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How near a marker can come to a place, against what is known of the place."""
+"""The smallest distance of a marker from a place, against places with a known answer."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0,
 
 
 class BlockedPlant:
-    """Goes where it is sent, or if `blocked(q, target)` says so half of the way; every action takes a second."""
+    """A plant that moves to its target, or half as far if `blocked(q, target)` is true; every action takes a second."""
 
     def __init__(self, start: np.ndarray, blocked: Callable[[np.ndarray, np.ndarray], bool]) -> None:
         self.robot, self.blocked, self.q, self.acted = ROBOT, blocked, np.array(start, dtype=float), list[np.ndarray]()
@@ -33,7 +33,7 @@ class BlockedPlant:
 
 
 def wall(first: np.ndarray, second: np.ndarray) -> Callable[[np.ndarray, np.ndarray], bool]:
-    """Between two poses, whichever way."""
+    """The edge between two poses, in either direction."""
     pair = (np.array(first), np.array(second))
 
     def blocked(q: np.ndarray, target: np.ndarray) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether two robots are the same, whatever order their links and shapes stand in."""
+"""Checks whether two robots are the same, in any order of their links and shapes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def assert_same_motors(one: Robot, other: Robot) -> None:
 
 
 def assert_same_motion(one: Robot, other: Robot, poses: int = 50) -> None:
-    """Every link goes the same way at random poses, every joint has the same limits."""
+    """Require that every link has the same pose at random q, and every joint the same limits."""
     links = [other.links.index(name) for name in one.links]
     assert len(other.links) == len(links)
     q = np.random.default_rng(9).uniform(*one.limits.T, size=(poses, len(one.motors)))
@@ -53,7 +53,7 @@ def _apart(shape: Shape, twin: Shape) -> float:
         gaps = np.abs(_corners(shape)[:, None] - _corners(twin)).max(axis=2)
         return float(max(gaps.min(axis=0).max(), gaps.min(axis=1).max()))
     apart = float(np.abs(shape.position - twin.position).max())
-    turned = np.abs(shape.rotation.T @ twin.rotation)  # every primitive looks the same from both ends of its axes
+    turned = np.abs(shape.rotation.T @ twin.rotation)  # every primitive is symmetric about the middle of its axes
     match shape.kind:
         case "sphere":
             return apart
@@ -70,7 +70,7 @@ def _corners(shape: Shape) -> Array:
 
 
 def assert_same_pairs(one: Robot, other: Robot) -> None:
-    """What is tested against what, and which links never are."""
+    """The pairs that are tested, and the links that are never tested."""
 
     def pairs(robot: Robot, table: Ints) -> set[frozenset[str]]:
         return {frozenset((robot.shapes[a].name, robot.shapes[b].name)) for a, b in table.tolist()}

@@ -83,7 +83,7 @@ def test_every_pair_of_links_is_tested_or_has_its_reason(tmp_path: Path) -> None
 def test_a_hand_has_its_joint_as_reason(tmp_path: Path) -> None:
     robot = chain(tmp_path, steps=(0.3, 0.3, 0.3, 0.3, 0.3), hand=1)
     hand = {names_of(robot, pair) for pair, reason in robot.untested.items() if reason == "same hand (noSelfCollision of joint j1)"}
-    assert hand == {"j1 j3", "j1 j4", "j2 j4"}  # what is joined has that reason
+    assert hand == {"j1 j3", "j1 j4", "j2 j4"}  # links that a joint connects have this reason
 
 
 def test_a_pair_ignored_for_solids_only_is_untested_unless_its_fields_meet(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ def test_a_recorded_descent_ends_where_a_link_and_a_joint_with_shapes_have_been_
     chain = bones(6)
     assert {frozenset((1, k)) for k in (2, 3)} <= recorded_neighbours(chain, set(range(1, 7)))
     assert frozenset((1, 4)) not in recorded_neighbours(chain, set(range(1, 7)))
-    assert frozenset((1, 4)) in recorded_neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears nothing, so the descent goes on
+    assert frozenset((1, 4)) in recorded_neighbours(chain, {1, 2, 4, 5, 6})  # joint 3 bears nothing, so the descent continues
 
 
 def test_a_descent_continues_past_elements_of_its_first_kind() -> None:

@@ -50,7 +50,7 @@ def test_many_substeps_in_one_call_are_as_many_calls() -> None:
 
 @pytest.mark.parametrize("lively", [1.0, 0.6])
 def test_motors_in_one_robot_equal_separate_ones(lively: float) -> None:
-    """Of any kind, in any mode and number, against their stops and with what is no number."""
+    """Motors of any kind, mode and number, at their hard stops, and with NaN."""
     robot, rng = load_robot("icub"), np.random.default_rng(5)
     n = len(robot.motors)
     any_kind: dict[str, Any] = {

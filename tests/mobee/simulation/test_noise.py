@@ -13,7 +13,7 @@ MOTORS = np.arange(len(ROBOT.motors))
 
 
 def normals(seed: int, ticks: range, motors: np.ndarray = MOTORS) -> np.ndarray:
-    """What is added to the encoders where the standard deviation is 1."""
+    """The noise that is added to the encoders if the standard deviation is 1."""
     alive = np.isin(MOTORS, motors)
     drawn = Motors(ROBOT, MotorParameters(encoder_noise=1.0), seed, np.zeros(len(MOTORS)), alive)
     return np.array([drawn.encoders(k, 0.02)[motors] for k in ticks])

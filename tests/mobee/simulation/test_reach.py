@@ -191,7 +191,7 @@ def test_tick_by_tick_a_reach_is_the_same_as_at_once(gains: Gains) -> None:
 
 
 def test_the_target_repels_the_arm_but_not_the_reaching_hand() -> None:
-    """A target in the hand pushes the arm away until the hand reaches for it; one at the elbow goes on pushing."""
+    """A target in the hand pushes the arm away until the hand reaches for it; a target at the elbow continues to push."""
 
     def pushed(target: Array, reaching: bool) -> float:
         plant = OfflinePlant(Model(ICUB), 0, Gains.published_2014(), dt=0.02, active=RIGHT, motors=MotorParameters.ideal())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a plant on the bus presents to the model, and what it says when that cannot be."""
+"""The world that a plant on the bus gives to the model, and the errors if this is impossible."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeSer
         client.present(ReachTarget(np.array(AT)))
     with pytest.raises(ActionInterrupted, match="does not list its objects"):
         client.present_object("ball")
-    client.leave()  # nobody need hear of it
+    client.leave()  # no message is needed
 
 
 def test_a_target_that_another_client_has_removed_causes_no_error(service: FakeService, client: ReachClient) -> None:

@@ -93,7 +93,7 @@ def test_spin_returns_during_a_flood() -> None:
     again()
     for _ in range(3):
         before = handled
-        inbox.spin(now() - 1.0)  # the caller is late already, and still the inbox goes on
+        inbox.spin(now() - 1.0)  # the caller is late already, and still the inbox continues
         assert handled > before
 
 

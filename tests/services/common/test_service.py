@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The life of a service, as a real process on a real bus: what it answers, what it refuses, and how it ends."""
+"""The life of a service, as a real process on a real bus: its answers, its refusals, and its end."""
 
 from __future__ import annotations
 

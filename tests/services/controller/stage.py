@@ -29,7 +29,7 @@ SETTLE = Gains.published_2014().settle
 
 @dataclass
 class Stage:
-    """The controller under test and what it says."""
+    """The controller under test and its messages."""
 
     rig: Rig
     sim: FakeSim
@@ -114,7 +114,7 @@ def staged(made: Rig, *arguments: str) -> Stage:
 
 
 def near(part: str, shift: float = 0.3) -> Array:
-    """A legal posture of the part, some way from home."""
+    """A valid posture of the part, at a distance from home."""
     p = ROBOT.part(part)
     low, high = ROBOT.limits[p.slice].T
     return np.clip(ROBOT.home[p.slice] + shift, low + 0.2 * (high - low), high - 0.2 * (high - low))

@@ -25,7 +25,7 @@ def test_a_push_at_a_marker_moves_the_arm_until_it_is_cleared(run: Stage) -> Non
     left, right = (ROBOT.part(part).start for part in ("left_arm", "right_arm"))
     now = np.abs(run.sim.q - run.rig.robot.home)
     assert now[left] < 0.5 * far[left]  # back to the attractor
-    assert now[right] > far[right] > 0.002  # the other part's force goes on
+    assert now[right] > far[right] > 0.002  # the other part's force continues
 
 
 def test_a_wrong_force_is_refused(run: Stage) -> None:

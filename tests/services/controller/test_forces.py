@@ -24,7 +24,7 @@ TOUCHES = [ContactItem(first="palm", second="table", first_link=LINK, second_lin
 
 
 def lift(state: State) -> Array:
-    """Away from what is touched, and against the motion."""
+    """A force away from contacts, and against the motion."""
     return 100.0 * state.pose.projection - state.velocity
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who owns the goal of a part, and what it may be."""
+"""The owner of a part's goal, and the valid goals."""
 
 from __future__ import annotations
 

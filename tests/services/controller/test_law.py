@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is warmed leaves no trace in the law."""
+"""The warm-up of the law does not change its state."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
 
 @pytest.fixture
 def bench(started: Bench) -> Iterator[Bench]:
-    """All under control, nobody owns a goal."""
+    """All parts are under control, and no goal has an owner."""
     started.stage.model.silent = False
     while started.stage.statuses() != {"idle"} or not started.answers[-1].ok:
         started.tick()

@@ -108,7 +108,7 @@ def test_without_forces_for_longer_than_three_ticks_the_robot_holds_and_the_acti
     refused("held", lambda: run.goal("left_arm", epoch, near("left_arm")))
     refused("held", lambda: run.force("left_arm", epoch, f=[1.0] * 16))
     run.force("left_arm", epoch)  # clearing is always right
-    run.ticks(150)  # beyond any look of the settle test
+    run.ticks(150)  # longer than any interval of the settle test
     assert run.statuses() == {"held", "suspended"}
     assert "settled" not in {m.status for m in run.motions["left_arm"] if m.action_id == "interrupted"}
     run.model.silent = False

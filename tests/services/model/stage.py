@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The model as a process: the test plays robot_sim, vision and whoever edits the world."""
+"""The model as a process: the test plays robot_sim, vision and the clients that edit the world."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 @dataclass
 class Stage:
-    """The model under test and what it says."""
+    """The model under test and its messages."""
 
     rig: Rig
     sim: FakeSim
@@ -77,7 +77,7 @@ def staged(made: Rig, *arguments: str) -> Stage:
 
 
 def library() -> Model:
-    """What the model service should know: the table's world without what is left to be perceived."""
+    """The world that the model service should have: the table's world without objects that only vision reports."""
     world = load_world("table")
     for name in [name for name, thing in world.objects.items() if thing.role == "target"]:
         world.remove(name)

@@ -19,7 +19,7 @@ from services.monitor.viewer.figure import Figure  # noqa: E402  # only where Re
 
 
 class Notebook:
-    """A recording stream that remembers what was logged, and when."""
+    """A recording stream that stores the logged data with their times."""
 
     def __init__(self) -> None:
         self.stream = rr.RecordingStream("test")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a viewer in a browser gets, and what it does not get when it is slow."""
+"""The frames that a viewer in a browser gets, and those that a slow viewer skips."""
 
 from __future__ import annotations
 

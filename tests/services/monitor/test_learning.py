@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the monitor shows of what an agent knows."""
+"""The monitor's view of an agent's transition model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SPACE = Lattice(ROBOT, ARM, neighbours="equidistant")
 
 
 class Notebook:
-    """A recording stream that remembers what was logged last at each path."""
+    """A recording stream that stores the newest logged data of each path."""
 
     def __init__(self) -> None:
         self.logged: dict[str, Any] = {}

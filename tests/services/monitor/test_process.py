@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor: what it shows, and that it disturbs no other process."""
+"""The monitor as a process: the logged data, and that it disturbs no other process."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def web_port() -> int:
 
 
 class Notebook:
-    """A recording stream that remembers what was logged."""
+    """A recording stream that stores the logged data."""
 
     def __init__(self) -> None:
         self.stream = rr.RecordingStream("test")

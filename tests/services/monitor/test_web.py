@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The web server of the page: what it answers, and to whom."""
+"""The web server of the page: its answers, and the clients that it accepts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from services.monitor.web.server import PageServer, Refused, Site
 
 
 class Asked:
-    """Controls that note what they were asked for."""
+    """Controls that record the requests."""
 
     def __init__(self) -> None:
         self.calls: list[tuple[str, str, dict[str, Any]]] = []

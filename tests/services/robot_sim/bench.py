@@ -34,7 +34,7 @@ class Bench:
         self.follow()
 
     def follow(self) -> None:
-        """Take up the run that has begun: what is still heard of the one before is passed over."""
+        """Follow the run that has begun: late messages of the run before are ignored."""
         before = self.rig.bus.run
         wait_for(lambda: self.clocks and self.clocks[-1].run != before, "the new run")
         self.rig.bus.run = self.clocks[-1].run
@@ -70,7 +70,7 @@ class Bench:
         return str(self.rig.call(keys.drive(part, verb), WithEpoch, Driven, who="controller", epoch=epoch).gate)
 
     def free(self, part: str) -> None:
-        """Have the part belong to nobody."""
+        """Release the part, so that it has no owner."""
         self.drive(part, "release", self.take(part))
 
     def take(self, part: str, instance: str = "c1") -> int:

@@ -50,14 +50,14 @@ def standing(engine: Engine, q: Array, dt: float = DT) -> Backend:
 
 
 def driven(backend: Backend, seconds: float, torque: Array | None = None, compensated: bool = True) -> Array:
-    """The way (ticks, n) of a robot that gets `torque` and what its weight needs."""
-    way = []
+    """The path (ticks, n) of a robot that gets `torque` and the torque that compensates its weight."""
+    path = []
     for _ in range(round(seconds / DT)):
         weight = gravity_torque(ROBOT, backend.motors.q) if compensated else np.zeros(41)
         backend.motors.command(ALL, "torque", weight + (0.0 if torque is None else torque))
         backend.step(DT)
-        way.append(backend.motors.q.copy())
-    return np.array(way)
+        path.append(backend.motors.q.copy())
+    return np.array(path)
 
 
 @pytest.mark.parametrize("dt", [0.005, 0.02])
@@ -96,19 +96,19 @@ def test_a_torque_bends_a_joint_at_the_speed_that_friction_allows(engine: Engine
     backend, elbow = standing(engine, posture(OUT)), ROBOT.motor_index("l_elbow")
     torque = np.zeros(41)
     torque[elbow] = 0.2 * FRICTION
-    way = driven(backend, 1.5, torque)
-    assert (way[-1, elbow] - way[-51, elbow]) / 0.5 == pytest.approx(0.2, rel=0.05)
+    path = driven(backend, 1.5, torque)
+    assert (path[-1, elbow] - path[-51, elbow]) / 0.5 == pytest.approx(0.2, rel=0.05)
 
 
 def test_neither_a_limit_nor_the_largest_speed_is_passed(engine: Engine) -> None:
     backend, elbow = standing(engine, posture(OUT)), ROBOT.motor_index("l_elbow")
     torque = np.zeros(41)
     torque[elbow] = 40.0
-    way = driven(backend, 2.0, torque)
+    path = driven(backend, 2.0, torque)
     limit, most = ROBOT.limits[elbow, 1], ROBOT.motor_table[elbow].max_velocity
-    assert way[-1, elbow] == pytest.approx(limit, abs=1e-3)
-    assert way[:, elbow].max() < limit + 1e-3
-    assert np.diff(way[:, elbow]).max() / DT == pytest.approx(most, rel=0.05)
+    assert path[-1, elbow] == pytest.approx(limit, abs=1e-3)
+    assert path[:, elbow].max() < limit + 1e-3
+    assert np.diff(path[:, elbow]).max() / DT == pytest.approx(most, rel=0.05)
 
 
 def test_hands_press_the_table_no_harder_than_the_torque_allows(engine: Engine) -> None:
@@ -129,11 +129,11 @@ def test_hands_press_the_table_no_harder_than_the_torque_allows(engine: Engine) 
 
 
 def test_wild_torques_leave_it_finite_inside_its_limits_and_repeatable(engine: Engine) -> None:
-    def way(backend: Backend) -> Array:
+    def path(backend: Backend) -> Array:
         rng = np.random.default_rng(3)
         return np.concatenate([driven(backend, 0.1, rng.uniform(-40.0, 40.0, 41), compensated=False) for _ in range(20)])
 
-    first, second = way(standing(engine, posture(OUT))), way(standing(engine, posture(OUT)))
+    first, second = path(standing(engine, posture(OUT))), path(standing(engine, posture(OUT)))
     assert np.isfinite(first).all()
     assert (first > ROBOT.limits[:, 0] - 2e-3).all() and (first < ROBOT.limits[:, 1] + 2e-3).all()
     assert (first == second).all()

@@ -160,7 +160,7 @@ def test_after_the_ttl_a_part_is_at_rest_as_soon_as_its_deceleration_allows(spee
         gated.tick()
     for _ in range(math.ceil(abs(speed) / ACCELERATION / gated.dt)):
         gated.tick()
-    assert np.abs(gated.velocity).max() < 0.02  # what is left is the servo, which corrects the pose
+    assert np.abs(gated.velocity).max() < 0.02  # the rest is the servo, which corrects the pose
 
 
 def test_nothing_is_replayed_after_a_hold() -> None:

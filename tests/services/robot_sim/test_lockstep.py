@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""robot_sim in lockstep as a process: the test is the only one who takes part."""
+"""robot_sim in lockstep as a process: the test is the only participant."""
 
 from __future__ import annotations
 
@@ -207,7 +207,7 @@ def test_a_participant_that_has_ended_is_not_waited_for(bench: Bench) -> None:
     bench.arm()
     bench.rig.drop_token("controller", "c1")
     wait_for(lambda: bench.k >= 3, "ticks without it")
-    bench.hears("not_repeatable", "controller is gone")  # of one who was waited for it is said that it is late
+    bench.hears("not_repeatable", "controller is gone")  # a participant that was awaited would be reported as late
 
 
 def test_a_reset_begins_a_new_run_at_tick_0(bench: Bench) -> None:

@@ -38,8 +38,8 @@ def test_without_new_commands_it_holds_after_the_ttl_within_the_time_that_brakin
     hold = bench.hears("hold", since, "ttl 100 ms")
     stopped = bench.hears("stopped", hold.k)
     assert bench.next_state("left_arm").gate == "hold"
-    took, way = stopped.values["time"] * 1e3, np.degrees(stopped.values["distance"])
-    print(f"\nstopped {took:.0f} ms after the last tick under command, {way:.2f} deg")
+    took, angle = stopped.values["time"] * 1e3, np.degrees(stopped.values["distance"])
+    print(f"\nstopped {took:.0f} ms after the last tick under command, {angle:.2f} deg")
     braking = 0.6 / np.radians(600)
     ticks = int(np.ceil(braking / DT)) + 1
     assert stopped.k - hold.k <= ticks
@@ -199,7 +199,7 @@ def test_random_bytes_on_every_key_move_nothing_and_kill_nothing(bench: Bench, r
         else:
             bench.rig.session.put(key, noise, encoding=encoding)
         if number % 20 == 0:
-            time.sleep(0.001)  # the newest of a burst is all that is looked at
+            time.sleep(0.001)  # only the newest of a burst is read
     stat = bench.rig.stat("robot_sim")
     assert bench.program.is_running
     assert bench.clocks[-1].run == run

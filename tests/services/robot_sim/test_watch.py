@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is measured of the physics: counters, stops, recorded files."""
+"""Measurements of the physics: counters, stops, recorded files."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def description(service: Service, config: Config, marks: list[int]) -> tuple[str, dict[str, float]]:
-    """What it is; one that freezes does so some time after it was first asked, as before that it is not ready to anybody."""
+    """Describe the service; a toy that freezes does so some time after the first call, since it is not ready before."""
     if config.behaviour == "freeze":
         service.inbox.at(time.monotonic() + config.delay, lambda: os.kill(os.getpid(), signal.SIGSTOP))
     if not marks and config.behaviour in SLOW:
@@ -59,7 +59,7 @@ def backlog(service: Service) -> None:
 
 
 def starve(service: Service) -> None:
-    """Other programs take the processor for five seconds; the toy gets what they leave."""
+    """Other programs take the processor for five seconds; the toy gets the rest."""
     cpu = min(os.sched_getaffinity(0))
     for thread in map(int, os.listdir("/proc/self/task")):
         os.sched_setaffinity(thread, {cpu})

@@ -8,6 +8,6 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Settings of the script."""
 
     run_dir: str = ""
-    """Folder for what came of it."""
+    """Folder of the results."""
     in_vain: bool = False
-    """Reach for what is out of reach, indefinitely."""
+    """Reach for a target out of reach, indefinitely."""

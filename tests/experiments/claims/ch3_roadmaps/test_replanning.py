@@ -26,11 +26,11 @@ def acted(vertex: int, asked: int, bump: int, ended: int) -> Acted:
 def folder(tmp_path: Path) -> Path:
     """The arm moves straight to the left vertex until tick 52, and then back."""
     space = new_map().space
-    way = space.target(LEFT) - space.target(RIGHT)
+    motion = space.target(LEFT) - space.target(RIGHT)
     q = np.repeat(robot().home[None], END, axis=0)
     for k in range(2, END):
         gone = min(k - 2, TURN - 2) - max(k - TURN, 0)
-        q[k - 2, ARM] = space.target(RIGHT) + 0.005 * gone * way
+        q[k - 2, ARM] = space.target(RIGHT) + 0.005 * gone * motion
     q.tofile(tmp_path / POSITIONS)
     (tmp_path / CONTACTS).write_text("k,pair,depth\n30,r_hand ball,0.001\n31,r_hand table,0.004\n")
     write_job(tmp_path, Job([0.1]))

@@ -146,7 +146,7 @@ class Trials:
         self.run: list[tuple[str, int, int]] = []
         self.breaks_at = 99
         monkeypatch.setattr(babbling, "run_trial", self._run)
-        self.late = 0  # in so many of the next trials somebody is late
+        self.late = 0  # in so many of the next trials a process is late
         monkeypatch.setattr(babbling, "measure", self._measure)
 
     def _measure(self, folder: Path, robot: Any, dt: float) -> Trial:

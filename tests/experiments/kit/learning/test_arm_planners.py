@@ -128,17 +128,17 @@ def test_path_costs_equal_those_found_by_trying_all_paths():
     edges = [pair for pair in itertools.combinations(range(6), 2) if rng.uniform() < 0.6]
     roadmap = Roadmap(vertices, edges, Plane())
 
-    def cost(way):
-        return sum(roadmap.cost(vertices[v], w) for v, w in itertools.pairwise(way))
+    def cost(route):
+        return sum(roadmap.cost(vertices[v], w) for v, w in itertools.pairwise(route))
 
     for goal in range(1, 6):
         inner = [v for v in range(1, 6) if v != goal]
-        ways = [(0, *middle, goal) for n in range(5) for middle in itertools.permutations(inner, n)]
-        possible = [way for way in ways if all(edge(v, w) in edges for v, w in itertools.pairwise(way))]
+        paths = [(0, *middle, goal) for n in range(5) for middle in itertools.permutations(inner, n)]
+        possible = [route for route in paths if all(edge(v, w) in edges for v, w in itertools.pairwise(route))]
         found = roadmap.path({0: 0.0}, goal, ())
         assert (found is None) == (not possible)
         if found is not None:
-            assert cost(found) == pytest.approx(min(cost(way) for way in possible))
+            assert cost(found) == pytest.approx(min(cost(route) for route in possible))
 
 
 def test_a_vertex_is_joined_by_sound_motions_only_and_by_all_if_there_are_none(square):

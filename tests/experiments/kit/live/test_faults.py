@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Schedules of faults, and what is judged of the states and transitions of a disturbed system."""
+"""Schedules of faults, and the checks of the states and transitions of a disturbed system."""
 
 from __future__ import annotations
 

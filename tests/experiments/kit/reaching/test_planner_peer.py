@@ -88,8 +88,8 @@ class TestPeer:
     @pytest.mark.parametrize("memory", ["none", "blocked"])
     def test_blocked_poses_count_in_the_next_try_only_with_memory(self, memory):
         shell = World()
-        for number, way in enumerate(np.concatenate([np.eye(3), -np.eye(3)])):
-            shell.add(f"ball {number}", sphere(0.04), position=TARGET.position + 0.1 * way)
+        for number, direction in enumerate(np.concatenate([np.eye(3), -np.eye(3)])):
+            shell.add(f"ball {number}", sphere(0.04), position=TARGET.position + 0.1 * direction)
         plant, peer = self.make(arm_belief(), memory, shell)
         assert peer.try_problem(TARGET).ended != "there"
         for name in shell.objects:

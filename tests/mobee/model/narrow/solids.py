@@ -19,10 +19,10 @@ class Solid:
     position: np.ndarray
     rotation: np.ndarray
 
-    def moved(self, way=(0.0, 0.0, 0.0), turn=None) -> Solid:
+    def moved(self, shift=(0.0, 0.0, 0.0), turn=None) -> Solid:
         """Moved, after having been turned about the root's origin."""
         turn = np.eye(3) if turn is None else turn
-        return Solid(self.kind, self.half, turn @ self.position + way, turn @ self.rotation)
+        return Solid(self.kind, self.half, turn @ self.position + shift, turn @ self.rotation)
 
 
 def solid(kind, half, position=(0.0, 0.0, 0.0), rotation=None) -> Solid:
@@ -87,24 +87,24 @@ def farthest(item, directions) -> np.ndarray:
 
 
 def overlap_along(a, b, directions) -> np.ndarray:
-    """How far `a` must move along each unit direction (m, 3) until a plane across it separates the two: (m,) m."""
+    """Return the distances (m,) in m that `a` must move along unit directions (m, 3) until a plane across it separates them."""
     return farthest(b, directions) + farthest(a, -directions)
 
 
 def sampled_depth(a, b, rng) -> float:
-    """The least such way over many random directions, refined around the best few: never below the true depth."""
+    """The least such distance over many random directions, refined around the best few: never below the true depth."""
     first = rng.normal(size=(600, 3))
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    ways = overlap_along(a, b, first)
-    starts = np.argsort(ways)[:5]
-    best, least, width = first[starts], ways[starts], 0.2
+    depths = overlap_along(a, b, first)
+    starts = np.argsort(depths)[:5]
+    best, least, width = first[starts], depths[starts], 0.2
     for _ in range(24):
         tried = best[:, None] + width * rng.normal(size=(5, 40, 3))
         tried /= np.linalg.norm(tried, axis=2, keepdims=True)
-        ways = overlap_along(a, b, tried.reshape(-1, 3)).reshape(5, 40)
-        rows, at = np.arange(5), ways.argmin(axis=1)
-        better = ways[rows, at] < least
-        best[better], least[better] = tried[rows, at][better], ways[rows, at][better]
+        depths = overlap_along(a, b, tried.reshape(-1, 3)).reshape(5, 40)
+        rows, at = np.arange(5), depths.argmin(axis=1)
+        better = depths[rows, at] < least
+        best[better], least[better] = tried[rows, at][better], depths[rows, at][better]
         width *= 0.6
     return float(least.min())
 

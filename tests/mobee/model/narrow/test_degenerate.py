@@ -45,10 +45,10 @@ def solids(draw, kind) -> Solid:
 @given(data=st.data())
 def test_there_is_always_a_finite_smallest_separation(first, second, data):
     a, b = data.draw(solids(first)), data.draw(solids(second))
-    way = np.array(data.draw(st.sampled_from([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.2, 0.1)])))
+    direction = np.array(data.draw(st.sampled_from([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.2, 0.1)])))
     # At a multiple of 0.5 of a size, faces and edges of these solids just touch.
     step = data.draw(st.sampled_from([0.0, 0.5, 1.0, 2.0])) * np.abs(a.half if data.draw(st.booleans()) else b.half).max()
-    a = a.moved(way * step)
+    a = a.moved(direction * step)
     size = max(np.abs(a.half).max(), np.abs(b.half).max(), 1.0)
     found, apart = overlap(a, b), distance(a, b)
     assert np.isfinite(found.depth) and np.isfinite(apart) and apart >= 0.0

@@ -121,12 +121,12 @@ def test_changing_places_turns_the_normal(first, second, seed):
 @given(seed=SEEDS)
 def test_a_rigid_motion_of_both_moves_the_answer_with_them(first, second, seed):
     a, b, rng = pair(seed, first, second)
-    turn, way = random_turn(rng), rng.uniform(-1.0, 1.0, 3)
-    one, other = overlap(a, b), overlap(a.moved(way, turn), b.moved(way, turn))
+    turn, shift = random_turn(rng), rng.uniform(-1.0, 1.0, 3)
+    one, other = overlap(a, b), overlap(a.moved(shift, turn), b.moved(shift, turn))
     assert other.depth == pytest.approx(one.depth, abs=1e-9)
     if one.depth > 1e-6:
         assert other.normal == pytest.approx(turn @ one.normal, abs=1e-4)
-        assert other.point == pytest.approx(turn @ one.point + way, abs=1e-4)
+        assert other.point == pytest.approx(turn @ one.point + shift, abs=1e-4)
 
 
 def sampled_gap(a, b, found) -> bool:

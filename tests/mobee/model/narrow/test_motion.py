@@ -23,7 +23,7 @@ ROUNDED = [pair for pair in PAIRS if pair[0] in ("sphere", "capsule")]
 
 def moved(rng, item, h):
     """The item moved and turned about its centre, no point of it by more than h."""
-    way, axis = rng.normal(size=(2, 3))
+    direction, axis = rng.normal(size=(2, 3))
     reach = 1.0  # m: more than any of these solids
     angle = 0.5 * h / reach
     x, y, z = axis / np.linalg.norm(axis) * angle
@@ -31,7 +31,7 @@ def moved(rng, item, h):
     turn, _ = np.linalg.qr(turn)
     turn *= np.sign(np.diag(turn))
     item = item.moved()
-    item.position = item.position + way / np.linalg.norm(way) * 0.4 * h
+    item.position = item.position + direction / np.linalg.norm(direction) * 0.4 * h
     item.rotation = turn @ item.rotation
     return item
 

@@ -50,12 +50,12 @@ def test_moves_of_a_picometre_and_motions_of_both_do_not_change_the_answer(name)
     first = overlap(a, b)
     assert first.depth > 0.0
     for _ in range(40):
-        turn, way = random_turn(rng), rng.uniform(-1.0, 1.0, 3)
+        turn, shift = random_turn(rng), rng.uniform(-1.0, 1.0, 3)
         jitter = rng.uniform(-1e-12, 1e-12, 3)
-        again = overlap(a.moved(way + jitter, turn), b.moved(way, turn))
+        again = overlap(a.moved(shift + jitter, turn), b.moved(shift, turn))
         assert again.depth == pytest.approx(first.depth, abs=1e-9)
         assert turn.T @ again.normal == pytest.approx(first.normal, abs=1e-6)
-        assert turn.T @ (again.point - way) == pytest.approx(first.point, abs=1e-6)
+        assert turn.T @ (again.point - shift) == pytest.approx(first.point, abs=1e-6)
 
 
 def point(name):

@@ -23,7 +23,7 @@ def _grown(spacing: float = 0.06, seed: int = 0, **how: Any) -> FrontierBuilder:
 
 
 def _uncovered(builder: FrontierBuilder) -> np.ndarray:
-    """How far all that can be reached is from the nearest vertex, in spacings."""
+    """The largest distance of a reachable point from the nearest vertex, in spacings."""
     found: np.ndarray = KDTree(builder.frontier.points).query(builder.evaluator.reachable())[0]  # type: ignore[attr-defined]  # of Level
     return found
 

@@ -56,9 +56,9 @@ def test_gaze_is_the_angle_to_a_place_or_a_marker(free: mobee.Model, postures: n
 
 def test_palms_face_each_other_when_both_normals_lie_on_the_line_between(free: mobee.Model, postures: np.ndarray) -> None:
     pose = free.evaluate(postures[:1])
-    way = pose.position("right_palm")[0] - pose.position("left_palm")[0]
-    way /= np.linalg.norm(way)
-    angles = [np.arccos(pose.normal("left_palm")[0] @ way), np.arccos(-pose.normal("right_palm")[0] @ way)]
+    line = pose.position("right_palm")[0] - pose.position("left_palm")[0]
+    line /= np.linalg.norm(line)
+    angles = [np.arccos(pose.normal("left_palm")[0] @ line), np.arccos(-pose.normal("right_palm")[0] @ line)]
     assert costs.palm_to_palm().residual(pose)[0] == pytest.approx(max(angles))
 
 

@@ -26,7 +26,7 @@ COUPLED = """
 
 
 def read(path: Path, **options: Any) -> Robot:
-    """The robot, without warnings of what it holds."""
+    """The robot, without the warnings of the reader."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Simplified)
         return load_robot(path, **options)

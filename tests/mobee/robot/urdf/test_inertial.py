@@ -42,7 +42,7 @@ def test_the_mass_of_a_fixed_link_is_added_to_its_parent(tmp_path: Path) -> None
 def test_moments_of_inertia_are_turned_into_the_root_frame(tmp_path: Path) -> None:
     turned = np.diag([2.0, 1.0, 2.5])  # by the joint's yaw
     (body,) = robot(tmp_path, own("2", INERTIA)).bodies
-    assert body.inertia is None  # that of the tool is not known
+    assert body.inertia is None  # the mass of the tool is not known
     (body,) = robot(tmp_path, own("2", INERTIA), tool=0.0).bodies
     np.testing.assert_allclose(body.inertia, turned, atol=1e-12)
 

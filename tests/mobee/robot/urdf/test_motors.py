@@ -17,7 +17,7 @@ WIDE = '<limit lower="-3" upper="3"/>'
 
 
 def fingers(folder: Path, *inside: str, kind: str = "revolute") -> Robot:
-    """Joints j0, j1, ... side by side, what is inside each in line 3, 4, ..."""
+    """Joints j0, j1, ... side by side; the content of each is in line 3, 4, ..."""
     joints = [
         f'<joint name="j{k}" type="{kind}"><parent link="l0"/><child link="l{k + 1}"/>{text}</joint>' for k, text in enumerate(inside)
     ]
@@ -73,7 +73,7 @@ def test_one_motor_drives_the_joints_that_mimic_its_joint(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
 def test_offsets_of_a_chain_of_mimics_are_multiplied_on(tmp_path: Path, order: tuple[int, int, int]) -> None:
-    # b = 2 a + 0.1, c = -3 b + 0.2 = -6 a - 0.1, whatever the order in the file
+    # b = 2 a + 0.1, c = -3 b + 0.2 = -6 a - 0.1, in any order in the file
     texts = [
         ("a", WIDE),
         ("b", '<mimic joint="a" multiplier="2" offset="0.1"/>'),

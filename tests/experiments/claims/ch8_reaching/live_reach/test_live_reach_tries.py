@@ -21,7 +21,7 @@ T, END, RATE = 100, 61, 50.0
 
 def tried(number: int, ends: list[int], **how: object) -> Tried:
     known = {"kind": FRESH, "number": number, "out": 2, "begin": 11, "ends": ends, "over": 90, "off": 0.0, "actions": 2, "believed": 0.0}
-    return Tried(**{**known, "thinking": 0.0, **how})  # type: ignore[arg-type]  # fields by name, whose types a dict of all does not tell
+    return Tried(**{**known, "thinking": 0.0, **how})  # type: ignore[arg-type]  # fields by name, the dict of all has no type for each field
 
 
 @pytest.fixture
