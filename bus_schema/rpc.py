@@ -64,7 +64,7 @@ class ReachFor(Request, frozen=True, kw_only=True):
     radius: Annotated[float, Meta(gt=0)]  # m
     aim: Aim
     normal: Vector3 | None = None  # direction in which the marker's normal should point
-    stay: bool = False  # True: the part stays where the force ended, instead of being drawn back
+    stay: bool = False  # True: the part stays where the force ended, instead of being pulled back
 
 
 class Place(Request, frozen=True, kw_only=True):

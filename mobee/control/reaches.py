@@ -97,7 +97,7 @@ class Reaches:
         return bool(self._core.reach_is_approaching(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:
-        """Update the list of addresses for the core."""
+        """Update the addresses of the reaches under way, which the core reads."""
         self._addresses = np.array([reaching.address for reaching in self._under_way.values()], dtype=np.int64)
         self.address = address(self._addresses)
 

@@ -82,7 +82,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Push once and measure."""
+    """Push the robot once, and return the measurements."""
     return push_hand(settings["law"], settings["direction"], settings["force"], seed)
 
 

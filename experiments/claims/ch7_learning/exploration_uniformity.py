@@ -97,7 +97,7 @@ tries = Claim(
 
 
 def _of_spikes(rule: Rule) -> Rule:
-    """Return a rule that judges tries at constraints by explorer; open where no action fails."""
+    """Return a rule on each explorer's ratio of mean tries: actions that run into constraints over others; open if no action fails."""
 
     def of_runs(grouped: Groups) -> Measured | None:
         spikes = {explorer: _spikes(grouped, "nearest", explorer) for explorer in EXPLORERS}

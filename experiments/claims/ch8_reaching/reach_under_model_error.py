@@ -339,7 +339,7 @@ def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
 
 
 def success(done: Cells, contestant: str, wrong: str) -> tuple[list[int], Array]:
-    """Return the numbers of tries at which a contestant was evaluated, and its success then, (seeds, points)."""
+    """Return the numbers of tries after which a contestant was evaluated, and its share of successes at each, (seeds, points)."""
     found = _of(done, contestant, wrong)
     points = list(found[0].cell.settings["tries"]) if found else []
     return points, np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(len(found), len(points))

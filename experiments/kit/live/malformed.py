@@ -73,7 +73,7 @@ OTHER: tuple[Any, ...] = (None, True, 0, -1, 1.5, "x", b"\x00", [], {}, [[[]]], 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """What is sent: `key`, payload and encoding; `call`: with a reply."""
+    """A message to send: `key`, payload and encoding; `call`: send it as a call, which has a reply."""
 
     key: str
     payload: bytes
