@@ -84,7 +84,7 @@ def value_iteration(
         V and Q, with Q = -inf where there is no action.
 
     Raises:
-        InvalidValue: with what is valid.
+        InvalidValue: an argument is not valid; the message gives the valid values.
     """
     core, address = _core()
     if isinstance(model, Tabled):
