@@ -28,7 +28,7 @@ def keys() -> list[str]:
 
 
 def schemas_of(key: str) -> dict[str, dict[str, Any]]:
-    """Return the JSON schemas of what is sent on a key: "message" of a stream, or "request", "reply" and "failure" of a call.
+    """Return the JSON schemas of the messages on a key: "message" of a stream, or "request", "reply" and "failure" of a call.
 
     `key`: as on the bus, such as "left_arm/state" or "*/state", as `keys` lists it, or the name of a type, such as "State": then its
     schema alone. Each schema has the encoding string that travels with the type. Empty for a key that the contract does not have.

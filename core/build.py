@@ -246,7 +246,7 @@ def macos_version() -> str:
 
 
 def _knows_cpp20(compiler: Compiler) -> bool:
-    """Whether a compiler takes C++20 and the flags of this machine's highest level: a version number does not reveal missing headers."""
+    """Whether a compiler takes C++20 and the flags of this machine's highest level: versions do not tell of headers that are missing."""
     with tempfile.TemporaryDirectory() as scratch:
         source = Path(scratch) / "probe.cpp"
         source.write_text(PROBE)

@@ -22,7 +22,7 @@ RUNTIMES = ("libasan.so", "libubsan.so")
 SETTINGS = {
     "ASAN_OPTIONS": "detect_leaks=0:strict_string_checks=1",
     "UBSAN_OPTIONS": "print_stacktrace=1:halt_on_error=1",
-    "PYTHONMALLOC": "malloc",  # each object has an address of its own, so that what is read beyond one is seen
+    "PYTHONMALLOC": "malloc",  # each object has an address of its own, so that a read beyond its end is detected
 }
 
 

@@ -21,7 +21,7 @@ from mobee.write_locks import lock, unlock
 class AgentFile:
     """The data of one agent in the file of a run; the processes of several agents may share the file.
 
-    Write-ahead log with full synchronisation: what was written survives a kill and a power cut. One process at a time may write the data
+    Write-ahead log with full synchronisation: written data survive a kill and a power cut. One process at a time may write the data
     of an agent.
 
     Args:
@@ -74,7 +74,7 @@ class AgentFile:
                 then, now = _differing(json_of(path, key, known[key]), json.loads(given.get(key, "null")))
                 raise MobeeError(
                     f"{path}: {self.agent} has {key} = {json.dumps(then)} on record, now {json.dumps(now)}. "
-                    "A run goes on only with the settings it began with: use those, or another file."
+                    "A run continues only with the settings it began with: use those, or another file."
                 )
 
     def settings(self, agent: str | None = None) -> dict[str, Any]:

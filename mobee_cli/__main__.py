@@ -16,7 +16,7 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, INTERRUPTED
 
 VERBS = {
-    "play": "make any robot curious: derive its parts, learn offline, go on live",
+    "play": "make any robot curious: derive its parts, learn offline, continue live",
     "launch": "start a scenario and supervise it",
     "keys": "make the keys of a secured system: new, add, list",
     "status": "print the state of the running system",

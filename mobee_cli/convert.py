@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Convert the file, and print what was written and what the new format cannot express."""
+    """Convert the file, and print the written content and the content that the new format cannot express."""
     target: Path = arguments.target
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)

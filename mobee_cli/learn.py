@@ -22,7 +22,7 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 _NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the
 robot (docs/play.md). Every transition is on disk before the next action: the
 same command continues the file, also after Ctrl-C. Beside FILE.sqlite are
-written the robot, FILE.xml, and a scenario that goes on live, FILE.toml; with
+written the robot, FILE.xml, and a scenario to continue live, FILE.toml; with
 --track the curves of all agents, into the folder FILE-tensorboard."""
 
 
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Derive the agents of the robot, let them learn, and print what they learned."""
+    """Derive the agents of the robot, let them learn, and print the results."""
     curves = arguments.store.with_name(f"{arguments.store.stem}-tensorboard")
     if arguments.store.suffix != ".sqlite":
         raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(numbers | {"store": str(files.store), "scenario": str(files.scenario)}, indent=2))
         return 0
     print(summary)
-    print(f"Kept in {files.store}. Plan with it: mobee plan --run {files.store}; go on live: mobee launch {files.scenario}")
+    print(f"Kept in {files.store}. Plan with it: mobee plan --run {files.store}; continue live: mobee launch {files.scenario}")
     if arguments.track:
         print(f"Curves: tensorboard --logdir {curves}")
     return 0

@@ -122,7 +122,7 @@ def _lines(learned: Learned, plan: Plan) -> list[str]:
 
 
 def _better(learned: Learned, start: int, plan: Plan, discount: float) -> list[str]:
-    """Explain a plan that is expected to fail: what was never tried, and the goals that are reached most reliably from the start."""
+    """Explain a plan that is expected to fail: name untried actions, and the goals that are reached most reliably from the start."""
     if plan.success >= UNLIKELY:
         return []
     pairs = zip(plan.path, plan.actions, strict=False)

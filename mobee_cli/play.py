@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee play`: any robot becomes curious: derives its parts, learns offline for some seconds, and goes on live."""
+"""`mobee play`: any robot becomes curious: derives its parts, learns offline for some seconds, and continues live."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from services.launcher.run import Options, launch, refused_now
 SECONDS = 5.0  # s of real time in which it learns offline
 _NOTES = """ROBOT: a shipped robot, a URDF, MJCF or zero-position XML file, or with the
 package mujoco-menagerie a robot of MuJoCo Menagerie; without it, the iCub at
-its table. --learned goes on live with a file of `mobee learn`. The address of
+its table. --learned continues a file of `mobee learn` live. The address of
 the page is in the table of services; Ctrl-C ends everything. docs/play.md."""
 
 
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.offline_only:
         if arguments.json:
             print(json.dumps(numbers | {"store": str(files.store), "scenario": str(files.scenario)}, indent=2))
-        say(f"mobee launch {files.scenario} goes on live.")
+        say(f"mobee launch {files.scenario} continues live.")
         return 0
     say(f"Goes on live: mobee launch {files.scenario}")
     return _live(arguments, files)
@@ -92,14 +92,14 @@ def _files(arguments: argparse.Namespace, setup: Setup) -> Files:
 
 
 def _offline(arguments: argparse.Namespace, setup: Setup, files: Files, say: Any) -> dict[str, Any]:
-    """Learn offline; returns the numbers of what was learned."""
+    """Learn offline; returns the numbers of the run, see `Learning.numbers`."""
     seconds = arguments.seconds or (None if arguments.transitions else SECONDS)
     with opened(setup, load_robot(setup.shipped or files.robot), files.store) as learning:
         try:
             learn(learning, seconds, arguments.transitions, say)
         except KeyboardInterrupt:
             kept = learning.kept
-            text = f"interrupted; {kept} transitions are kept, and `mobee launch {files.scenario}` goes on live with them"
+            text = f"interrupted; {kept} transitions are kept, and `mobee launch {files.scenario}` continues live with them"
             raise UserError(text if kept else "interrupted", INTERRUPTED) from None
         say(learning.report())
         say(learning.summary())

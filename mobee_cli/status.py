@@ -120,7 +120,7 @@ _BEYOND = {"rate": "rate", "gap": "gap_ms", "refused": "refused_rate", "memory":
 
 
 def _health_lines(services: dict[str, Any]) -> list[str]:
-    """Return a table of what each process needs and receives; a number beyond its limit is marked with !."""
+    """Return a table of the resources that each process uses and its messages; a number beyond its limit is marked with !."""
     known = {who: service for who, service in services.items() if service["health"]}
     if not known:
         return []

@@ -58,7 +58,7 @@ def require_recording(save: Path | None) -> None:
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None, solids: bool = False) -> int:
     """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges.
 
-    `solids`: show the solids in place of what the file draws.
+    `solids`: show the solids in place of the file's visuals.
     """
     try:
         from services.monitor.viewer.view import view  # needs the viewer, which is an extra

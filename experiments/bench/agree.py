@@ -64,7 +64,7 @@ def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transi
 
 
 def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]]:
-    """Run the same agents on the offline plant; returns what they observed, by part."""
+    """Run the same agents on the offline plant; returns their transitions, by part."""
     robot, world = load_robot("icub"), load_world("table")
     world.remove("ball")  # live, it is not seen without cameras
     plant = OfflinePlant(Model(robot, world), seed=seed, gains=Gains.named("published_2014"), dt=TICK)

@@ -69,7 +69,7 @@ class _DisturbedSystem:
         wait_for(lambda: self.observer.all_armed(len(self._robot.parts)), _BACK_PATIENCE, "every part follows commands again")
 
     def disturb(self, schedule: Sequence[Fault]) -> dict[str, Any]:
-        """Perform a schedule; return what was measured and which promises were broken."""
+        """Perform a schedule; return the measurements and the broken guarantees."""
         self.observer.take_states()
         times, broken = self._injector.perform(schedule), list[str]()
         over = max(at + fault.duration for at, fault in zip(times, schedule, strict=True))
@@ -120,7 +120,7 @@ def measure(settings: Settings) -> dict[str, Any]:
             for n in range(settings.schedules):
                 progress.show(n / settings.schedules, f"schedule {settings.seed + n}")
                 rows.append(_performed(disturbed, settings.seed + n, settings))
-            time.sleep(1.0)  # what was published last arrives
+            time.sleep(1.0)  # the last published messages arrive
             kept = compare_transitions(disturbed.observer, system.run_dir, list(AGENTS))
     return _result(settings, rows, kept, time.monotonic() - begun)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearly valid messages, calls and tokens to a live system, see `experiments.kit.live.malformed`: which processes end, and what they keep.
+"""Nearly valid messages, calls and tokens to a live system, see `experiments.kit.live.malformed`: which end, and how memory grows.
 
 Claim: no process ends, none is ended by the launcher, the memory of each grows by less than 20 MB, and afterwards every agent learns.
 The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages are not dropped: a service that does not
@@ -52,7 +52,7 @@ QUICK = Settings(messages=40_000)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Send all, and return what was sent, what was refused and what the processes keep; raises LaunchFailed."""
+    """Send all messages; return the numbers sent and refused, and the growth of the processes' memory; raises LaunchFailed."""
     sent: Counter[str] = Counter()
     begun = time.monotonic()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reports what is wrong with a robot or world file, and what to do about it."""
+"""Reports the faults of a robot or world file, and their remedies."""
 
 from mobee.check.file import check_file
 from mobee.check.finding import Finding

@@ -19,7 +19,7 @@ SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One problem of a file: what is wrong, where, why it matters, and what to do.
+    """One problem of a file: the fault, its place, its effect, and the remedy.
 
     error: the robot cannot work; warning: it will behave unexpectedly; note: useful to know, and possibly intended.
     """

@@ -215,7 +215,7 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def world_contacts(subject: Subject) -> Iterator[Finding]:
-    """Report in one note what the robot touches at home in the world; nothing without a world."""
+    """Report in one note the objects of the world that the robot touches at home; nothing without a world."""
     if subject.world is None:
         return
     world = subject.world.objects

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks what the robot's file draws: finds mesh files that are missing."""
+"""Checks the visuals of the robot's file: finds mesh files that are missing."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class Controller:
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
-        """End `force` and all pushes; reaches go on."""
+        """End `force` and all pushes; reaches continue."""
         self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 

@@ -45,7 +45,7 @@ def reach_path(
     `position` (3,) m and `normal` (3,) in the root frame, `start` (n,) rad, `tolerance` m, and rad for the normal. The thesis leaves
     alpha open: here it is one over the largest eigenvalue of J J^T plus a bound on the curvature of the path, so that no step
     overshoots. Every step ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of
-    reach, limits are in the way, or the pose is singular. Raises InvalidValue and UnknownName.
+    reach, limits block the motion, or the pose is singular. Raises InvalidValue and UnknownName.
     """
     model.robot.marker(marker)
     target = ReachTarget(position, normal=normal)
@@ -150,7 +150,7 @@ class Reacher:
     def update(self, q: Array, dt: float) -> ReachStatus:
         """Return the status at the measured q (n,) rad, dt [s] after the last update.
 
-        "stuck" while the marker comes no nearer: the target is out of reach, or limits, clauses, contacts or springs are in the way.
+        "stuck" while the marker comes no nearer: the target is out of reach, or limits, clauses, contacts or springs prevent the motion.
         The force on the marker continues.
         """
         found = marker_error(self._controller.model, self._marker, self.target, real_array("q", q))

@@ -37,7 +37,7 @@ class Arm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derived:
-    """A robot that curious agents can use at once, and what was derived.
+    """A robot that curious agents can use at once, and the derived values.
 
     `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of contact,
     or farther from it. `narrowed`: motors with a narrower range: beyond it, solids touch that fields cannot keep apart; the added clauses

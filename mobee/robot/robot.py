@@ -143,7 +143,7 @@ class Robot:
         untested: for every pair of links that is never tested, the reason.
         where: file and line of every element, as {("joint", name): "file:line"}.
         bodies: masses, at most one for each link, in the order of the links; () if the file has none.
-        visuals: what is drawn of the links, if it is not their solids.
+        visuals: the drawn surfaces of the links, where these are not their solids.
         cameras: those that the file names, by name; see `mobee.robot.cameras`.
         least_lever: m; 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so one with a short lever hardly pushes. Above 0:
             by LEVER^2 J^T / (|J|^2 + least_lever^2), where |J| is the lever of the contact, see `mobee.model.levers`.

@@ -340,7 +340,7 @@ class OfflinePlant:
         address = self._runner.prepare(most, traced or self._digest is not None, traced, self.reaching)
         try:
             yield address
-        finally:  # also what was run before a Ctrl-C
+        finally:  # also the ticks before a Ctrl-C
             rows = self.conclude()
         return rows
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The record of an offline plant as plain JSON values, stored with what was learned on it."""
+"""The record of an offline plant as plain JSON values, stored with the transitions that were learned on it."""
 
 from __future__ import annotations
 

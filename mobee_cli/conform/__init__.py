@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def broken(check: Check, player: Player, part: str) -> str | None:
-    """Run a check; return what is broken, or None."""
+    """Run a check; return the violation, or None."""
     try:
         check.test(player, part)
     except Broken as found:

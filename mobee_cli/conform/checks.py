@@ -35,7 +35,7 @@ STOP_TIME = 0.5  # s within which a stop is obeyed
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A rule: its name, what it requires, and the function that tests it on a part."""
+    """A rule: its name, its requirement, and the function that tests it on a part."""
 
     name: str
     rule: str
@@ -248,7 +248,7 @@ CHECKS = (
 
 
 def _accepted(call: Callable[[], object]) -> bool:
-    """Return whether a call that must be refused is answered; raises CallFailed if nobody answers."""
+    """Return whether a call that must be refused is answered; raises CallFailed if there is no answer."""
     try:
         call()
     except CallFailed as failed:
@@ -315,7 +315,7 @@ def _require_ignored(player: Player, part: str, what: str, send: Callable[[], in
 
 
 def _hold_without(player: Player, part: str, who: str, owner: bool) -> None:
-    """Require that an armed part holds when the token of a service disappears; the other commands go on."""
+    """Require that an armed part holds when the token of a service disappears; the other commands continue."""
     session, instance = player.service.bus.session, f"i0_conform_{who}"
     token: Any = session.liveliness().declare_token(keys.alive(who, instance))
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays the controller for a robot_sim under test: records what it streams, and sends commands, also ones that it must refuse."""
+"""Plays the controller for a robot_sim under test: records its messages, and sends commands, also ones that it must refuse."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _R = TypeVar("_R", bound=Reply)
 
 
 class Broken(Exception):
-    """A rule of the contract that the robot does not keep; the message says what was seen, and what is expected."""
+    """A rule of the contract that the robot does not keep; the message gives the observation and the expectation."""
 
 
 class Player:

@@ -74,7 +74,7 @@ def write_readme(setup: Setup, files: Files) -> None:
 {"" if setup.shipped else own}- `{scenario}`: services, agents and their joints: `mobee launch {scenario}`.
 - `{store}`: the transitions: `mobee plan --run {store} --agent PART --to STATE`.
 
-An agent goes on only with the joints, limits and settings with which it began. After a change of these remove
+An agent continues only with the joints, limits and settings with which it began. After a change of these remove
 `{store}`, and the lines `continues` of the scenario.
 
 What was derived:

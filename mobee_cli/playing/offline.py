@@ -28,7 +28,7 @@ FIRST_REPORT = 5.0  # min of robot time; the next report follows after twice the
 
 @dataclass(slots=True, eq=False)
 class Learning:
-    """Agents that learn on one offline plant, and counts over what they have made."""
+    """Agents that learn on one offline plant, and counts of their transitions."""
 
     plant: OfflinePlant
     agents: tuple[CuriousAgent, ...]
@@ -51,7 +51,7 @@ class Learning:
         return sum(len(_made(agent)) for agent in self.agents)
 
     def numbers(self) -> dict[str, Any]:
-        """Return what was made and learned, as plain values."""
+        """Return the agents' actions and results, as plain values."""
         return {
             "transitions": self.transitions,
             "transitions_ever": self.transitions + self.begun,

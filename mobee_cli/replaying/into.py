@@ -36,7 +36,7 @@ class Role:
 
     with_tick: tuple[str, ...]  # from the model, after the tick: it answers the tick when it has these
     after: tuple[str, ...]  # from others, before the next tick
-    says: tuple[str, ...]  # what is compared
+    says: tuple[str, ...]  # the compared values
     answers: Callable[[Item], bool]  # whether a message ends its work on a tick
 
 
@@ -147,7 +147,7 @@ class _Replay:
             if time.monotonic() > give_up:
                 raise Stopped(f"{self._stage.who} did not answer tick 0 within {START:g} s")
 
-    # What the service gets
+    # Messages to the service
 
     def _publish(self, items: Iterable[Item]) -> None:
         for item in items:
@@ -193,7 +193,7 @@ class _Replay:
                 raise Stopped(f"{self._stage.who} refused {served.key} of tick {served.k}, which it had accepted: {failure.get('text')}")
             time.sleep(0.02)
 
-    # What it asks robot_sim for
+    # Calls of the service to robot_sim
 
     def _note_drives(self, tick: TickOf) -> None:
         """Keep the replies of robot_sim to the service's calls, so that it gets them again."""
@@ -214,7 +214,7 @@ class _Replay:
 
         return answer
 
-    # What it says
+    # Messages of the service
 
     def _own(self, tick: TickOf) -> list[Item]:
         return [item for item in tick.items if item.src == self._stage.who]

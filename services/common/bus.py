@@ -179,7 +179,7 @@ class Bus:
             handle()
         except MobeeError:
             raise
-        except Exception as error:  # any: no message may end a process, and the report names what was raised
+        except Exception as error:  # any: no message may end a process, and the report names the exception
             self.report_defect(what, error)
 
     def report_defect(self, what: str, error: Exception) -> str:

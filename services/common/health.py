@@ -57,7 +57,7 @@ class Health:
         self._begun = self._checked = now
         self._memory_then: float | None = None  # MB
         self._refused, self._refused_rate = 0, 0.0
-        self.bad: dict[str, float] = {}  # what is or was beyond its limit: its name, and the time [s] of the last check that found it
+        self.bad: dict[str, float] = {}  # numbers beyond their limits: the time [s] of the last check that found each
 
     def numbers(self, waiting: int) -> dict[str, int | float | None]:
         """Rate [Hz], age and longest gap [ms] of the ticks, refusals per second, memory [MB], open files, threads, waiting messages."""

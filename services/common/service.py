@@ -314,7 +314,7 @@ class Service(Listener):
 
 
 def _measured(value: float) -> int | float | None:
-    """Return a number of `describe` for the bus: a count stays a whole number, and what was not measured is None."""
+    """Return a number of `describe` for the bus: a count stays a whole number; None if it was not measured."""
     if value == NOT_MEASURED or not math.isfinite(value):
         return None
     return int(value) if isinstance(value, Integral) else float(value)

@@ -145,7 +145,7 @@ class ControllerNode:
             self._hold(part, tick.k, why)
 
     def _regain(self, part: str, tick: Tick) -> None:
-        """Go on with a part that is under control again, from rest: with its suspended action, or without an action."""
+        """Continue with a part that is under control again, from rest: with its suspended action, or without an action."""
         action = self._actions[part]
         self._law.rest(part)
         if action.status == "suspended" and action.target is not None:

@@ -154,7 +154,7 @@ class MonitorNode:
 
         self._service.inbox.at(rate.next(), turn)
 
-    # What is shown regularly
+    # Data that are shown regularly
 
     def _show_robot(self) -> None:
         """Show robot, contacts and plots in the 3D view."""
@@ -256,7 +256,7 @@ class MonitorNode:
     def _show_things(self) -> None:
         self._board.put("objects", [thing(one) for one in self._known.objects.values()])
 
-    # What is shown when it happens
+    # Events that are shown at once
 
     def _show_object(self, seen: WorldObject) -> None:
         self._scene.log_object(seen)

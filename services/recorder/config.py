@@ -24,4 +24,4 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     json_rate: Annotated[float, Meta(ge=0, le=100)] = 2.0
     """Largest rate of copies in JSON for viewers, on each key, Hz; 0: none. The messages themselves are all recorded."""
     everything: bool = False
-    """Whether to record also what is published for subscribers only: clock, states of single parts, poses, contacts, pictures."""
+    """Whether to record also streams that are published for subscribers only: clock, states of single parts, poses, contacts, pictures."""

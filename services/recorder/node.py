@@ -23,7 +23,7 @@ from services.recorder.config import Config
 from services.recorder.files import Channel, Files
 from services.recorder.views import Views
 
-PERIOD = 0.25  # s between two checks of what has arrived: the time of a check counts as that of receipt
+PERIOD = 0.25  # s between two checks for new messages; the time of the check is stored as the time of receipt
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
@@ -53,7 +53,7 @@ def sender_of(payload: bytes) -> tuple[str, int] | None:
 
 
 FOR_SUBSCRIBERS: tuple[type[Message], ...] = (Clock, State, Pose, Contacts, Image, Camera)
-"""Streams that others need not publish if nobody reads them, and that follow from the ticks and the robot's world."""
+"""Streams that need not be published without a subscriber, and that follow from the ticks and the robot's world."""
 
 
 def recorded_keys(everything: bool) -> list[str]:

@@ -24,7 +24,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """The simulated robot's settings."""
 
     backend: Literal["auto", "pybullet", "mujoco", "kinematic"] = "auto"
-    """Physics with contacts: PyBullet for the iCub or MuJoCo for every robot; kinematic: the motor model alone; auto: what is installed."""
+    """Physics with contacts: PyBullet for the iCub or MuJoCo for every robot; kinematic: motor model alone; auto: an installed engine."""
     rate: Annotated[float, Meta(ge=1, le=1000)] = 100.0
     """Ticks a second."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
@@ -46,11 +46,11 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.02
     """Standard deviation of a part's sampling time, share of a tick."""
     truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
-    """Messages a second of what only the simulator knows."""
+    """Rate of the messages with the ground truth, per second."""
     participants: tuple[str, ...] = ()
-    """Lockstep: who must be there before tick 1; the launcher names every service that computes what the robot does."""
+    """Lockstep: services that must be present before tick 1; the launcher names all services that affect the robot's motion."""
     ticks: Annotated[int, Meta(ge=0)] = 0
-    """Lockstep: stop after so many ticks; 0: go on indefinitely."""
+    """Lockstep: stop after so many ticks; 0: never."""
     stop_record: str = ""
     """File that holds the emergency stop, so that it outlives this process; one that is missing counts as a stop.  Empty: not kept."""
     record: str = ""

@@ -167,7 +167,7 @@ def _all(found: NDArray[np.bool_]) -> bool:
 
 
 class Shaper:
-    """Limits references to what the motors may do, tick by tick; arrays (n,)."""
+    """Limits references to the limits of the motors, tick by tick; arrays (n,)."""
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits = limits

@@ -46,7 +46,7 @@ class Backend(Protocol):
     name: str
     """As in the settings."""
     notes: Sequence[str]
-    """What the back-end assumed about the robot, a sentence each."""
+    """Assumptions of the back-end about the robot, one sentence each."""
     pairs_watched: int
 
     @property

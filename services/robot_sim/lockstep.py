@@ -15,7 +15,7 @@ START_PERIOD = 0.05  # s between two repetitions of tick 0
 
 
 class Lockstep:
-    """The barrier of a run, and the count of what made the run unrepeatable."""
+    """The barrier of a run, and the number of events that made the run unrepeatable."""
 
     def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
         """`last_tick`: tick at which the run ends; 0: it does not end."""

@@ -139,7 +139,7 @@ CONTACTS = "contacts.csv"  # tick, pair, depth [m]; nothing for a tick without c
 class Recorded:
     """A back-end that keeps the joint positions, without noise, and the solid contacts of every tick.
 
-    Both files begin anew with every run; what was written is in them even when the process is killed.
+    Both files begin anew with every run; written data are in them even when the process is killed.
     """
 
     def __init__(self, inner: Backend, folder: Path) -> None:

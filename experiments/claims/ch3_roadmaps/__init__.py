@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thesis chapters 3 and 4.3: poses and roadmaps from cost functions, and what they learn from contacts."""
+"""Thesis chapters 3 and 4.3: poses and roadmaps from cost functions, and roadmaps that learn from contacts."""

@@ -34,8 +34,8 @@ POSES = (  # rad, shoulder and elbow; the wrist is straight
     (-1.14, 1.38, 0.30, 0.67),  # above it
 )
 GOALS = ((LEFT, ABOVE), (RIGHT, ABOVE), (RIGHT, LEFT))
-WORLD = Path(__file__).with_name("replanning_ghost.xml")  # what the model knows
-SIMULATED = Path(__file__).with_name("replanning_away.xml")  # what the simulator has, until the ball is moved there
+WORLD = Path(__file__).with_name("replanning_ghost.xml")  # the objects of the model
+SIMULATED = Path(__file__).with_name("replanning_away.xml")  # the objects of the simulator at first
 RATE, SPEED = 100.0, 1.0  # Hz; share of the motors' speed
 
 

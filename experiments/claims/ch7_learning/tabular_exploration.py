@@ -49,7 +49,7 @@ LEAST_MOST = 5000  # transitions
 JUDGED = 20  # transitions for each state-action, after which the beliefs are compared with the truth
 OFTEN = 5  # tries
 NEAR_ONE = 0.99999  # discount of the best policy
-DISCOUNT = 0.99  # of the agents that look for rewards
+DISCOUNT = 0.99  # of the agents that maximise rewards
 COVERAGE = (
     "curious",
     "curious, debiased",
@@ -117,7 +117,7 @@ def best_reward(plant: RewardedPlant) -> float:
 
 
 def _pursuing(plant: RewardedPlant, name: str, number: float) -> Explorer:
-    """Return an explorer that looks for rewards."""
+    """Return an explorer that maximises rewards."""
     kinds: dict[str, Callable[[], Explorer]] = {
         "curious": lambda: Curious(plant, number),
         "count bonus": lambda: CountBonus(plant, number),

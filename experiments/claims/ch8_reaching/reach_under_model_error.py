@@ -209,7 +209,7 @@ class Score:
 
 
 class Contestant(Protocol):
-    """Makes tries; an evaluation leaves what it has learned unchanged."""
+    """Makes tries; an evaluation does not change what it has learned."""
 
     def learn(self, tries: int) -> None:
         """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2)."""

@@ -124,7 +124,7 @@ class PosteriorSampling:
 
 @dataclass(frozen=True, eq=False)
 class EpsilonGreedy:
-    """Takes the action that is best by what was found so far, and a random one with probability `share`."""
+    """Takes the action that is best by the observations so far, and a random one with probability `share`."""
 
     plant: RewardedPlant
     share: float

@@ -212,7 +212,7 @@ def _struct(cls: type[Struct]) -> StructType:
 
 
 def main() -> None:
-    """Send what is drawn, and print how many messages, calls and tokens these were."""
+    """Send random messages, calls and tokens, and print their numbers."""
     endpoint, seed, count, parts = sys.argv[1:]
     print(json.dumps(send(endpoint, int(seed), int(count), json.loads(parts))))
 

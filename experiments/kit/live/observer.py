@@ -172,7 +172,7 @@ class Kept:
 
 
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
-    """Compare what was published with the store of a run."""
+    """Compare the published transitions with the store of a run."""
     kept = lost = differing = gaps = 0
     with TransitionStore(run_dir / STORE, "", read_only=True) as store:
         on_disk = {

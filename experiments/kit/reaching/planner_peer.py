@@ -213,7 +213,7 @@ class PlannerPeer:
         plant: the plant to move; motors that are not planned with keep their initial position.
         belief: the model to plan with.
         part: the part of the motors.
-        memory: what is kept from earlier tries: "none", where motions were "blocked", or also which poses "missed" their target
+        memory: the knowledge kept from earlier tries: "none", where motions were "blocked", or also which poses "missed" their target
             although nothing blocked them.
         seed: of random goals and paths.
         limit: largest number of actions per try.

@@ -61,7 +61,7 @@ class RoadmapSettings:
 
     Attributes:
         method: "nes": thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task points, for coordinates
-            with derivatives.  "hybrid": least squares where all coordinates have derivatives, then evolution for what it missed.
+            with derivatives.  "hybrid": least squares where all coordinates have derivatives, then evolution for the points that it missed.
         neighbours: number of nearest vertices to which each vertex is joined.  None: as many of the earlier vertices as the task space
             has dimensions (Algorithm 4).
         longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.

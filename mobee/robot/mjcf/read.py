@@ -179,7 +179,7 @@ def _where(compiled: Compiled, skeleton: _Skeleton, name: str, motors: tuple[Mot
 
 
 def _warn(compiled: Compiled) -> None:
-    """Warn in one line each of what is held, left out or not closed."""
+    """Warn, in one line each, of joints that are held, elements that are left out and loops that are not closed."""
     names = compiled.names
     free = [names["joint"][k] for k, kind in enumerate(compiled.joint_kinds) if kind == "free"]
     balls = [names["joint"][k] for k, kind in enumerate(compiled.joint_kinds) if kind == "ball"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sentences of an agent's story: what it tries, what it expects, what happened, what it wants."""
+"""The sentences of an agent's story: its action, its expectation, the outcome, and its aim."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ WITHOUT_PLAN = {"random": "it chooses at random", "least_tried": "it chooses wha
 
 
 def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:
-    """Return what the agent tries now: "elbow +32°: its hand goes 12 cm up. 4th try from here."."""
+    """Return a description of the present action: "elbow +32°: its hand goes 12 cm up. 4th try from here."."""
     shift = "" if places is None else displacement(places[decision.goal] - places[decision.s], space.robot.name)
     return f"{action_words(space, decision.s, decision.goal)}{f': {shift}' if shift else ''}. {ordinal(decision.tries + 1)} try from here."
 
 
 def expects_sentence(decision: Decision) -> str:
-    """Return what the agent expects of the present action."""
+    """Return the outcome that the agent expects of the present action."""
     if decision.tries == 0:
         return f"It cannot know what will happen; it gives getting there {percent(decision.reached)}."
     if decision.expected == decision.goal:

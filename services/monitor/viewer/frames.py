@@ -37,7 +37,7 @@ class _Part:
         self.is_dirty = True
 
     def take(self) -> bytes:
-        """Return what was logged since the last call; empty if there was nothing."""
+        """Return the data logged since the last call; empty if there are none."""
         if not self.is_dirty:
             return b""
         self.is_dirty = False

@@ -30,7 +30,7 @@ TOGETHER = 12.0  # s for all
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A section of the motion: a description of what moves, and the poses (k, n) rad."""
+    """A section of the motion: a description of the moving motors, and the poses (k, n) rad."""
 
     title: str
     poses: Array
@@ -90,7 +90,7 @@ def view(
     """Show a motion on a page until the user interrupts, or save it to a file.
 
     `report` is called with the page's address when all data are logged.  `stretches`: of the motion, RATE poses a second; None: a sweep
-    through the ranges of all motors.  `solids`: show the solids in place of what the file draws.
+    through the ranges of all motors.  `solids`: show the solids in place of the file's visuals.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
