@@ -59,7 +59,7 @@ class Recording:
 
 
 class _Bounded:
-    """A file of which no single read is larger than a record may be: a damaged length must not take all memory."""
+    """A file that refuses reads larger than the largest record, since a damaged length must not make the reader use up the memory."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file

@@ -50,7 +50,7 @@ class Evidence:
     certain: bool = True
 
     def remark(self) -> Remark:
-        """Return a note that names the generation."""
+        """Return a note on the element, which names the generation of programs by whose rules the file is read."""
         return Remark(self.node, f"read as a file of {self.generation}, for {self.what}", severity="note")
 
 

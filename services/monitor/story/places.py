@@ -64,7 +64,7 @@ def base_link(robot: Robot, part: str) -> int:
 
 
 def places(space: Space, spot: Spot, q: Array) -> Array:
-    """Return the place of a spot in each state, (S, 3) m in the frame of the link that the part is mounted on.
+    """Return the position of `spot`, a point on a link, in each state: (S, 3) m, in the frame of the link on which the part is mounted.
 
     `q`: (n,) rad, posture of the other parts.
     """
