@@ -40,7 +40,10 @@ from mobee.learning.value_iteration import OutcomeModel
 
 @dataclass(frozen=True)
 class World:
-    """A lattice, its explorers and their transitions.  `tries`: of each action in each walk; 0: the true outcomes are a table."""
+    """A lattice, its explorers and their number of transitions.
+
+    `tries`: number of tries of each action in the walks that measure the true outcomes; 0 if a table gives them.
+    """
 
     text: str
     levels: tuple[float, ...]
