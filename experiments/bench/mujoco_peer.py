@@ -33,7 +33,7 @@ class MujocoPeer:
     def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None, precise: bool = False) -> None:
         """Build the MuJoCo model.
 
-        `servo`: gain of velocity servos on all joints, for `step`; there is no gravity then.  `precise`: iterative searches go on to
+        `servo`: gain of velocity servos on all joints, for `step`; there is no gravity then.  `precise`: iterative searches continue to
         the last digits, which takes longer than MuJoCo's defaults.
         """
         self._mujoco = load_mujoco()

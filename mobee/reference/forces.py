@@ -165,7 +165,7 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
     """Return 1; for a robot with a least lever, LEVER^2 / (|J|^2 + least_lever^2) times the contact's share in the depth between its links.
 
     J is the change of the depth when each motor moves by 1 rad (one that slides: by its `unit`). With this factor J^T pushes along the
-    smallest motion that undoes the contact, whatever its lever, and the contacts between two links push as one.
+    smallest motion that ends the contact, for any lever, and the contacts between two links push as one.
     """
     if robot.least_lever == 0.0:
         return 1.0

@@ -121,7 +121,7 @@ class Player:
 
     @contextmanager
     def armed(self, part: str) -> Iterator[None]:
-        """Take and arm a part; release it at the end, in whatever state it is."""
+        """Take and arm a part; release it at the end, in any state."""
         self.take(part)
         gate = self._armed_when_known(part)
         if gate != "armed":

@@ -61,7 +61,7 @@ def _scenario(setup: Setup, files: Files) -> str:
     services |= {who: {} for who in setup.eyes}
     services["monitor"] = {}
     tables = {"title": f"A curious {setup.name}", "shared": shared, "services": services}
-    return f"# Written by mobee: the agents go on with what they have learned offline, in {files.store.name}.\n{to_toml(tables)}"
+    return f"# Written by mobee: the agents continue from their offline transitions, in {files.store.name}.\n{to_toml(tables)}"
 
 
 def write_readme(setup: Setup, files: Files) -> None:

@@ -57,7 +57,7 @@ class _LogFile(logging.FileHandler):
 
 
 class _OneLine(logging.Formatter):
-    """Formats each entry as one line, whatever its text: clients write some of the texts, for example the reason of a stop."""
+    """Formats each entry as one line, for any text: clients write some of the texts, for example the reason of a stop."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:
         """Escape control characters; a traceback, which is added later, keeps its lines."""

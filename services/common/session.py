@@ -46,7 +46,7 @@ _NOT_HELD_UP: dict[str, object] = {
     "transport/link/tx/queue/size/real_time": 16,  # batches of 64 kB: for observers that get no processor for a moment
     "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
 }
-"""Settings of a router at which the services that depend on each other have a local endpoint: whoever connects by TCP only observes.
+"""Settings of a router at which the services that depend on each other have a local endpoint: clients that connect by TCP only observe.
 
 A router with one thread would wait in vain until a full queue has room, because the same thread empties it.
 """

@@ -33,7 +33,7 @@ class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
     distance: float  # m, at which hulls count as apart
     poses: int  # random legal ones, in all of which the hulls of a pair were apart
     seed: int
-    always: list[list[str]]  # listed whatever the poses say: hands and forearms against torso, head, other arm, table
+    always: list[list[str]]  # listed for all poses: hands and forearms against torso, head, other arm, table
     apart: list[list[str]]  # the others
 
     def links(self) -> set[frozenset[str]]:

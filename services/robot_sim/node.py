@@ -214,12 +214,12 @@ class Node:
         """Refuse a call of another service than the one that has paused the robot, while that one runs."""
         pause = self._pause
         if pause is not None and who != pause.by and self._service.alive.get(pause.by):
-            raise CallRefused("owned", f"{pause.by} has paused the robot, and only it can let it go on while it runs")
+            raise CallRefused("owned", f"{pause.by} has paused the robot, and only it can resume the robot while it runs")
 
     def _is_paused(self) -> bool:
         """Return whether time stands still; a pause that was forgotten ends by itself."""
         if self._pause is not None and time.monotonic() > self._pause.until:
-            self._bus.event("warning", "pause_over", f"the pause by {self._pause.by} lasted {MAX_PAUSE:g} s: the robot goes on")
+            self._bus.event("warning", "pause_over", f"the pause by {self._pause.by} lasted {MAX_PAUSE:g} s: the robot continues")
             self._end_pause()
         return self._pause is not None
 

@@ -128,7 +128,7 @@ def test_random_bytes_do_not_disturb_lockstep_and_every_agent_learns_on(tmp_path
         until(lambda: watcher.k > 0, 60.0, "tick 1")
         send_random_bytes(watcher)
         counts = {agent: len(transitions(system.run_dir)[agent]) for agent in AGENTS}
-        until(lambda: all(len(transitions(system.run_dir)[a]) > counts[a] for a in AGENTS), 60.0, "every agent goes on")
+        until(lambda: all(len(transitions(system.run_dir)[a]) > counts[a] for a in AGENTS), 60.0, "every agent continues")
         assert watcher.stat("robot_sim").numbers["flaws"] == 0.0
 
 

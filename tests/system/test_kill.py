@@ -94,7 +94,7 @@ def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:
     print(f"agent killed: its goal is dropped after {gone.k - k} ticks")
     assert np.allclose(gone.goal, gone.q, atol=np.deg2rad(1.5))  # q* is the measured q, of the same or the tick before
     end = gone.k + 15  # before its successor's start takes a core
-    until(lambda: watcher.k > end, 3.0, "the others to go on")
+    until(lambda: watcher.k > end, 3.0, "the others to continue")
     for part in ("torso", "right_arm"):
         assert all(m.status != "held" for m in watcher.motions[part] if k < m.k <= end)
     assert all(s.gate == "armed" for part in PARTS for s in watcher.states[part] if k < s.k <= end)

@@ -237,7 +237,7 @@ def figure(folder: Path) -> Path:
     through, around = _motion(_through_ball(), np.linspace(0.0, 1.0, STEPS), np.inf), _motion(kept["q"], kept["times"], solid)
     strips = [
         Strip(through, MARKER, (VIEW,), 6, "the ball is a ghost: the short path leads through it", lambda motion, moment: ""),
-        Strip(around, MARKER, (VIEW,), 6, f"solid after {solid:.1f} s, felt after {bump:.1f} s: the hand goes around it", caption),
+        Strip(around, MARKER, (VIEW,), 6, f"solid after {solid:.1f} s, contact after {bump:.1f} s: the hand goes around it", caption),
     ]
     return filmstrip(strips, folder / "replanning.png", height=260)
 

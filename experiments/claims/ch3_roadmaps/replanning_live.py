@@ -148,7 +148,7 @@ class Crosser:
         vertex = int(np.abs(space.samples - target[space.columns]).max(axis=1).argmin())
         outcome = hand.act(part, target)
         bump = -1 if hand.bump is None else hand.bump
-        self.motions.append(Acted(vertex, hand.asked, hand.commanded, bump, hand.felt, asked_for - self._ended))
+        self.motions.append(Acted(vertex, hand.asked, hand.commanded, bump, hand.evaluated, asked_for - self._ended))
         self._ended = time.process_time()
         return outcome
 
@@ -209,7 +209,7 @@ class ContactStopPlant(BusPlant):
         """Tick in which a command formed after the last request is first in force, -1: not yet."""
         self.on_forces: Callable[[int], None] = lambda k: None
         """Called with every tick whose forces have been received."""
-        self.felt = -1
+        self.evaluated = -1
         """The newest tick whose forces have been received."""
         self._watched = -1
         self._watcher = None if watcher is None else Participant(watcher)
@@ -245,7 +245,7 @@ class ContactStopPlant(BusPlant):
             if forces.t - self._last > MIN_GAP and self.bump is None:
                 self.bump = forces.re_k
             self._last = forces.t
-        self.felt = forces.re_k
+        self.evaluated = forces.re_k
         self.on_forces(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
@@ -258,6 +258,6 @@ class ContactStopPlant(BusPlant):
 
     def _answer(self) -> None:
         super()._answer()
-        if self._watcher is not None and self._watched >= 0 and (self._watched == 0 or self.felt >= self._watched):
+        if self._watcher is not None and self._watched >= 0 and (self._watched == 0 or self.evaluated >= self._watched):
             self._watcher.done(self._watched)
             self._watched = -1

@@ -81,7 +81,7 @@ def _part(name: str, arguments: argparse.Namespace, folder: Path) -> dict[str, A
             write(place / RESULTS, experiment.decided(experiment.method.run(options, place), own))
         drawn = _drawn(name, place)
         (place / _FAILURE).unlink(missing_ok=True)
-    except Exception as error:  # of the experiment's own code: it is reported, and the others go on
+    except Exception as error:  # of the experiment's own code: it is reported, and the others continue
         (place / _FAILURE).write_text(traceback.format_exc())
         reason = str(error) if isinstance(error, MobeeError) else f"{type(error).__name__}: {error}"
         return {"minutes": _spent(place, start), "failed": reason}

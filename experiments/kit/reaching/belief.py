@@ -108,11 +108,11 @@ class PeerBelief:
     def _touching(self, poses: Array, care: Care) -> Ints:
         """Return the indices of the poses (P, n) that touch something."""
         table = self._evaluate(poses, reaching=care == "grasping").table
-        felt = table.kind == 0
+        counted = table.kind == 0
         if care == "fields":  # the hand's may be in the target
             target = len(table.shapes) + table.objects.index(TARGET) if TARGET in table.objects else -1
-            felt |= (table.second != target) | ~self._exempt[table.first_link]
-        touching: Ints = table.pose[felt]
+            counted |= (table.second != target) | ~self._exempt[table.first_link]
+        touching: Ints = table.pose[counted]
         return touching
 
     def push(self, q: Array) -> Array:

@@ -38,7 +38,7 @@ def test_the_velocity_command_is_within_its_limits(wanted: float, sent: float) -
 @pytest.mark.parametrize(
     ("reference", "q", "velocity", "then"),
     [(0.1, 0.0, 1.0, 0.11), (0.4, 0.0, 1.0, 0.4), (0.4, 0.0, -1.0, 0.39), (-0.4, 0.0, -1.0, -0.4), (0.995, 0.9, 1.0, 1.0)],
-    ids=["goes on", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
+    ids=["continues", "waits for a blocked motor", "but comes back", "the same downwards", "ends at the limit"],
 )
 def test_the_position_reference(reference: float, q: float, velocity: float, then: float) -> None:
     law = OneLaw(max_lead=0.3, low=-1.0, high=1.0)

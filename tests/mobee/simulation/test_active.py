@@ -32,7 +32,7 @@ def test_a_stiffened_robot_has_the_forces_of_the_whole_one(name: str, active: tu
         assert len(stiff.joints) < len(robot.joints)
         whole, reduced = Model(robot, load_world("table")), Model(stiff, load_world("table"))
         rng = np.random.default_rng(0)
-        felt = 0.0
+        largest = 0.0
         for _ in range(100):
             q = np.where(alive, rng.uniform(*robot.limits.T), robot.home)
             one, other = whole.evaluate(q), reduced.evaluate(q)
@@ -42,8 +42,8 @@ def test_a_stiffened_robot_has_the_forces_of_the_whole_one(name: str, active: tu
                 )  # cylinders meet to 1e-8 m
             else:
                 assert other.projection[alive] == pytest.approx(one.projection[alive], rel=1e-6, abs=1e-7)  # cylinders meet to 1e-8 m
-            felt = max(felt, float(np.abs(one.projection[alive]).max()))
-        assert felt > 0.0
+            largest = max(largest, float(np.abs(one.projection[alive]).max()))
+        assert largest > 0.0
 
 
 def test_the_rest_of_the_robot_stands_still_and_is_read_without_noise() -> None:

@@ -139,7 +139,7 @@ def test_together_is_one_after_the_other_to_the_last_bit(threads: int, one_after
     for found, expected in zip(run_together(together, 60, threads), traces, strict=True):
         for name in ("encoders", "q", "velocity", "solid", "field"):
             assert np.array_equal(getattr(found, name), getattr(expected, name))
-    assert max(trace.field.max() for trace in traces) > 0.0, "something was felt"
+    assert max(trace.field.max() for trace in traces) > 0.0, "some field has a contact"
     for mine, theirs in zip(together, alone, strict=True):
         assert (mine.time, mine.acting) == (theirs.time, theirs.acting)
         assert np.array_equal(mine.motors.q, theirs.motors.q)
@@ -277,7 +277,7 @@ def test_a_function_that_raises_takes_nothing_from_the_others() -> None:
     assert together[0].time == pytest.approx(0.07)
     together[0].every(1, None)
     run_together(together, 10)
-    assert together[0].time == pytest.approx(0.17), "it can go on"
+    assert together[0].time == pytest.approx(0.17), "it can continue"
 
 
 @pytest.mark.parametrize("count", [1, 3])

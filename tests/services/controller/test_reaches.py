@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A reach draws a marker to its target and lets it go."""
+"""A reach pulls a marker to its target and then ends its force."""
 
 from __future__ import annotations
 
