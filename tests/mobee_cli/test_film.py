@@ -25,13 +25,13 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     robot = {"name": "arm", "parts": [{"name": "arm", "color": [255, 0, 0]}], "shapes": []}
     last = {"outcome": "It got there.", "surprise": "Surprise 0.69 nats.", "reached": True}
     card = {"part": "arm", "title": "arm", "now": "pan +10°. 1st try from here.", "n": 3, "tried": 0.2, "predictable": 0.1, "last": last}
-    told: list[tuple[float, str, Any]] = [(0.0, "robot", robot), (0.0, "cards", [card])]
-    told += [(0.0, "places", {"arm": {"link": 0, "marker": "tip", "points": [[-0.3, 0.0, 0.2], [-0.3, 0.1, 0.2]]}})]
-    told += [
+    logged: list[tuple[float, str, Any]] = [(0.0, "robot", robot), (0.0, "cards", [card])]
+    logged += [(0.0, "places", {"arm": {"link": 0, "marker": "tip", "points": [[-0.3, 0.0, 0.2], [-0.3, 0.1, 0.2]]}})]
+    logged += [
         (0.0, "curves", {"arm": [[0, 0.0, 0.0], [3, 0.2, 0.1]]}),
         (0.0, "baselines", {"arm": {"random": [[0, 0.0, 0.0], [3, 0.1, 0.0]]}}),
     ]
-    told += [(0.0, "left", {"arm": {"left": [1.0, 0.1], "here": 0, "path": [1], "untried": [1, 0], "actions": [1, 1]}})]
+    logged += [(0.0, "left", {"arm": {"left": [1.0, 0.1], "here": 0, "path": [1], "untried": [1, 0], "actions": [1, 1]}})]
     lines = [json.loads(line) for line in (folder / "story.jsonl").read_text().splitlines()]
     lines = [*logged, *(one for one in lines if one[1] == "q")]
     (folder / "story.jsonl").write_text("".join(json.dumps(one) + "\n" for one in lines))
