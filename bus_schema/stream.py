@@ -46,12 +46,9 @@ def chunk(name: str) -> str:
 class Stream:
     """The key and the delivery class of a message; the tables in docs/bus.md are written from these.
 
-    Attributes:
-        pattern: the key, with at most one variable in braces, such as "{part}/state".
-        delivery: its delivery class.
-        writers: who may write it; nobody else may (bus_schema/authority.py).
-        readers: who reads it, beside READERS_OF_ALL.
-        when: when it is written.
+    `pattern`: the key, with at most one variable in braces, such as "{part}/state".  `delivery`: its delivery class.  `writers`: the only
+    parties that may write it (bus_schema/authority.py).  `readers`: the parties that read it, beside READERS_OF_ALL.  `when`: when it is
+    written.
     """
 
     pattern: str

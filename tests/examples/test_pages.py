@@ -48,6 +48,7 @@ target = mobee.ReachTarget([-0.3, 0.2, 0.1])
 targets = [target]
 goal, poses = plant.measure("right_arm"), robot.home + np.zeros((3, 1))
 """,
+    "docs/vision.md": "",
     "docs/roadmaps.md": TABLE + "start, goals = robot.home, robot.home + 0.05 * np.eye(41)[robot.motor_index('r_elbow')]\n",
 }
 """Pages whose Python blocks run here, one after the other, and what the text presumes before the first."""
@@ -82,6 +83,13 @@ RUN_ELSEWHERE = {
     r"mobee launch reach": "tests/services/launcher/test_scenario.py",
     r"mobee launch kinematic --camera .*": "tests/services/launcher/test_scenario.py",
     r"mobee launch lockstep --ticks 3000": "tests/system/test_recorder.py",
+    r"mobee launch lockstep --page --runs runs": "tests/services/launcher/test_run.py",
+    r"mobee launch eyes": "tests/system/test_calibrate.py",
+    r"mobee calibrate .*": "tests/mobee_cli/test_calibrate.py",
+    r"mobee keys new": "tests/mobee_cli/test_keys.py",
+    r"mobee launch --secure.*": "tests/system/test_intruders.py",
+    r"mobee status": "tests/mobee_cli/test_status.py",
+    r"python -m services.vision --endpoint tls/robot:7447": "needs a second host; tests/system/test_intruders.py starts services with keys",
     r"mobee record --to FOLDER": "needs a system that was started without a launcher",
     r"mobee launch filtered": "tests/services/port_filter/test_process.py",
     r"mobee reach --target [-. 0-9]+": "tests/system/test_reach.py",

@@ -77,7 +77,7 @@ class Mistake:
 
 
 MISTAKES = (
-    Mistake("lanch", ("unknown verb 'lanch'. Did you mean 'launch'?", "Valid: play, launch, status")),
+    Mistake("lanch", ("unknown verb 'lanch'. Did you mean 'launch'?", "Valid: play, launch, keys, status")),
     Mistake("status --jsn", ("unrecognized arguments: --jsn", "see `mobee status --help`")),
     # names
     Mistake("check iccub", ("unknown robot or world 'iccub'. Did you mean 'icub'?",)),

@@ -25,6 +25,7 @@ EXTRAS = {"live", "sim", "viz", "reference", "planning", "parquet", "cluster", "
     "meshes",
     "mjcf",
     "track",
+    "vision",
 }
 
 
