@@ -6,6 +6,8 @@ The archives are part of the repository.  Anybody can compute all verdicts, inte
 
 from __future__ import annotations
 
+import io
+import lzma
 import tempfile
 import zipfile
 import zlib
@@ -59,8 +61,8 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
     path.parent.mkdir(exist_ok=True)
     with zipfile.ZipFile(unfinished, "w") as archive:
         for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(place)), file) for file in files)]:
-            method = zipfile.ZIP_STORED if source.suffix == ".npz" else zipfile.ZIP_DEFLATED
-            archive.writestr(zipfile.ZipInfo(member, _NO_TIME), source.read_bytes(), method)
+            content = _unpacked(source) if source.suffix == ".npz" else source.read_bytes()
+            archive.writestr(zipfile.ZipInfo(member, _NO_TIME), content, zipfile.ZIP_LZMA)
     if (size := unfinished.stat().st_size) > MAX_BYTES:
         unfinished.unlink()
         raise TooLarge(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: give its sweep a summary.")
@@ -69,6 +71,15 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
         raise InvalidValue(f"{path} exists: an experiment is confirmed once, with the first run of new seeds. {run} is another run.")
     unfinished.replace(path)
     return path
+
+
+def _unpacked(path: Path) -> bytes:
+    """Return a .npz file whose arrays are not compressed: the archive compresses them better."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(content, "w") as unpacked:
+        for name in source.namelist():
+            unpacked.writestr(zipfile.ZipInfo(name, _NO_TIME), source.read(name))
+    return content.getvalue()
 
 
 @contextmanager
@@ -84,6 +95,6 @@ def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
         try:
             with zipfile.ZipFile(path) as archive:
                 archive.extractall(folder)
-        except (zipfile.BadZipFile, zlib.error, OSError) as error:
+        except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, OSError) as error:
             raise InvalidValue(f"{path} is damaged ({error}): restore it with git, or write it anew.") from None
         yield Path(folder)
