@@ -41,7 +41,7 @@ from services.common.rpc import CallFailed
 from services.common.session import BusUnreachable, open_client
 from tests.system.live import Launch, Watcher, acting_as, running, until
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.untimed]
 ROBOT = load_robot("icub")
 MOTORS = len(ROBOT.motors)
 SERVICES = ("robot_sim", "model", "controller", "agent_left_arm", "recorder", "vision", "launcher")
