@@ -74,8 +74,9 @@ class Service(Listener):
                 and, in lockstep, handles them.
         """
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
-        signal.signal(signal.SIGTERM, _end)
-        signal.signal(signal.SIGINT, _end)
+        self._signalled = False
+        signal.signal(signal.SIGTERM, self._end)
+        signal.signal(signal.SIGINT, self._end)
         self.log = set_up_log(who)
         if config.mode == "lock":
             spare_threads()
@@ -211,8 +212,15 @@ class Service(Listener):
             spin(time.monotonic() + 1.0)
             self.check_router()
 
+    def _end(self, signum: int, frame: FrameType | None) -> None:
+        _ignore_signals()  # a second one must not interrupt the end
+        self._signalled = True
+        raise SystemExit(OK)
+
     def check_router(self) -> None:
-        """End the process after ten seconds without a router."""
+        """End the process after ten seconds without a router, and after a signal whose exception was lost, as in a finalizer."""
+        if self._signalled:
+            raise SystemExit(OK)
         if self._router in self.alive.get("router", ()):
             self._router_seen = time.monotonic()
         elif time.monotonic() - self._router_seen > ORPHANED:
@@ -328,11 +336,6 @@ def return_free_memory() -> None:
 
 
 def _leave() -> None:
-    raise SystemExit(OK)
-
-
-def _end(signum: int, frame: FrameType | None) -> None:
-    _ignore_signals()  # a second one must not interrupt the end
     raise SystemExit(OK)
 
 

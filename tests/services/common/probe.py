@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import itertools
+import os
+import signal
 import sys
 import time
+from contextlib import suppress
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, Forces, WorldObject
@@ -29,6 +32,7 @@ class Probe:
         service.on_request(keys.goal("*", "take"), Take, lambda request, _: self._take(request), part_of_key=True)
         service.on_request(keys.service_rpc(WHO, "fail"), Empty, self._fail)
         service.on_request(keys.service_rpc(WHO, "block"), Empty, self._block)
+        service.on_request(keys.service_rpc(WHO, "lose"), Empty, self._lose)
         service.on_each(WorldObject, lambda _: self._see(config.inject_test_delay))
         service.on_newest(Forces, lambda _: self._count("forces"), "model")
         service.on_clock(self._tick)
@@ -56,6 +60,12 @@ class Probe:
 
     def _block(self, request: Empty, key: str) -> Done:
         self.service.inbox.at(time.monotonic() + 0.05, self._ask_the_mute)
+        return Done(v=VERSION)
+
+    def _lose(self, request: Empty, key: str) -> Done:
+        with suppress(SystemExit):  # as Python does with what is raised in a finalizer
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(1.0)
         return Done(v=VERSION)
 
     def _ask_the_mute(self) -> None:

@@ -372,6 +372,12 @@ def test_two_signals_end_it_as_well_as_one(bus: Rig) -> None:
     assert timed_end(program) == 0
 
 
+def test_a_signal_whose_exception_is_lost_ends_it_too(bus: Rig) -> None:
+    program = another(bus)
+    bus.call(keys.service_rpc("probe", "lose"), Empty, Done)
+    assert timed_end(program) == 0
+
+
 def test_an_error_in_a_handler_is_counted_reported_and_logged_and_the_process_continues(tmp_path: Path, bus: Rig) -> None:
     with rig(tmp_path, bus.robot) as alone:
         program, events = another(alone), alone.record(Event, "probe")
