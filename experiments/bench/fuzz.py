@@ -62,11 +62,12 @@ def measure(settings: Settings) -> dict[str, Any]:
             while sent.total() < settings.messages:
                 batch += 1
                 sent += _send(system, settings.seed + _SENDERS * batch, min(_BATCH * _SENDERS, settings.messages - sent.total()))
-                rows.append({who: stat.health["memory_mb"] for who, stat in _stats(session).items()})
+                rows.append(_memory(_stats(session)))
                 progress.show(min(1.0, sent.total() / settings.messages), f"{sent.total()} sent")
             took, after = time.monotonic() - begun, _stats(session)
             learned = _learns_again(system, session)
-    grown = {who: after[who].health["memory_mb"] - before[who].health["memory_mb"] for who in WATCHED}  # type: ignore[operator]  # measured on Linux
+    kept, first = _memory(after), _memory(before)
+    grown = {who: kept[who] - first[who] for who in WATCHED}
     ended = [who for who in WATCHED if after[who].pid != before[who].pid]
     return {
         "sent": dict(sent),
@@ -98,6 +99,14 @@ def _send(system: System, seed: int, count: int) -> Counter[str]:
 def _stats(session: Any) -> dict[str, Stat]:
     """Return the status of all processes; raises LaunchFailed if one does not answer."""
     return {who: wait_for(partial(stat_of, session, who, 2.0), _PATIENCE, f"{who} answers") for who in WATCHED}
+
+
+def _memory(stats: dict[str, Stat]) -> dict[str, float]:
+    """Return the memory of each process [MB]; raises LaunchFailed where the system does not report it."""
+    memory = {who: stat.health.get("memory_mb") for who, stat in stats.items()}
+    if unknown := [who for who, value in memory.items() if value is None]:
+        raise LaunchFailed(f"{', '.join(unknown)}: the memory is not known; this system does not report it")
+    return {who: float(value) for who, value in memory.items() if value is not None}
 
 
 def _learns_again(system: System, session: Any) -> list[str]:

@@ -153,6 +153,7 @@ def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
         raise MobeeError(f"{place}: there is no such file. `mobee roadmap build` makes maps.") from None
     except OSError as error:
         raise MobeeError(f"{place}: the map cannot be read ({error.strerror or error}).") from error
+    # NotImplementedError: zipfile's for a compression that it does not know, as damaged bytes may name.
     except (ValueError, KeyError, AttributeError, TypeError, EOFError, RecursionError, zipfile.BadZipFile, NotImplementedError) as error:
         raise MobeeError(
             f"{place}: no roadmap, or only a part of one ({_line(error)}). Give another file, or remove it and build it anew."

@@ -89,6 +89,15 @@ class Secured:
         return alive(self.watcher.session)[who][0]
 
 
+def authority_of(secured: Secured, folder: Path) -> Path:
+    """Copy the certificate and the key of the system's authority into a new folder, and return it."""
+    folder.mkdir(mode=0o700)
+    for name in ("ca.crt", "ca.key"):
+        (folder / name).write_bytes((secured.keys / name).read_bytes())
+        (folder / name).chmod(0o600)
+    return folder
+
+
 @pytest.fixture(scope="module")
 def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
     folder = tmp_path_factory.mktemp("intruders")
@@ -142,24 +151,16 @@ def test_a_process_with_the_certificate_of_another_authority_does_not_get_in(sec
 
 
 def test_a_process_with_an_expired_certificate_does_not_get_in(secured: Secured, tmp_path: Path) -> None:
-    old = tmp_path / "keys"
-    old.mkdir(mode=0o700)
-    for name in ("ca.crt", "ca.key"):
-        (old / name).write_bytes((secured.keys / name).read_bytes())
-        (old / name).chmod(0o600)
+    old = authority_of(secured, tmp_path / "keys")
     KeyFolder(old).add([("controller", "controller")], days=0)
-    time.sleep(1.0)
+    time.sleep(1.0)  # certificates count whole seconds: it expires in this one
     with acting_as(Identity(old, "controller")), pytest.raises(BusUnreachable):
         open_client(secured.system.endpoint, patience=0.0)
     secured.is_reported("a connection was refused: invalid peer certificate: certificate expired")
 
 
 def test_an_identity_that_the_launcher_does_not_know_may_do_nothing(secured: Secured, tmp_path: Path) -> None:
-    later = tmp_path / "keys"
-    later.mkdir(mode=0o700)
-    for name in ("ca.crt", "ca.key"):
-        (later / name).write_bytes((secured.keys / name).read_bytes())
-        (later / name).chmod(0o600)
+    later = authority_of(secured, tmp_path / "keys")
     KeyFolder(later).add([("stranger", "operator")])
     with secured.session_of("stranger", later) as session:
         assert alive(session) == {}

@@ -20,7 +20,7 @@ outcomes; a generalised likelihood ratio of two windows; or the posterior over r
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any
 
@@ -320,26 +320,20 @@ def _unchanged(runs: Runs) -> Measured:
     return text, equivalent(ours, without, MARGIN * float(without.mean()))
 
 
+def _of_each_change(text: str, published: str, rule: Callable[[str, Runs], Measured]) -> list[Claim]:
+    """Return a claim about the learner with a detector after each change of the world."""
+    changes = {change: name for change, name in CHANGES.items() if change != "nothing"}
+    return [
+        Claim(OUR_AIM, f"{name}: 60 problem-tries later, {text}", published, rule=partial(rule, change)) for change, name in changes.items()
+    ]
+
+
 CLAIMS = (
-    *(
-        Claim(
-            OUR_AIM,
-            f"{text}: 60 problem-tries later, the learner with a detector has at least {BACK:.2f} of the score of the new world's oracle",
-            f"at least {BACK:.2f}",
-            rule=partial(_back, change),
-        )
-        for change, text in CHANGES.items()
-        if change != "nothing"
+    *_of_each_change(
+        f"the learner with a detector has at least {BACK:.2f} of the score of the new world's oracle", f"at least {BACK:.2f}", _back
     ),
-    *(
-        Claim(
-            OUR_AIM,
-            f"{text}: 60 problem-tries later, at most {MAX_FAILURES:.0f} transitions fail in an evaluation of the learner with a detector",
-            f"at most {MAX_FAILURES:.0f}",
-            rule=partial(_few, change),
-        )
-        for change, text in CHANGES.items()
-        if change != "nothing"
+    *_of_each_change(
+        f"at most {MAX_FAILURES:.0f} transitions fail in an evaluation of the learner with a detector", f"at most {MAX_FAILURES:.0f}", _few
     ),
     Claim(
         OUR_AIM,
