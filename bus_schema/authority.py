@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from bus_schema.messages import Message
 from bus_schema.page import streams
@@ -41,6 +42,24 @@ def party_of(name: str) -> Party:
     if name.startswith(AGENT):
         return "agent"
     return next((party for party in EVERYONE if party == name and party != "agent"), "client")
+
+
+@lru_cache(1024)
+def may_call(who: str, key: str) -> bool:
+    """Return whether the table lists the caller `who` for `key`, a key of the contract.
+
+    Programs that are no service choose their names themselves, and an agent its parts: only the router of a secured system, which knows the
+    identity of each, restricts these.
+    """
+    party = party_of(who)
+    allowed = _expressions(_patterns("callers", party), ("*",), "*")
+    return party in ("client", "operator", *_PROGRAMS) or any(_matches(expression, key) for expression in allowed)
+
+
+def _matches(expression: str, key: str) -> bool:
+    """Return whether a key expression, in which * stands for one chunk, matches `key`."""
+    expected, chunks = expression.split("/"), key.split("/")
+    return len(expected) == len(chunks) and all(one in ("*", chunk) for one, chunk in zip(expected, chunks, strict=True))
 
 
 def rights_of(name: str, party: Party) -> Rights:

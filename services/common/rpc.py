@@ -13,6 +13,7 @@ from msgspec import Struct
 from zenoh.handlers import Callback
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
+from bus_schema.authority import may_call
 from bus_schema.messages import Served
 from bus_schema.rpc import Empty, Failure, Reply, Request
 from mobee.errors import MobeeError
@@ -177,6 +178,8 @@ class Answering:
         if query.payload is None or query.encoding is None:
             raise Refused("decode", f"{cls.__name__}: the request is empty")
         request = decode(cls, query.payload.to_bytes(), str(query.encoding), part=size, robot=self.bus.robot_size)
+        if not may_call(request.who, key):
+            raise CallRefused("caller", f"{request.who} may not call {key}; docs/bus.md lists who may")
         call = (key, request.id)
         if call not in self._replies:
             reply = handler(request, key)

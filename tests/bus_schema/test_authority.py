@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from bus_schema.authority import party_of, rights_of
+from bus_schema.authority import may_call, party_of, rights_of
 from bus_schema.stream import EVERYONE, Party
 
 
@@ -48,3 +48,18 @@ def test_an_observer_changes_nothing() -> None:
     rights = rights_of("observer", "observer")
     assert {key.split("/")[0] for key in rights.writes} == {"estop", "event", "served"}
     assert set(rights.calls) == {"*/rpc/stat", "*/rpc/config", "*/meta", "model/rpc/world/list", "model/rpc/jacobian"}
+
+
+@pytest.mark.parametrize(
+    ("who", "key", "may"),
+    [
+        ("model", "sim/rpc/pause", False),
+        ("monitor", "sim/rpc/pause", True),
+        ("my_tool", "sim/rpc/pause", True),
+        ("agent_torso", "torso/rpc/goal", True),
+        ("agent_torso", "torso/rpc/drive/take", False),
+        ("vision", "model/rpc/stat", True),
+    ],
+)
+def test_a_service_calls_only_what_the_table_lists_for_it(who: str, key: str, may: bool) -> None:
+    assert may_call(who, key) is may
