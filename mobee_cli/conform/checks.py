@@ -52,8 +52,8 @@ def service(player: Player, part: str) -> None:
     stat = player.stat()
     if stat.who != "robot_sim" or not stat.ready:
         raise Broken(f"stat says who {stat.who!r}, ready {stat.ready}: expected 'robot_sim', True")
-    player.call(keys.service_rpc("robot_sim", "config"), Empty, Config)
-    player.call(keys.service_rpc("robot_sim", "pulse"), Empty, Pulse)
+    player.call_as_operator(keys.service_rpc("robot_sim", "config"), Empty, Config)
+    player.call_as_operator(keys.service_rpc("robot_sim", "pulse"), Empty, Pulse)
 
 
 def parts(player: Player, part: str) -> None:
@@ -225,7 +225,7 @@ def emergency_stop(player: Player, part: str) -> None:
             if _accepted(lambda: player.drive(part, "arm")):
                 raise Broken("a part can be armed during an emergency stop")
         finally:
-            player.call(keys.ESTOP_RESET, Empty, Done)
+            player.call_as_operator(keys.ESTOP_RESET, Empty, Done)
         if not player.until(lambda: player.status(part).gate in ("hold", "idle"), ANSWER):
             raise Broken(f"after {keys.ESTOP_RESET} the gate is {player.status(part).gate!r}, expected 'hold'")
 

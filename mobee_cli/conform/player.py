@@ -16,6 +16,7 @@ from bus_schema.messages import Clock, Commands, EStop, Message, Mode, Order, Pa
 from bus_schema.rpc import Driven, Empty, Reply, Request, Stat, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
+from services.common import rpc
 from services.common.observe import Received, listen
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -25,6 +26,9 @@ TTL = 200  # ms, of a command
 
 _M = TypeVar("_M", bound=Message)
 _R = TypeVar("_R", bound=Reply)
+
+
+OPERATOR = "mobee_conform"
 
 
 class Broken(Exception):
@@ -101,8 +105,12 @@ class Player:
     # Calls
 
     def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
-        """Call the robot; raises rpc.CallFailed."""
+        """Call the robot as its controller; raises rpc.CallFailed."""
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
+
+    def call_as_operator(self, key: str, request: type[Request], reply: type[_R]) -> _R:
+        """Call the robot as a person does, what a controller may not call; raises rpc.CallFailed."""
+        return rpc.call(self.service.bus.session, OPERATOR, key, request, reply, timeout=ANSWER)
 
     def stat(self) -> Stat:
         """Return the status of robot_sim."""
