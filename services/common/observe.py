@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 import zenoh
+from zenoh.handlers import Callback
 
 from bus_schema import UNDECODABLE, keys, type_of
 from bus_schema.rpc import Stat
@@ -39,7 +40,7 @@ class Received:
 
 
 def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None]) -> None:
-    """Handle every message on a key expression, on a thread of Zenoh, until the session is closed.
+    """Handle every message on a key expression, on a thread of Zenoh, until the session is closed; `handle` must not wait.
 
     Raises ValueError if the key expression is not valid.
     """
@@ -48,7 +49,8 @@ def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None])
         handle(Received(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), time.monotonic()))
 
     try:
-        session.declare_subscriber(zenoh.KeyExpr(key), enqueue)
+        # Not by a thread of Python, which would still handle waiting messages while the interpreter ends, and crash it.
+        session.declare_subscriber(zenoh.KeyExpr(key), Callback(enqueue, indirect=False))
     except zenoh.ZError as error:
         raise ValueError(str(error).partition(" at /")[0]) from None
 
