@@ -92,7 +92,7 @@ def _send(system: System, seed: int, count: int) -> Counter[str]:
     ]
     outputs = [sender.communicate()[0] for sender in senders]
     if any(sender.returncode for sender in senders):
-        raise LaunchFailed("a process that sends has ended with an error")
+        raise LaunchFailed(f"a process that sends has ended with code {[s.returncode for s in senders]}")
     return sum((Counter(json.loads(output)) for output in outputs), Counter[str]())
 
 
@@ -117,7 +117,7 @@ def _learns_again(system: System, session: Any) -> list[str]:
             for key in (keys.ESTOP_RESET, keys.sim("resume")):
                 rpc.call(session, "bench", key, Empty, Done, timeout=1.0)
             for part in AGENTS:
-                rpc.call(session, "bench", keys.service_rpc(f"agent_{part}", "go_on"), Empty, Done, timeout=1.0)
+                rpc.call(session, "bench", keys.service_rpc(f"agent_{part}", "resume"), Empty, Done, timeout=1.0)
         except rpc.CallFailed:
             return False
         return True

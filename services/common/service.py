@@ -241,6 +241,8 @@ class Service(Listener):
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         instances = self.alive.setdefault(who, set())
         (instances.add if up else instances.discard)(instance)
+        if not up:
+            self._strays.discard(instance)
         if who == "router" and up:
             self._join(instance)
         for handler in self._on_alive:

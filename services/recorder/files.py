@@ -14,6 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 FILES = 8  # of which a full recording consists
 _NAME = re.compile(r"messages-(\d{4,})\.mcap$")
+MOST_CHANNELS = 5000  # of a file: the format numbers 65 535, and every chunk has an index of each
 _CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
 
 
@@ -59,18 +60,24 @@ class Files:
         if self._file is None:
             self._begin()
         number = self._channels.get(channel)
+        if number is None and len(self._channels) >= MOST_CHANNELS:
+            self._end_part()
+            self._begin()
         if number is None:
             number = self._channels[channel] = self._register(channel)
         self._writer.add_message(number, received, data, published, sequence)
 
     def flush(self) -> None:
-        """Give everything to the operating system, so that it survives a kill of this process; begin a new file if this one is large."""
+        """Give everything to the operating system, so that it survives a kill of this process; end this one if it is large."""
         if self._file is None:
             return
         self._writer.flush()  # type: ignore[no-untyped-call]  # the package lacks the annotation
         if self._file.tell() > self._largest / FILES:
-            self.close()
-            self._remove_oldest()
+            self._end_part()
+
+    def _end_part(self) -> None:
+        self.close()
+        self._remove_oldest()
 
     def close(self) -> None:
         """End the file with its index."""

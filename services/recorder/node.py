@@ -17,7 +17,7 @@ from bus_schema import UNDECODABLE, encoding_of
 from bus_schema.messages import Camera, Clock, Contacts, Count, Image, Message, Pose, State
 from bus_schema.page import streams
 from mobee.robot.robot import Robot
-from services.common.service import Service
+from services.common.service import Service, return_free_memory
 from services.common.tap import Raw, Tap
 from services.recorder.config import Config
 from services.recorder.files import Channel, Files
@@ -27,6 +27,8 @@ PERIOD = 0.25  # s between two checks for new messages; the time of the check is
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
 CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
+KNOWN = 5000  # keys and senders that are remembered; a sender may invent more
+TRIM_PERIOD = 10.0  # s between two returns of free memory: a flood of messages leaves 100 MB of it
 NICENESS = 10
 ALIVE, JSON = "alive", "json"  # key and encoding of the liveliness tokens, which are no messages on the bus
 MOST_LOST = 2**53  # messages; a forged number may be any
@@ -80,6 +82,7 @@ class RecorderNode:
         self._mark()
         service.on_alive(self._note_token)
         self._repeat()
+        self._trim()
 
     def lower_priority(self) -> None:
         """Let the main thread yield the processor to all services; called when the start, on which they wait, is over.
@@ -103,6 +106,10 @@ class RecorderNode:
     def _repeat(self) -> None:
         self._record_arrived()
         self._service.inbox.at(time.monotonic() + PERIOD, self._repeat)
+
+    def _trim(self) -> None:
+        return_free_memory()
+        self._service.inbox.at(time.monotonic() + TRIM_PERIOD, self._trim)
 
     def _record_arrived(self) -> None:
         arrived, now = self._tap.drain(), time.monotonic()
@@ -144,7 +151,12 @@ class RecorderNode:
             sequence = self._number_of(message) if kind else 0
             write(channel, message.payload, message.received, message.published, sequence)
             if kind:
-                for copy, data in views.of(message, kind):
+                try:
+                    copies = list(views.of(message, kind))
+                except Exception as error:  # as in Bus.guarded: no message may end the recording of the others
+                    self._service.bus.report_defect(f"{message.key}, for a copy that viewers show,", error)
+                    continue
+                for copy, data in copies:
                     write(copy, data, message.received, message.published, sequence)
         self._messages += len(arrived)
 
@@ -155,6 +167,8 @@ class RecorderNode:
             return 0
         src, seq = sender
         stream = message.key, src
+        if len(self._last) >= KNOWN:
+            self._last.clear()
         last, self._last[stream] = self._last.get(stream, -1), seq
         if 0 <= last < seq - 1:
             self._lost = min(self._lost + seq - 1 - last, MOST_LOST)
@@ -162,6 +176,8 @@ class RecorderNode:
 
     def _new_channel(self, message: Raw) -> tuple[Channel, str]:
         """Return the channel of a key and an encoding, and the type of its messages; "" if the contract has none of this encoding."""
+        if len(self._channels) >= KNOWN:
+            self._channels.clear()
         kind = self._kinds.get(message.encoding, "")
         encoding = "msgpack" if message.encoding.startswith("application/msgpack") else message.encoding
         found = self._channels[message.key, message.encoding] = Channel(message.key, encoding, message.encoding), kind

@@ -42,6 +42,7 @@ float64 z
 float64 w
 {_HEADER}"""
 ROOT_FRAME = "root_frame"
+END_OF_TIME = 2**31 * 1_000_000_000  # ns; the seconds of a stamp are an int32
 
 
 class _Layout:
@@ -89,7 +90,7 @@ class JointStates:
         self._data = layout.data
 
     def encode(self, t: int, q: Array) -> bytes:
-        """Return the message at time t [ns of the robot]; q (n,) rad."""
+        """Return the message at time t < END_OF_TIME [ns of the robot]; q (n,) rad."""
         struct.pack_into("<iI", self._data, self._stamp, *divmod(t, 1_000_000_000))
         self._data[self._positions : self._positions + 8 * len(q)] = q.astype("<f8").tobytes()
         return bytes(self._data)
@@ -112,7 +113,7 @@ class Transforms:
         self._data = np.frombuffer(layout.data, dtype=np.uint8)
 
     def encode(self, t: int, positions: Array, quaternions: Array) -> bytes:
-        """Return the message at time t [ns of the robot]; positions (L, 3) m, quaternions (L, 4) wxyz."""
+        """Return the message at time t < END_OF_TIME [ns of the robot]; positions (L, 3) m, quaternions (L, 4) wxyz."""
         rows = np.column_stack([positions, quaternions[:, [1, 2, 3, 0]]]).astype("<f8")
         self._data[self._stamps] = np.frombuffer(struct.pack("<iI", *divmod(t, 1_000_000_000)), dtype=np.uint8)
         self._data[self._poses] = rows.view(np.uint8)

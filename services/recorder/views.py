@@ -54,7 +54,7 @@ class Views:
 
     def _of_tick(self, tick: Tick) -> Iterator[Copy]:
         q = np.array(tick.q)
-        if len(q) != len(self._robot.motors) or not np.isfinite(q).all():
+        if len(q) != len(self._robot.motors) or not np.isfinite(q).all() or tick.t >= ros.END_OF_TIME:
             return
         yield _JOINTS, self._joints.encode(tick.t, q)
         poses = self._model.evaluate(q).transforms

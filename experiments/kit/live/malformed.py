@@ -64,6 +64,7 @@ NAMES = (
     "left_arm",
     "right_arm",
 )
+INSTANCES = 100  # among which tokens are drawn: Zenoh keeps a kilobyte of every key that was ever declared (zenoh#1518)
 ODD_NAMES = ("", "*", "**", "a/b", "../..", "\x00", "ü", "x" * 64, "x" * 65, "x" * 5000, "$", "@", "-1", "None")
 LENGTHS = (0, 1, 3, 4, 6, 7, 9, 16, 41, 1000)
 INTEGERS = (0, 1, -1, 2**31, 2**53, 2**62, 2**63 - 1, -(2**63), 2**64 - 1)
@@ -108,7 +109,7 @@ class Drawer:
     def token(self) -> str:
         """Draw the key of a liveliness token."""
         who = self._random.choice((*SERVICES, "router", "stranger"))
-        return keys.alive(who, f"i{self._random.randrange(10**6)}")
+        return keys.alive(who, f"i{self._random.randrange(INSTANCES)}")
 
     def _drawn(self, key: str, cls: type[Struct], size: int, call: bool, valid: bool = True) -> Drawn:
         fields = self._fields(_struct(cls), size)

@@ -12,7 +12,7 @@ from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 
 from mobee.errors import MobeeError
-from services.recorder.files import FILES, Channel, Files, parts_of
+from services.recorder.files import FILES, MOST_CHANNELS, Channel, Files, parts_of
 from services.recorder.reader import LARGEST_RECORD, Recording
 from tests.services.recorder.recordings import Writer, message
 
@@ -124,3 +124,13 @@ def test_a_folder_without_a_recording_is_refused_in_one_sentence(tmp_path: Path)
         Recording(tmp_path)
     with pytest.raises(MobeeError, match="cannot be read"):
         Recording(tmp_path / "none.mcap")
+
+
+def test_keys_without_number_begin_new_files_and_lose_nothing(tmp_path: Path) -> None:
+    files = Files(tmp_path, 10**9, {})
+    names = [f"event/x{n}" for n in range(2 * MOST_CHANNELS + 10)]
+    for n, name in enumerate(names):
+        files.write(Channel(name, "json", "json"), b"{}", n, n)
+    files.close()
+    assert [one.key for one in Recording(tmp_path)] == names
+    assert files.begun == 3

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -17,6 +18,7 @@ from mobee import Model, load_robot
 from mobee.arrays import Array
 from mobee.model.kinematics import matrix_from_quaternion
 from services.common.tap import Raw
+from services.recorder import ros
 from services.recorder.files import Files
 from services.recorder.views import Copy, Views
 
@@ -89,3 +91,9 @@ def test_streams_are_copied_at_a_bounded_rate_and_events_always() -> None:
 @pytest.mark.parametrize("payload", [b"", b"\x00", b"\xc1", b"\x81" * 5000, encode(tick_at(ROBOT.home))[:-7]])
 def test_a_message_that_cannot_be_decoded_has_no_copy(payload: bytes) -> None:
     assert copies(Raw("tick", encoding_of(Tick), payload, 0, 0)) == []
+
+
+def test_a_tick_at_a_time_that_ros_cannot_state_has_no_ros_messages() -> None:
+    tick, cdr = tick_at(ROBOT.home), {"/joint_states", "/tf"}
+    for t, topics in ((ros.END_OF_TIME - 1, {*cdr, "json/tick"}), (ros.END_OF_TIME, {"json/tick"}), (2**62, {"json/tick"})):
+        assert {channel.topic for channel, _ in copies(raw(msgspec.structs.replace(tick, t=t), "tick"))} == topics
