@@ -50,7 +50,7 @@ def world_rpc(verb: str) -> str:
 
 
 def service_rpc(who: str, verb: str) -> str:
-    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown; of an agent rest, go_on or explore."""
+    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown; of an agent rest, resume or explore."""
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 
 

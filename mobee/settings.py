@@ -50,7 +50,7 @@ class Settings:
     type takes a name, `module:name`, or the object itself, see `named`.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     def __post_init__(self) -> None:

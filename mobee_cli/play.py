@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(json.dumps(numbers | {"store": str(files.store), "scenario": str(files.scenario)}, indent=2))
         say(f"mobee launch {files.scenario} continues live.")
         return 0
-    say(f"Goes on live: mobee launch {files.scenario}")
+    say(f"Continues live: mobee launch {files.scenario}")
     return _live(arguments, files)
 
 

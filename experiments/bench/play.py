@@ -38,7 +38,7 @@ WITHOUT_DRAWING = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-firs
 TRIES = "Boolean(document.querySelector('.card .now'))"
 STEPS = {  # by what the command prints
     "derived": r"learns|torso, left_arm and right_arm learn",
-    "learned offline": r"Goes on live",
+    "learned offline": r"Continues live",
     "page served": r"monitor is ready after .*: http://",
     "all services ready": r"all ready after",
 }

@@ -125,7 +125,7 @@ class CuriousAgent(CuriousLearner):
             touched=outcome.touched,
         )
         if self.store is None:
-            self._go_on(transition)
+            self._continue(transition)
         else:
             self.store.append(transition)
             self._learn(transition)

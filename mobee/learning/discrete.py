@@ -31,7 +31,7 @@ class DiscreteSpace(Space):
         name: of the robot's only part.
 
     Raises:
-        InvalidValue: with what is valid.
+        InvalidValue: an argument is out of its range; the message states the valid one.
     """
 
     def __init__(self, states: int, actions: int, goals: ArrayLike | None = None, name: str = "environment") -> None:

@@ -189,9 +189,9 @@ class CuriousLearner:
 
     def _learn(self, transition: Transition) -> None:
         self.model.observe(transition.s, transition.a, transition.s_next)
-        self._go_on(transition)
+        self._continue(transition)
 
-    def _go_on(self, transition: Transition) -> None:
+    def _continue(self, transition: Transition) -> None:
         """Update the learner for a transition that the model has already observed."""
         self.transitions, self.last = transition.n, transition
         self._plans.keep()

@@ -35,7 +35,7 @@ class Space:
         rest: fraction of its range at which each other motor of the part stays; or one for each motor of the part.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     def __init__(

@@ -152,7 +152,7 @@ class TransitionModel(Tabled):
         detector: of changed outcomes, "none" or "run_length", by which the real counts are those since the last change, see `OutcomeRuns`.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     def __init__(

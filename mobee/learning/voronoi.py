@@ -31,7 +31,7 @@ class Voronoi(Space):
         rest: fraction of its range at which each other motor of the part stays.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     def __init__(

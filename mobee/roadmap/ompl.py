@@ -241,7 +241,7 @@ def rrt_connect(
         Poses (K, n) rad from the start to a goal, or None: no path was found.
 
     Raises:
-        OmplMissing, InvalidValue, UnknownName: with what is valid, and what to do.
+        OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
     """
     free, first = _free(model, motors, start, step)
     ends = np.atleast_2d(_poses(model, goals))[:, free.columns]
@@ -270,7 +270,7 @@ def prm(
         step: as in `rrt_connect`.
 
     Raises:
-        OmplMissing, InvalidValue, UnknownName: with what is valid, and what to do.
+        OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
     """
     return _grown("PRM", model, motors, milestones, neighbours, rest, seed, step)
 

@@ -218,7 +218,7 @@ def play(
         seed: of the encoders' noise.
 
     Raises:
-        InvalidValue: with what is valid.
+        InvalidValue: an argument is out of its range; the message states the valid one.
     """
     given, robot = _within(model.robot, path), model.robot
     law = Gains.default() if gains is None else gains

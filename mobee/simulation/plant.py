@@ -91,7 +91,7 @@ class OfflinePlant:
         **changes: fields of `PlantSettings` by keyword, in place of those in `settings`.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     @accepts(PlantSettings)

@@ -3,6 +3,6 @@
 
 Reads: clock, {part}/motion, {part}/reach.
 Writes: agents/{part}/{transition,learned}.
-Answers: agent_{part}/rpc/{rest,go_on,explore}.
+Answers: agent_{part}/rpc/{rest,resume,explore}.
 Calls: {part}/rpc/{take,goal,reach} of the controller, model/rpc/world/{add,remove}.
 """

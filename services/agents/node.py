@@ -32,14 +32,14 @@ from services.common.service import CallRefused, Service
 class Work:
     """The main loop of an agent's process; counts the interruptions of the measurement under way.
 
-    On request the agent rests: it gives its goal away, so that another client can move its part, until it is asked to go on.
+    On request the agent rests: it gives its goal away, so that another client can move its part, until it is asked to continue.
     """
 
     def __init__(self, service: Service, plant: BusPlant, part: str) -> None:
         self._service, self._plant, self._part = service, plant, part
         self.interrupted = 0
         service.on_request(keys.service_rpc(service.who, "rest"), Empty, self._rest)
-        service.on_request(keys.service_rpc(service.who, "go_on"), Empty, self._go_on)
+        service.on_request(keys.service_rpc(service.who, "resume"), Empty, self._resume)
 
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
         """Run steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, else empty."""
@@ -64,8 +64,8 @@ class Work:
         self._service.bus.event("info", "rests", f"{self._part}: its agent rests, as {request.who} asked")
         return Done(v=VERSION)
 
-    def _go_on(self, request: Empty, key: str) -> Done:
-        self._plant.go_on()
+    def _resume(self, request: Empty, key: str) -> Done:
+        self._plant.resume()
         return Done(v=VERSION)
 
 

@@ -65,11 +65,11 @@ class BusFollower(BusPlant):
             self._wait(lambda: self._has(parts))
 
     def follow(
-        self, parts: Sequence[str], attractors: Sequence[Array], period: float, tell: Callable[[float], None] = lambda share: None
+        self, parts: Sequence[str], attractors: Sequence[Array], period: float, progress: Callable[[float], None] = lambda share: None
     ) -> dict[str, Outcome]:
         """Set the attractors of taken parts to one row (n,) rad of `attractors` per period [s of the robot's clock]; wait until all rest.
 
-        A row that is too late is left out, except the last.  `tell` is called with the share of the rows that is over.
+        A row that is too late is left out, except the last.  `progress` is called with the share of the rows that is over.
 
         Raises ActionInterrupted if a part is in hold or was taken by another service, or if the robot's clock stands still; call `let_go`
         afterwards.
@@ -84,7 +84,7 @@ class BusFollower(BusPlant):
                 where = self.robot.part(part).slice
                 if before is None or row == last or not np.array_equal(here[where], before[where]):
                     asked[part] = self._aim(part, here[where])
-            tell(row / max(1, last))
+            progress(row / max(1, last))
             if row == last:
                 break
             self._until(parts, run, self._reached(begun + (row + 1) * period), CLOCK_TIMEOUT, "the robot's clock stands still")

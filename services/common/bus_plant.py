@@ -257,14 +257,14 @@ class BusPlant:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
 
     def rest(self) -> None:
-        """Release all goals at once and take none until `go_on`; an action under way raises ActionInterrupted."""
+        """Release all goals at once and take none until `resume`; an action under way raises ActionInterrupted."""
         self._is_resting = True
         self._wanted.clear()
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller
                 self.release(part)
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """End the rest."""
         self._is_resting = False
 
@@ -289,13 +289,13 @@ class BusPlant:
     def _wait(self, enough: Callable[[], bool]) -> None:
         """Run handlers for a while, or until `enough` returns True; answer the tick before waiting."""
 
-        def may_go_on() -> bool:
+        def may_continue() -> bool:
             if enough():
                 return True
             self._answer()
             return False
 
-        self._service.spin(time.monotonic() + RETRY_PERIOD, may_go_on)
+        self._service.spin(time.monotonic() + RETRY_PERIOD, may_continue)
 
     def _answer(self) -> None:
         """Answer the tick that waits for this service; tick 0, which is repeated, only after all goals were taken."""

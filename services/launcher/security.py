@@ -15,7 +15,7 @@ from services.launcher.scenario import Scenario
 
 LAUNCHER = "launcher"
 _PERIOD = 0.2  # s between two checks for refusals
-_SAY_AGAIN = 10.0  # s after which a refusal that goes on is reported again
+_SAY_AGAIN = 10.0  # s after which a refusal that continues is reported again
 _MOST = 1000  # different refusals that are remembered
 _AT_ONCE = 4  # reports of one check: who tries a new key each time must not fill the log
 

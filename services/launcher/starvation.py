@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long processes are ready to run but have no processor, so that a busy machine is not taken for a frozen service."""
+"""Measures how long processes wait for a processor: the launcher must not take a busy machine for a frozen service."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-PERIOD = 0.2  # s between two looks at the threads
+PERIOD = 0.2  # s between two readings of the threads
 
 
 @dataclass(frozen=True, slots=True)

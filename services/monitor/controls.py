@@ -87,7 +87,7 @@ class PageControls:
         self._verbs: Mapping[str, Callable[[dict[str, Any]], str]] = {
             "release": self._release_stop,
             "pause": lambda given: self._plain(keys.sim("pause"), "Paused."),
-            "resume": lambda given: self._plain(keys.sim("resume"), "The robot goes on."),
+            "resume": lambda given: self._plain(keys.sim("resume"), "The robot continues."),
             "reset": lambda given: self._reset(),
             "pace": self._pace,
             "fields": self._fields,
@@ -163,7 +163,7 @@ class PageControls:
         raise Refused(f"the stop was sent for {STOP_PATIENCE:g} s, and not every part confirms it: use the robot's own emergency button")
 
     def _release_stop(self, given: dict[str, Any]) -> str:
-        return self._plain(keys.ESTOP_RESET, "Released: the controller arms the parts, and agents go on.")
+        return self._plain(keys.ESTOP_RESET, "Released: the controller arms the parts, and agents continue.")
 
     def _reset(self) -> str:
         self.give_all_back()
@@ -305,7 +305,7 @@ class PageControls:
     def _wake(self, agent: str) -> None:
         if agent:
             with suppress(CallFailed):  # it has ended meanwhile: a new one acts from its start
-                self._call(keys.service_rpc(agent, "go_on"), Empty, Done)
+                self._call(keys.service_rpc(agent, "resume"), Empty, Done)
 
     def _aim(self, part: str, verb: str, request: type[Request], **fields: Any) -> str:
         action_id = uuid.uuid4().hex

@@ -47,7 +47,10 @@ def banner(seen: Seen) -> dict[str, Any] | None:
     if seen.stop is not None or stopped:
         why = f"{seen.stop.reason[:1].upper()}{seen.stop.reason[1:]}." if seen.stop is not None else "All motors are stopped."
         return _said(
-            "stop", "EMERGENCY STOP", why, "Release: key R, or mobee estop --reset. The controller then arms all parts, and agents go on."
+            "stop",
+            "EMERGENCY STOP",
+            why,
+            "Release: key R, or mobee estop --reset. The controller then arms all parts; agents continue.",
         )
     faulty = [title_of(part) for part, gate in seen.gates.items() if gate == "fault"]
     if faulty:
@@ -60,7 +63,7 @@ def banner(seen: Seen) -> dict[str, Any] | None:
     if "robot_sim" not in seen.services:
         return _said("fault", "The robot is gone", "robot_sim has ended.", "The launcher starts it again; if not: mobee status")
     if seen.mode == "paused":
-        return _said("paused", "Paused", "The robot's time stands still, and all parts hold.", "Go on: space bar")
+        return _said("paused", "Paused", "The robot's time stands still, and all parts hold.", "Resume: space bar")
     if seen.clock_age > seen.patience:
         return _said(
             "fault", "The robot does not answer", f"No tick of its clock for {seen.clock_age:.0f} s.", "mobee status shows what runs"

@@ -89,7 +89,7 @@ class FilterNode:
     def _tick(self, tick: Tick) -> None:
         twin = self._twin.bus
         if self._is_waiting:
-            return  # robot_sim went on without its late participants
+            return  # robot_sim continued without its late participants
         twin.run, twin.k, twin.t, twin.dt = tick.run, tick.k, tick.t, tick.dt
         self._streams.note(tick)
         if tick.mode != "paused" and tick.k != self._last_k:

@@ -50,7 +50,7 @@ def test_mistakes_are_said_in_one_line(
     assert main(["keys", "new", str(folder)]) == 0
     capsys.readouterr()
     assert main(["keys", *(word.format(folder=folder) for word in arguments)]) == code
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert said in told.err
-    assert told.err.count("\n") == 1
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert said in printed.err
+    assert printed.err.count("\n") == 1

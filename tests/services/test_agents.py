@@ -369,7 +369,7 @@ def test_an_agent_that_is_asked_to_rest_releases_its_goal_and_continues_later(st
     time.sleep(1.0)
     assert len(stage.transitions) == before
     assert "agent rests" in stage.texts("rests")[0]
-    stage.rig.call(keys.service_rpc("agent_torso", "go_on"), Empty, Done)
+    stage.rig.call(keys.service_rpc("agent_torso", "resume"), Empty, Done)
     assert len(stage.made(before + 1)) > n
     agent.stop()
 

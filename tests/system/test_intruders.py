@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intruders in a secured system: without keys, with keys of others, and with the keys of another role.
 
-Each is refused, and the refusal is reported with the identity and the key.  The system is one for all tests, and goes on.
+Each is refused, and the refusal is reported with the identity and the key.  The system is one for all tests, and continues.
 """
 
 from __future__ import annotations
@@ -418,4 +418,4 @@ def test_the_system_has_gone_on_with_the_same_processes(secured: Secured) -> Non
     assert not any(count for name, count in launcher.numbers.items() if name.startswith("restarts_"))
     log = secured.system.log("launcher")
     assert re.search(r"WARNING launcher access: vision may not call icub/head/rpc/drive/take", log)
-    until(lambda: secured.watcher.motions["left_arm"][-1].status == "moving", 30.0, "the agent goes on")
+    until(lambda: secured.watcher.motions["left_arm"][-1].status == "moving", 30.0, "the agent continues")

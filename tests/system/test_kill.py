@@ -46,7 +46,7 @@ def wait_back(watcher: Watcher, who: str, old_pid: int) -> None:
     until(is_back, 20.0, f"{who} is back")
 
 
-def all_go_on(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]]) -> None:
+def all_continue(live: tuple[Launch, Watcher], before: dict[str, list[tuple[object, ...]]]) -> None:
     """Every agent's part moves again, and the transitions that were on disk before are still there, in order."""
     system, watcher = live
     watcher.wait_until_moved(AGENTS)
@@ -82,7 +82,7 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
     assert max(held) <= limit
     assert max(rested) <= limit + 0.2  # 60 deg/s at 600 deg/s^2 is 0.1 s, and the motors' delay and lag
     wait_back(watcher, who, pid)
-    all_go_on(live, before)
+    all_continue(live, before)
 
 
 def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:
@@ -99,7 +99,7 @@ def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:
         assert all(m.status != "held" for m in watcher.motions[part] if k < m.k <= end)
     assert all(s.gate == "armed" for part in PARTS for s in watcher.states[part] if k < s.k <= end)
     wait_back(watcher, "agent_left_arm", pid)
-    all_go_on(live, before)
+    all_continue(live, before)
 
 
 def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher]) -> None:
@@ -113,7 +113,7 @@ def test_robot_sim_starts_again_at_home_as_a_new_run(live: tuple[Launch, Watcher
     assert first.gate in ("idle", "hold")
     assert max(map(abs, first.dq)) < 0.05
     wait_back(watcher, "robot_sim", pid)
-    all_go_on(live, before)
+    all_continue(live, before)
 
 
 @pytest.mark.parametrize("who", ["vision", "renderer", "monitor"])
@@ -141,4 +141,4 @@ def test_after_all_kills_every_agent_learns_on(live: tuple[Launch, Watcher]) -> 
         90.0,
         "one more transition of each agent",
     )
-    all_go_on(live, before)
+    all_continue(live, before)

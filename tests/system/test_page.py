@@ -140,7 +140,7 @@ def test_the_ball_is_dragged_and_a_hand_reaches_for_it(page: Page, live: tuple[L
     page.until(f"{targets}.ball", "the ball in the picture")
     time.sleep(0.5)  # the picture turns
     # On a busy machine the page moves under the mouse, or the part holds, which interrupts the reach.
-    until(lambda: reaches_after_a_drag(page, targets), "the end of the reach", lambda: told(page))
+    until(lambda: reaches_after_a_drag(page, targets), "the end of the reach", lambda: texts(page))
     moved = {one.name: one for one in world(session)}["ball"].position
     assert np.linalg.norm(np.array(moved) - ball["position"]) > 0.01
     missing = float(re.search(r"(\d+)\smm from it", page.page.inner_text("#cards"))[1])  # type: ignore[index]  # waited for above
@@ -160,7 +160,7 @@ def reaches_after_a_drag(page: Page, targets: str) -> bool:
     return shown(page, "eaches for the ball", 8.0) and shown(page, "mm from it", 25.0)
 
 
-def told(page: Page) -> str:
+def texts(page: Page) -> str:
     """The cards and the events of a page."""
     return str(page.evaluate("document.querySelector('#cards').textContent + document.querySelector('#events').textContent"))
 

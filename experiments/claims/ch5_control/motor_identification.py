@@ -332,6 +332,6 @@ def _parameters(rows: Sequence[dict[str, str]]) -> MotorParameters:
 
 EXPERIMENT = Experiment(
     claim="the motor model, fitted to encoder readings alone, explains the PyBullet robot to within the encoders' noise",
-    source="thesis 2.2: the robot does not do exactly what it is told",
+    source="thesis 2.2: the robot does not do exactly what it is commanded",
     method=Steps(add_arguments, run, figure),
 )

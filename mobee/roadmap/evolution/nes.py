@@ -124,7 +124,7 @@ class NES:
         seed: of the samples; or a generator to draw them from.
 
     Raises:
-        InvalidValue, UnknownName: with what is valid.
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
     def __init__(

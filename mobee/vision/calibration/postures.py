@@ -45,7 +45,7 @@ def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str,
 
 
 def _search(rig: Rig, model: Model, settings: CameraSettings, free: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return postures (K, n) that fit, and numbers (K, f) by which they are told apart: random ones first, then others about them."""
+    """Return postures (K, n) that fit, and numbers (K, f) by which they are distinguished: random ones first, then others about them."""
     home, low, span = rig.robot.home, rig.robot.limits[free, 0], np.ptp(rig.robot.limits[free], axis=1)
     kept, seen, later = np.empty((0, len(home))), list[Array](), 0
     for _ in range(FIRST + NEXT):
@@ -77,7 +77,7 @@ def _moves(rig: Rig, free: Ints) -> NDArray[np.bool_]:
 
 
 def _fitting(rig: Rig, model: Model, settings: CameraSettings, postures: Array) -> tuple[Ints, Array]:
-    """Return which postures (B, n) fit, and numbers (K, f) by which these are told apart."""
+    """Return which postures (B, n) fit, and numbers (K, f) by which these are distinguished."""
     assert rig.tag is not None
     robot = rig.robot
     low, high = robot.limits[list(rig.head)].T

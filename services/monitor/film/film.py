@@ -26,8 +26,8 @@ FRAMED = 16  # frames between two that the camera must see
 COLORS = 64  # of a GIF
 
 
-def film(run: Path, file: Path, tell: Callable[[float], None] = lambda share: None) -> Path:
-    """Write the film of a run's folder as .gif or .mp4; `tell` is called with the share that is done.
+def film(run: Path, file: Path, progress: Callable[[float], None] = lambda share: None) -> Path:
+    """Write the film of a run's folder as .gif or .mp4; `progress` is called with the share that is done.
 
     Raises MobeeError if the run has no record, InvalidValue for another ending of the file's name, NotInstalled without the packages.
     """
@@ -39,7 +39,7 @@ def film(run: Path, file: Path, tell: Callable[[float], None] = lambda share: No
     artist = Artist(story, moments[::FRAMED])
     for number, moment in enumerate(moments):
         pictures.append(artist.frame(moment))
-        tell((number + 1) / len(moments))
+        progress((number + 1) / len(moments))
     return _write(pictures, file)
 
 

@@ -92,14 +92,14 @@ class RobotView:
 
     def _draw_places(self, ink: Any, values: dict[str, Any], transforms: Array) -> None:
         for part, where in values.get("places", {}).items():
-            told = values.get("left", {}).get(part)
-            if told is None:
+            plan = values.get("left", {}).get(part)
+            if plan is None:
                 continue
             pixels, hue = [(x, y) for x, y in self._camera.pixels(moved(transforms, where)).tolist()], self._colors[part]
-            for state in np.argsort(told["left"]).tolist():
-                share = told["left"][state]
+            for state in np.argsort(plan["left"]).tolist():
+                share = plan["left"][state]
                 dot(ink, pixels[state], 1.6 + 1.8 * share, mixed(LEARNED, hue, share), mixed(GROUND, hue, 0.3 + 0.3 * share))
-            path = [pixels[state] for state in (told["here"], *told["path"])]
+            path = [pixels[state] for state in (plan["here"], *plan["path"])]
             for start, end in list(pairwise(path))[1:]:
                 ink.line([start, end], fill=hue, width=1)
             if len(path) > 1:

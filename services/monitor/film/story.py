@@ -88,8 +88,8 @@ class StoryView:
 
 def _surprise(last: dict[str, Any]) -> str:
     """Return how surprised the agent was, without how much it learned."""
-    told, comma, _ = str(last["surprise"]).partition(", learned")
-    return told + "." * bool(comma)
+    text, comma, _ = str(last["surprise"]).partition(", learned")
+    return text + "." * bool(comma)
 
 
 def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:

@@ -71,8 +71,8 @@ def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence
         return ""
     why = f"{untried[end]} of {actions[end]} actions were never tried" if untried[end] else "it still learns most, though all was tried"
     if steps <= 1:
-        return f"to go on from there, where {why}."
-    return f"to go on by {steps - 1} more action{'s' if steps > 2 else ''}, to a pose where {why}."
+        return f"to continue from there, where {why}."
+    return f"to continue by {steps - 1} more action{'s' if steps > 2 else ''}, to a pose where {why}."
 
 
 def reach_sentence(reach: Reach) -> str:

@@ -190,14 +190,14 @@ def test_while_the_inbox_is_served_the_thread_that_brings_a_message_handles_it()
 
 def test_what_comes_while_the_server_handles_waits_for_its_turn() -> None:
     with Serving() as inbox:
-        busy, go_on, done, seen = threading.Event(), threading.Event(), threading.Event(), []
-        inbox.put(lambda: (busy.set(), go_on.wait(), seen.append("first")))
+        busy, resume, done, seen = threading.Event(), threading.Event(), threading.Event(), []
+        inbox.put(lambda: (busy.set(), resume.wait(), seen.append("first")))
         busy.wait()
         for name in ("second", "third"):
             inbox.handle(lambda name=name: seen.append(name))
         inbox.handle(done.set)
         assert seen == []
-        go_on.set()
+        resume.set()
         done.wait()
         assert seen == ["first", "second", "third"]
 

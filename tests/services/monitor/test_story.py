@@ -107,10 +107,11 @@ def test_how_surprised_it_was() -> None:
 def test_what_it_wants() -> None:
     untried, actions = [0] * 81, [8] * 81
     untried[67] = 5
-    assert wants_sentence(decision(), untried, actions) == "to go on from there, where 5 of 8 actions were never tried."
+    assert wants_sentence(decision(), untried, actions) == "to continue from there, where 5 of 8 actions were never tried."
     far = decision(plan=[67, 66, 3])
     assert (
-        wants_sentence(far, untried, actions) == "to go on by 2 more actions, to a pose where it still learns most, though all was tried."
+        wants_sentence(far, untried, actions)
+        == "to continue by 2 more actions, to a pose where it still learns most, though all was tried."
     )
 
 
@@ -248,13 +249,13 @@ def playback(**changes: Any) -> Playback:
     return Playback(**(HEADER | {"src": "player"} | fields | {"share": 0.25, "duration": 4.0, "missing": 0.08} | changes))
 
 
-def test_a_motion_along_a_roadmap_is_told_until_the_robot_does_something_else() -> None:
+def test_a_motion_along_a_roadmap_is_shown_until_the_robot_does_something_else() -> None:
     assert playback_sentence(playback()) == "Moves the right palm to x -0.3: 80 mm to go, 25 % of 4.0 s are over."
     assert playback_sentence(playback(share=1.0, missing=0.004)) == "Moves the right palm to x -0.3: 4 mm to go; it comes to rest."
     teller = Teller(ROBOT, colors_of_all(ROBOT.parts))
     teller.note_playback(playback())
-    told = teller.values()["path"]
-    assert (told["phase"], told["share"], told["marker"], len(told["points"])) == ("moving", 0.25, "right palm", 2)
+    path = teller.values()["path"]
+    assert (path["phase"], path["share"], path["marker"], len(path["points"])) == ("moving", 0.25, "right palm", 2)
     teller.note_gone("someone else")
     assert teller.values() == {}
     teller.note_gone("player")

@@ -61,7 +61,7 @@ export function card(one, { color, isChosen, isTaken, isPast, click }) {
     line.append(surprise);
     made.append(line);
   } else if (one.now && !isTaken) {
-    made.append(node("p", "", one.n ? `It goes on after ${one.n} transitions of an earlier run.` : "Its first action has not ended yet: nothing is learned so far."));
+    made.append(node("p", "", one.n ? `It continues after ${one.n} transitions of an earlier run.` : "Its first action has not ended yet: nothing is learned so far."));
   }
   if (one.wants && !isTaken) made.append(labelled("", one.wants.startsWith("nothing") ? "Wants" : `Wants, ${one.chooses},`, one.wants));
   made.addEventListener("click", click);

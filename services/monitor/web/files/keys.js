@@ -24,7 +24,7 @@ export class Keys {
     this.resets = 0;
     this.seeking = 0;
     this.actions = {
-      " ": ["pause", "stop the robot's time, or let it go on", () => this.pause()],
+      " ": ["pause", "stop the robot's time, or resume it", () => this.pause()],
       s: ["stop", "EMERGENCY STOP: all motors, at once", () => send("stop")],
       r: ["release", "release the emergency stop", () => send("release")],
       c: ["control", "take the controls from another page", () => send("control")],

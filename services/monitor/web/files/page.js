@@ -173,7 +173,7 @@ function showState() {
   $("state").textContent = word;
   $("state").className = `pill ${kind}`;
   if (state.status.time !== undefined) $("clock").textContent = `${state.status.time.toFixed(0)} s`;
-  $("pause").firstChild.textContent = state.status.mode === "paused" ? "Go on " : "Pause ";
+  $("pause").firstChild.textContent = state.status.mode === "paused" ? "Resume " : "Pause ";
   for (const button of document.querySelectorAll("[data-do=stop], [data-do=pause]")) button.hidden = state.past;
   if (!state.cards.length) story.showCards();
   arrange();

@@ -77,7 +77,7 @@ export class View {
   close(why) {
     this.frame.hidden = true;
     this.frame.removeAttribute("src");
-    this.frame.contentWindow?.location.replace("about:blank"); // without an address alone it would go on
+    this.frame.contentWindow?.location.replace("about:blank"); // without an address alone it would continue
     this.canvas.hidden = this.legend.hidden = false;
     this.rerunTime = null;
     this.button.firstChild.textContent = "Rerun's view ";

@@ -33,7 +33,7 @@ while True:
 
 
 def resumed(path, until, **options) -> ReachAgent:
-    """An agent that goes on from the record, on a plant that is where the record ended, until so many steps are made."""
+    """An agent that continues from the record, on a plant that is where the record ended, until so many steps are made."""
     store = ReachStore(path, PART)
     steps = store.load()
     on = plant(1)

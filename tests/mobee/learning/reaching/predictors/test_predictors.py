@@ -97,9 +97,9 @@ def test_a_target_far_from_all_others_is_expected_to_be_like_the_average_and_kno
 def test_writing_into_a_returned_mean_changes_nothing(name):
     made = reaches()
     predictor = taught(PREDICTORS[name](made), drawn(made, 10))
-    told = predictor.mean(places()[0])
-    told += 1.0
-    np.testing.assert_allclose(predictor.mean(places()[0]) + 1.0, told)
+    copy = predictor.mean(places()[0])
+    copy += 1.0
+    np.testing.assert_allclose(predictor.mean(places()[0]) + 1.0, copy)
 
 
 def test_the_published_predictor_says_that_it_has_no_deviation():
