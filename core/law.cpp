@@ -14,6 +14,7 @@ namespace law {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double rounding = 1e-9;  // s, times are sums of ticks
+constexpr double yield_force = 0.25;  // rad/s^2; an opposing force of this size ends the motion with a moving attractor
 
 double norm(const double* v, std::int64_t count) {
     double squares = 0.0;
@@ -110,9 +111,15 @@ constexpr Term terms[] = {
 };
 constexpr std::int64_t term_count = std::size(terms);
 
-// Eq. 5.7 solved for the acceleration: squashed spring plus forces minus damping.
+// Eq. 5.7 solved for the acceleration: squashed spring plus forces minus damping, which is relative to the attractor's velocity.
 double acceleration(double q, double velocity, double attractor, double force, const MotorGains& motor) {
     return squash(attractor - q, motor.max_spring, motor.spring_knee) + force - motor.damping * velocity;
+}
+
+// Return the velocity of a moving attractor that a motor follows: less if a force opposes it, and none from `yield_force` on.
+double followed_velocity(double goal_velocity, double force, double unit) {
+    if (goal_velocity * force >= 0.0) return goal_velocity;
+    return goal_velocity * std::max(0.0, 1.0 - std::fabs(force) / (yield_force * unit));
 }
 
 // Return the velocity command: at most `fastest`, and at most `change` away from the last command `sent`.
@@ -168,7 +175,12 @@ void advance(const Law& law, const double* q, double dt, const double* attractor
     for (const std::int64_t i : law.active) {
         const MotorGains& motor = law.motors[i];
         LawState& own = state[i];
-        const double a = law::acceleration(q[i], own.velocity, attractor[i], force[i], motor);
+        double ahead = 0.0;
+        if (own.goal_time > 0.0) {
+            ahead = law::followed_velocity(own.goal_velocity, force[i], motor.unit);
+            own.goal_time -= dt;
+        }
+        const double a = law::acceleration(q[i], own.velocity - ahead, attractor[i], force[i], motor);
         const double v = law::limited_velocity(own.velocity + a * dt, own.commanded, motor.max_speed, motor.max_acceleration * dt);
         own.acceleration = (v - own.commanded) / dt;  // of the command: after a hold `velocity` is 0, and `commanded` may not be
         own.velocity = own.commanded = v;

@@ -77,9 +77,11 @@ struct Law {
 };
 
 // The state of one motor under the law.  `velocity` is the law's own velocity, `commanded` the velocity of the last command.
-// `reference` is the position reference, and `feedforward` is added to a torque command [N m].
+// `reference` is the position reference, and `feedforward` is added to a torque command [N m].  `goal_velocity` is the velocity of an
+// attractor that moves, valid for `goal_time` [s].
 struct LawState {
     double velocity = 0.0, acceleration = 0.0, commanded = 0.0, reference = 0.0, feedforward = 0.0;
+    double goal_velocity = 0.0, goal_time = 0.0;
 };
 
 // The input of the forces: the measured positions q (n,), the sum of J^T (depth * normal) over the contacts of fields (n,), and the

@@ -18,8 +18,9 @@ MOTOR_GAINS = columns(
 )  # fmt: skip
 CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])
 CLAUSE_ENTRY = np.dtype([("motor", WHOLE), ("factor", "f8"), ("normal", "f8")])
-STATE = columns("velocity", "acceleration", "commanded", "reference", "feedforward")
-"""The state of a motor under the law: velocity, acceleration, last velocity command, position reference, feedforward torque [N m]."""
+STATE = columns("velocity", "acceleration", "commanded", "reference", "feedforward", "goal_velocity", "goal_time")
+"""The state of a motor under the law: velocity, acceleration, last velocity command, position reference, feedforward torque [N m]; the
+velocity of an attractor that moves, and the time for which it is valid [s]."""
 SETTLE = ("speed", "acceleration", "first_check", "interval", "timeout")
 
 TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")

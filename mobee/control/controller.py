@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mobee.model.pose import Pose
     from mobee.reach import ReachTarget
 
+FOLLOW_TIME = 0.1  # s of the law's time for which the velocity of a moving goal is valid
+
 
 class Controller:
     """Integrates thesis eq. 5.7 over all motors of a robot and returns a command in every tick.
@@ -104,6 +106,7 @@ class Controller:
     @attractor.setter
     def attractor(self, q: Array) -> None:
         self._attractor[:] = checked("attractor", q, len(self.robot.motors))
+        self._state["goal_time"] = 0.0
 
     @property
     def velocity(self) -> Array:
@@ -158,9 +161,26 @@ class Controller:
         return total
 
     def set_attractor(self, part: str, q: Array) -> None:
-        """Set the attractor of one part, (n_part,) rad; raises InvalidValue and UnknownName."""
+        """Set the attractor of one part, (n_part,) rad, which stands still; raises InvalidValue and UnknownName."""
         where = self.robot.part(part)
         self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
+        self._state["goal_time"][where.slice] = 0.0
+
+    def follow(self, part: str, q: Array, velocity: Array) -> None:
+        """Set the attractor of one part to a moving goal; call it at least every FOLLOW_TIME of the law's time, else the goal stands still.
+
+        The damping of eq. 5.7 is relative to the goal's velocity, C (q' - q*'), so that the part follows without a lag.  A motor yields
+        to forces that oppose this velocity: from 0.25 rad/s^2 on, only the spring pulls it.  Raises InvalidValue and UnknownName.
+
+        Args:
+            part: the part.
+            q: (n_part,) rad, where the goal is now.
+            velocity: (n_part,) rad/s, of the goal.
+        """
+        where = self.robot.part(part)
+        moving = checked(f"velocity of {part}", velocity, len(where))
+        self.set_attractor(part, q)
+        self._state["goal_velocity"][where.slice], self._state["goal_time"][where.slice] = moving, FOLLOW_TIME
 
     def force(self, f: Array) -> None:
         """Apply a force on the motors, (n,) rad/s^2 or m/s^2, until the next call or `clear` (f of thesis eq. 5.9)."""

@@ -24,7 +24,6 @@ from mobee.robot.robot import Clause, Robot
 
 INSIDE = 0.999  # share of the velocity and acceleration limits, so that no rounding makes the safety gate refuse a command
 LEASH = 0.3  # s at full speed: how far the position reference may run ahead of a blocked motor
-
 _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 

@@ -21,6 +21,8 @@ from mobee.reference.kinematics import joint_column, joints_to, link_frames, mar
 from mobee.robot.motor_units import limit_zones, motor_units
 from mobee.robot.robot import LEVER, Robot
 
+YIELD = 0.25  # rad/s^2: an opposing force of this size ends the motion with a moving attractor
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
@@ -35,6 +37,7 @@ class State:
     force: Array | None = None  # f of eq. 5.9, the client's force on the motors, rad/s^2
     pushes: Mapping[str, Array] = field(default_factory=dict)  # f_m of eq. 5.10 by marker: force (3,), or force and moment (6,)
     propagate: Literal["tree", "part"] = "tree"  # how far down the body a contact acts, see `projected`
+    goal_velocity: Array | None = None  # q*', rad/s, of an attractor that moves
 
 
 def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
@@ -55,6 +58,19 @@ def spring(s: State) -> Array:
 def damping(s: State) -> Array:
     """Return the damping, -C q', on the right-hand side of eq. 5.7."""
     return -s.gains.of_robot("damping", s.robot) * s.velocity
+
+
+def following(s: State, outside: Array) -> Array:
+    """Return C q*', which makes the damping relative to the velocity of a moving attractor; `outside` (n,): all forces of clients and limits.
+
+    A motor yields to a force that opposes this velocity: it follows less, and not at all from YIELD on.
+    """
+    if s.goal_velocity is None:
+        return np.zeros(len(s.q))
+    opposed = s.goal_velocity * outside < 0.0
+    share = np.where(opposed, np.maximum(0.0, 1.0 - np.abs(outside) / (YIELD * motor_units(s.robot))), 1.0)
+    found: Array = s.gains.of_robot("damping", s.robot) * s.goal_velocity * share
+    return found
 
 
 def config_force(s: State) -> Array:

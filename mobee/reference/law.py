@@ -22,7 +22,17 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.control.law import FRICTION, INERTIA
-from mobee.reference.forces import State, clause_force, config_force, contact_force, damping, limit_force, spring, work_force
+from mobee.reference.forces import (
+    State,
+    clause_force,
+    config_force,
+    contact_force,
+    damping,
+    following,
+    limit_force,
+    spring,
+    work_force,
+)
 from mobee.reference.kinematics import weight_torque
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
@@ -46,11 +56,14 @@ class Motion:
 
 
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
-    """Return q" of eq. 5.7 with mass 1: the sum of the terms, (n,) rad/s^2."""
-    total = np.zeros(len(state.q))
+    """Return q" of eq. 5.7 with mass 1: the sum of the terms, and C q*' for an attractor that moves, (n,) rad/s^2."""
+    total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
-        total += term(state)
-    return total
+        force = term(state)
+        total += force
+        if term not in (spring, damping):
+            outside += force
+    return total + following(state, outside)
 
 
 def at_rest(robot: Robot, gains: Gains, q: Array) -> Motion:

@@ -41,16 +41,23 @@ def test_the_controllers_motion_is_this(seed: int) -> None:
     motion, goal = at_rest(robot, gains, q), q
     force: Array | None = None
     pushes: dict[str, Array] = {}
+    moving: Array | None = None
     for tick in range(12):
         if tick % 4 == 1:
             controller.attractor = goal = drawn_pose(rng, robot)
+            moving = None
             force, pushes = rng.normal(size=len(q)) * 10.0, {"marker7": rng.normal(size=6)}
             controller.force(force)
             controller.push("marker7", pushes["marker7"])
         if tick == 6:
             controller.hold("one", q[robot.part("one").slice])
             motion, goal = hold(robot, motion, "one"), controller.attractor
-        state = State(robot, gains, q, motion.velocity, goal, force=force, pushes=pushes)
+        if tick in (3, 7):
+            controller.attractor = goal = drawn_pose(rng, robot)
+            moving = rng.normal(size=len(q))
+            for name, part in robot.parts.items():
+                controller.follow(name, goal[part.slice], moving[part.slice])
+        state = State(robot, gains, q, motion.velocity, goal, force=force, pushes=pushes, goal_velocity=moving)
         motion = step(robot, gains, motion, q, acceleration(state), dt, scale)
         command = controller.step(q, dt)
         assert apart(command.velocity, motion.velocity) < ROUNDING
