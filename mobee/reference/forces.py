@@ -61,9 +61,10 @@ def damping(s: State) -> Array:
 
 
 def following(s: State, outside: Array) -> Array:
-    """Return C q*', which makes the damping relative to the velocity of a moving attractor; `outside` (n,): all forces of clients and limits.
+    """Return C q*', which makes the damping relative to the velocity of a moving attractor.
 
-    A motor yields to a force that opposes this velocity: it follows less, and not at all from YIELD on.
+    `outside` (n,): the sum of all forces but spring and damping.  A motor yields to a force that
+    opposes this velocity: it follows less, and not at all from YIELD on.
     """
     if s.goal_velocity is None:
         return np.zeros(len(s.q))

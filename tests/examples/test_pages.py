@@ -30,6 +30,7 @@ model = mobee.Model(robot, mobee.load_world("table"))
 """
 
 GIVEN = {
+    "docs/behaviours.md": "",
     "docs/control.md": "",
     "docs/gymnasium.md": "",
     "docs/installation.md": "",

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A reference that catches up with a moving goal, within the speed and acceleration of the motors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.robot.robot import Robot
+
+SPEED, ACCELERATION = 0.95, 0.8  # shares of the motors' limits; the rest is for the control law
+CLOSE = 15.0  # 1/s: rate at which a small distance decreases
+BRAKING = 1.5  # 2 is the least distance in which a reference can brake; the rest is for a goal that accelerates
+LEASH = np.deg2rad(15.0)  # rad by which the reference may be ahead of its motor, which something may block
+
+
+class Reference:
+    """The moving reference of some motors; arrays (m,) in rad and rad/s."""
+
+    def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array) -> None:
+        """Start at rest at q, to stay between `low` and `high`; `where`: the motors."""
+        table = robot.motor_table[where]
+        self._fastest = SPEED * np.array([motor.max_velocity for motor in table])
+        self._hardest = ACCELERATION * np.array([motor.max_acceleration for motor in table])
+        self._low, self._high = np.minimum(low, q), np.maximum(high, q)
+        self.q, self.velocity = q.copy(), np.zeros(len(q))
+
+    def catch_up(self, goal: Array, goal_velocity: Array, near: Array, dt: float) -> None:
+        """Advance by dt [s] towards a goal that moves; stay near `near`, where the motors are expected.
+
+        A far goal is approached at full speed, and with so much time left that the acceleration limit suffices to move with it then.
+        """
+        left = goal - self.q
+        rate = np.minimum(CLOSE * np.abs(left), np.sqrt(BRAKING * self._hardest * np.abs(left)))
+        wanted = np.clip(goal_velocity + np.sign(left) * rate, -self._fastest, self._fastest)
+        change = self._hardest * dt
+        before = self.q
+        self.velocity = self.velocity + np.clip(wanted - self.velocity, -change, change)
+        self.q = np.clip(np.clip(before + self.velocity * dt, near - LEASH, near + LEASH), self._low, self._high)
+        self.velocity = np.where((self.q <= self._low) | (self.q >= self._high), (self.q - before) / dt, self.velocity)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The motion of a target by its last places: where it is now, although pictures are late and rare."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from mobee.arrays import Array, real_array
+from mobee.errors import InvalidValue
+
+WINDOW = 0.5  # s: places within this time of the newest are used
+LEAST_SPAN = 0.12  # s between the first and the last of them, from which a velocity can be computed
+JUMP = 0.05  # m from where the target was expected: it has jumped, and older places are of another motion
+
+
+class TargetTrack:
+    """Follows a target that moves at a constant velocity, or jumps; times are in s of any clock."""
+
+    def __init__(self, patience: float = 0.6) -> None:
+        """`patience`: s after the last place for which the motion is extrapolated; after that the target is stale."""
+        if not 0.0 < patience < np.inf:
+            raise InvalidValue(f"patience {patience!r} s: must be a finite time above 0")
+        self.patience = patience
+        self._seen: deque[tuple[float, Array]] = deque()
+
+    def note(self, t: float, place: Array) -> None:
+        """Add the place (3,) m of the target at time t [s]; one that is not newer than the last is ignored.  Raises InvalidValue."""
+        place = real_array("place", place)
+        if place.shape != (3,) or not (np.isfinite(place).all() and np.isfinite(t)):
+            raise InvalidValue(f"place {place.tolist()} of the target at {t} s: must be three finite numbers, in m, at a finite time")
+        if self._seen and t <= self._seen[-1][0]:
+            return
+        expected = self.at(t)
+        if expected is not None and np.linalg.norm(place - expected[0]) > JUMP:
+            self._seen.clear()
+        self._seen.append((t, place))
+        while t - self._seen[0][0] > WINDOW:
+            self._seen.popleft()
+
+    def at(self, t: float) -> tuple[Array, Array] | None:
+        """Return place (3,) m and velocity (3,) m/s at time t [s], by a line through the last places; None if it is not known or stale."""
+        if not self._seen or t - self._seen[-1][0] > self.patience:
+            return None
+        times = np.array([time for time, _ in self._seen])
+        places = np.array([place for _, place in self._seen])
+        if times[-1] - times[0] < LEAST_SPAN:
+            return places[-1].copy(), np.zeros(3)
+        off = times - times.mean()
+        velocity = off @ (places - places.mean(axis=0)) / (off @ off)
+        return places.mean(axis=0) + (t - times.mean()) * velocity, velocity
+
+    def forget(self) -> None:
+        """Drop all places, at the start of a new run."""
+        self._seen.clear()
