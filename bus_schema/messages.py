@@ -81,7 +81,11 @@ class Tick(Clock, frozen=True, kw_only=True):
     """Start of tick k, with the newest state of every part; each part has its own sampling time."""
 
     stream: ClassVar[Stream] = Stream(
-        "tick", "CONTROL", writers=("robot_sim",), readers=("model", "controller", "port_filter", "agent", "renderer"), when="every tick"
+        "tick",
+        "CONTROL",
+        writers=("robot_sim",),
+        readers=("model", "controller", "port_filter", "agent", "gaze", "renderer"),
+        when="every tick",
     )
 
     q: RobotVector  # rad, encoders
@@ -178,7 +182,7 @@ class Motion(Message, frozen=True, kw_only=True):
         "{part}/motion",
         "CONTROL",
         writers=("controller",),
-        readers=("agent", "monitor"),
+        readers=("agent", "gaze", "monitor"),
         when="at once after a change, else up to 100 per second",
     )
 
@@ -192,6 +196,22 @@ class Motion(Message, frozen=True, kw_only=True):
     ddq: PartVector  # rad/s^2, the controller's own acceleration
     goal: PartVector  # rad, attractor q*
     touched: list[Name]  # world objects in contact
+
+
+class Follow(Message, frozen=True, kw_only=True):
+    """A part's attractor, which moves: the controller follows it, and stops it after 0.1 s without a new message."""
+
+    stream: ClassVar[Stream] = Stream(
+        "{part}/follow",
+        "LATEST",
+        writers=("gaze", "client"),
+        readers=("controller",),
+        when="while a behaviour moves a part, at least 20 times per second",
+    )
+
+    epoch: Count  # goal epoch of the sender, as in `Taken`; with another one the message has no effect
+    q: PartVector  # rad, attractor q* now
+    dq: PartVector  # rad/s, its velocity
 
 
 class Reach(Message, frozen=True, kw_only=True):
@@ -319,7 +339,7 @@ class Geometry(Struct, frozen=True, forbid_unknown_fields=True):
 class WorldObject(Message, frozen=True, kw_only=True):
     """An object as perceived by vision."""
 
-    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "monitor"))
+    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "gaze", "monitor"))
 
     name: Name
     geometry: Geometry

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
 from mobee.behaviours.reference import Reference
@@ -46,7 +47,15 @@ class Movement:
 class Gaze:
     """Aims the cameras of a robot at a target by the motors of one part; keeps its motion from call to call."""
 
-    def __init__(self, robot: Robot, cameras: Mapping[str, Camera], part: str, margin: Array | float = 0.0, lag: float = LAG) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        cameras: Mapping[str, Camera],
+        part: str,
+        margin: Array | float = 0.0,
+        lag: float = LAG,
+        movable: NDArray[np.bool_] | None = None,
+    ) -> None:
         """Find the motors that turn cameras.
 
         Args:
@@ -55,6 +64,7 @@ class Gaze:
             part: the part that may move.
             margin: (n,) rad, kept free before each limit, at most a quarter of a motor's range.
             lag: s, by which the motors' velocity is later than the commanded one.
+            movable: (n,) the motors that may be moved; None: all.
 
         Raises:
             InvalidValue: the part turns none of the cameras.
@@ -62,7 +72,7 @@ class Gaze:
         """
         self.robot, self.part, self.lag = robot, robot.part(part), lag
         self._cameras = tuple(cameras.values())
-        self.eyes, self.neck = gaze_motors(robot, part, (camera.link for camera in self._cameras))
+        self.eyes, self.neck = gaze_motors(robot, part, (camera.link for camera in self._cameras), movable)
         (low, high), middle = robot.limits.T, robot.limits.mean(axis=1)
         spare = np.minimum(margin, 0.25 * (high - low))
         self._low, self._high, self._middle = low + spare, high - spare, middle
@@ -118,10 +128,11 @@ class Gaze:
             centred, others = goal.copy(), velocity.copy()
             centred[self._centring], others[self.eyes] = self._middle[self._centring], 0.0
             centred[self.neck] = self._neck
-            slopes, drift = self._point(centred, self.neck, NECK_DAMPING, target, bounded=True)
+            damping = NECK_DAMPING if len(self.eyes) else EYE_DAMPING
+            slopes, drift = self._point(centred, self.neck, damping, target, bounded=True)
             goal[self.neck] = self._neck = centred[self.neck]
             inside = (self._neck > self._low[self.neck]) & (self._neck < self._high[self.neck])
-            moving[self.neck] = inside * _compensating(slopes, drift @ target_velocity, others, self.neck, NECK_DAMPING)
+            moving[self.neck] = inside * _compensating(slopes, drift @ target_velocity, others, self.neck, damping)
         return goal, moving
 
     def _point(self, q: Array, motors: Ints, damping: float, target: Array, bounded: bool) -> tuple[Array, Array]:
@@ -175,8 +186,8 @@ class Gaze:
         return alike
 
 
-def gaze_motors(robot: Robot, part: str, links: Iterable[int]) -> tuple[Ints, Ints]:
-    """Return the motors of a part that turn one of the links: those that move no shape, and the others.
+def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
+    """Return the motors of a part that turn one of the links: those that move no shape, and the others; of the `movable` (n,) ones.
 
     Raises InvalidValue if there are none, and UnknownName.
     """
@@ -185,6 +196,7 @@ def gaze_motors(robot: Robot, part: str, links: Iterable[int]) -> tuple[Ints, In
     for link in links:
         turning |= (matrix[ancestry[link]] != 0.0).any(axis=0)
     turning[: span.start] = turning[span.stop :] = False
+    turning &= True if movable is None else movable
     if not turning.any():
         raise InvalidValue(f"{part} of {robot.name!r} turns none of the cameras: name the part that carries them")
     for shape in robot.shapes:

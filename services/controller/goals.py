@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of agents: take and release a part's goal, set it, apply a force, reach."""
+"""Answers the calls of agents: take and release a part's goal, set it, apply a force, reach; and lets attractors move."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
 from bus_schema import VERSION, keys
+from bus_schema.messages import Follow
 from bus_schema.rpc import Done, Force, Goal, ReachFor, Reply, Request, Started, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.control.forces import LARGEST_FORCE
@@ -19,6 +21,7 @@ from mobee.robot.robot import Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
 from services.controller.law import RobotLaw
+from services.controller.precedence import may_take_from
 from services.controller.publish import CommandPublisher
 from services.controller.reaches import Reaches
 
@@ -46,14 +49,20 @@ class GoalServer:
         service.on_request(keys.goal("*", "goal"), Goal, _by_part(self._goal), part_of_key=True)
         service.on_request(keys.goal("*", "force"), Force, _by_part(self._force), part_of_key=True)
         service.on_request(keys.goal("*", "reach"), ReachFor, _by_part(self._reach), part_of_key=True)
+        for part in robot.parts:
+            service.on_newest(Follow, partial(self._follow, part), part)
         service.on_alive(self._note_alive)
 
     def _take(self, part: str, request: Take) -> Taken:
         owner = self._actions[part].owner
-        if owner is not None and owner.instance != request.instance and owner.instance in self._service.alive.get(owner.who, ()):
+        is_owned = owner is not None and owner.instance != request.instance and owner.instance in self._service.alive.get(owner.who, ())
+        if owner is not None and is_owned and not may_take_from(request.who, owner.who):
             raise CallRefused("owned", f"the goal of {part} belongs to {owner.who}, which must release it first")
         if request.instance not in self._service.alive.get(request.who, ()):
             raise CallRefused("token", f"no liveliness token alive/{request.who}/{request.instance}: declare it before taking a goal")
+        if owner is not None and is_owned:
+            self._service.bus.event("info", "taken", f"{request.who} takes the goal of {part} from {owner.who}")
+            self._end_ownership(part)
         self._epoch += 1
         self._actions[part].owner = Owner(request.who, request.instance, self._epoch)
         return Taken(v=VERSION, epoch=self._epoch)
@@ -82,6 +91,20 @@ class GoalServer:
         started = self._start(part, request.action_id)
         self._commands.send_again(part)  # before the next tick
         return started
+
+    def _follow(self, part: str, follow: Follow) -> None:
+        """Move the attractor of a part as its owner asks, which ends an action; a message of an earlier owner has no effect."""
+        action, motors = self._actions[part], self._robot.motor_table[self._robot.part(part).slice]
+        if action.owner is None or action.owner.epoch != follow.epoch or action.is_in_hold:
+            return
+        target, fastest = np.array(follow.q), np.array([motor.max_velocity for motor in motors])
+        if outside := self._beyond_limits(part, target):
+            self._service.bus.reject("limits", f"attractor that moves: {outside}")
+            return
+        if action.is_under_way:
+            self._reaches.interrupt(part)
+            action.resume(self._service.bus.k)
+        self._law.follow(part, target, np.clip(follow.dq, -fastest, fastest))
 
     def _start(self, part: str, action_id: str, target: Array | None = None) -> Started:
         self._actions[part].start(action_id, self._service.bus.k, self._service.bus.t * 1e-9, target)
@@ -124,14 +147,17 @@ class GoalServer:
             raise CallRefused("epoch", f"epoch {epoch} does not own the goal of {part}: take it first")
 
     def _check_limits(self, part: str, target: Array) -> None:
+        if outside := self._beyond_limits(part, target):
+            raise CallRefused("limits", outside)
+
+    def _beyond_limits(self, part: str, target: Array) -> str:
+        """Return which motor would leave its range, as a text; empty if none would."""
         limits = self._robot.limits[self._robot.part(part).slice]
         outside = np.flatnonzero((target < limits[:, 0] - 1e-9) | (target > limits[:, 1] + 1e-9))
-        if len(outside):
-            i = int(outside[0])
-            raise CallRefused(
-                "limits",
-                f"{self._robot.part(part).motors[i]} at {target[i]:.4f} rad: its range is {limits[i, 0]:.4f} to {limits[i, 1]:.4f} rad",
-            )
+        if not len(outside):
+            return ""
+        i = int(outside[0])
+        return f"{self._robot.part(part).motors[i]} at {target[i]:.4f} rad: its range is {limits[i, 0]:.4f} to {limits[i, 1]:.4f} rad"
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         for part, action in self._actions.items():

@@ -128,6 +128,10 @@ class RobotLaw:
         """Set the attractor of the part to `target` (n_part,) rad."""
         self._law.set_attractor(part, target)
 
+    def follow(self, part: str, target: Array, velocity: Array) -> None:
+        """Set the attractor of the part to `target` (n_part,) rad, which moves with `velocity` (n_part,) rad/s."""
+        self._law.follow(part, target, velocity)
+
     def motion(self, part: str) -> tuple[Array, Array, Array]:
         """Return velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
         where = self._where[part]

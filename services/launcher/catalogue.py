@@ -35,6 +35,16 @@ _ENTRIES = {
     "model": Entry("services.model", "services.model.config:Config", 1, after=(RECORDER,)),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
+    "gaze": Entry(
+        "services.gaze",
+        "services.gaze.config:Config",
+        3,
+        after=("controller",),
+        nice=_NICE_PLANS,
+        vital=False,
+        participates=False,
+        real_time=True,
+    ),
     "renderer": Entry(
         "services.robot_sim.renderer",
         "services.robot_sim.config:RendererConfig",

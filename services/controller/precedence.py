@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Precedence: from whom the goal of a part may be taken while it has an owner.
+
+The rule is in this file alone.  A behaviour runs beside the agents and uses what they leave free: everyone else may take its part at any
+time, and so may a behaviour of a higher rank.  It takes the part again when the part is free.  Between two of equal rank the first one
+keeps the part until it releases it or ends; two agents, clients or commands are of equal rank.
+"""
+
+from __future__ import annotations
+
+BEHAVIOURS = ("gaze",)
+"""The behaviours by the names of their services, in ascending rank; everyone else is above them."""
+
+
+def rank_of(who: str) -> int:
+    """Return the rank of a service by its name."""
+    return BEHAVIOURS.index(who) if who in BEHAVIOURS else len(BEHAVIOURS)
+
+
+def may_take_from(who: str, owner: str) -> bool:
+    """Return whether a service may take the goal of a part from its owner."""
+    return rank_of(who) > rank_of(owner)
