@@ -64,6 +64,7 @@ class ReachFor(Request, frozen=True, kw_only=True):
     radius: Annotated[float, Meta(gt=0)]  # m
     aim: Aim
     normal: Vector3 | None = None  # direction in which the marker's normal should point
+    faces: bool = False  # True: instead of a normal; the marker's normal should point to the target, also while it moves
     stay: bool = False  # True: the part stays where the force ended, instead of being pulled back
 
 

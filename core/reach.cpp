@@ -16,6 +16,7 @@ constexpr double degree = 3.14159265358979323846 / 180.0;
 // rad/s^2 for a lever of 1 m and a distance of 1 m; a normal gets the full value if it is opposite to the target's.  The 2014 program has
 // 5000 deg/s^2.
 constexpr double gain = 5000.0 * degree;
+constexpr double facing_distance = 0.02;  // m from the target's centre, within which a marker is turned less and less towards it
 
 // Rotate v about the axis of a joint, by the angle with the given sine and the joint's cosine.
 Vec3 rotate_about(const ReachJoint& joint, Vec3 v, double sine) {
@@ -140,8 +141,14 @@ void update_error(Reach& reach) {
     reach.distance = distance;
     for (int k = 0; k < 3; ++k) reach.error[k] = offset[k] * share;
     if (!reach.turns_normal) return;
+    double near = 1.0;  // less than 1 close to the target's centre, where a direction to it is not defined
+    if (reach.faces_target) {
+        const double apart = length(offset);
+        near = std::min(1.0, apart / reach::facing_distance);
+        if (apart > 0.0) reach.target_normal = (1.0 / apart) * offset;
+    }
     const Vec3 turn = cross(reach.marker_normal, reach.target_normal);
-    for (int k = 0; k < 3; ++k) reach.error[3 + k] = turn[k];
+    for (int k = 0; k < 3; ++k) reach.error[3 + k] = near * turn[k];
 }
 
 void add_reaches(const Law& law, View<Reach* const> reaches, double* q, const double* attractor, double dt, double* total) {

@@ -51,6 +51,7 @@ struct Reach {
     std::int64_t part = 0;          // first motor of the part; -1 for a reach of the whole body
     std::int64_t to_surface = 0;    // whether the target is the surface of a ball, else its centre
     std::int64_t turns_normal = 0;  // whether the marker's normal is turned to `target_normal`
+    std::int64_t faces_target = 0;  // whether `target_normal` is the direction from the marker to the target
     std::int64_t joint_count = 0;   // number of joints up to the last one that a pulled motor drives
     View<ReachJoint> joints;        // from the base to the marker
     View<const ReachDrive> drives;

@@ -25,13 +25,15 @@ class ReachTarget:
     """A sphere as a target for a marker; it repels all links except the reaching hand.
 
     `position`: (3,) m, root frame, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker is to come to its "centre" (thesis 8.2) or
-    to its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.
+    to its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.  `faces`: the desired direction is
+    that from the marker to the target's centre, as of a palm that looks at what it reaches for.
     """
 
     position: Array
     radius: float = RADIUS
     aim: Aim = "centre"
     normal: Array | None = None
+    faces: bool = False
 
     def __post_init__(self) -> None:
         """Check all fields; raises InvalidValue, UnknownName."""
@@ -42,6 +44,8 @@ class ReachTarget:
             raise InvalidValue(f"radius {self.radius!r} of the target: must be a length above 0 m, at most {MAX_DISTANCE:g} m")
         if self.aim not in AIMS:
             raise UnknownName("aim", self.aim, AIMS)
+        if self.faces and self.normal is not None:
+            raise InvalidValue("target with a normal that also faces it: give a direction of the marker's normal, or faces=True, not both")
         object.__setattr__(self, "position", where)
         if self.normal is not None:
             normal = _triple(self.normal, "normal")

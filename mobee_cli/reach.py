@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array
+from mobee.control.reach import marker_error
 from mobee.errors import ActionInterrupted, MobeeError, UnknownName
 from mobee.learning.reaching.evaluation import move
 from mobee.learning.reaching.failures import has_failed
@@ -55,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="radius of the target [m] (default: %(default)g)")
     where = "bring the marker to the centre or to the surface of the target (default: centre for --target, surface for --object)"
     parser.add_argument("--aim", choices=AIMS, help=where)
+    parser.add_argument("--facing", action="store_true", help="turn the marker's normal, such as that of a palm, towards the target")
     parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that has learned to reach, or its file {STORE}")
     parser.add_argument("--stay", action="store_true", help="stay at the target; without it the hand moves back")
     parser.add_argument("--offline", action="store_true", help="use the offline plant, starting at home, instead of the running system")
@@ -119,7 +121,7 @@ class Setup:
     plant: ReachPlant
     hand: Hand
     q: Callable[[], Array]
-    present_object: Callable[[str, Aim], ReachTarget]
+    present_object: Callable[[str, Aim, bool], ReachTarget]
     first_motion: Callable[[], float | None]
 
     @property
@@ -135,11 +137,11 @@ def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> 
     hand = choose(robot, known.get(target) if isinstance(target, str) else target)
     plant = OfflinePlant(Model(robot, world))
 
-    def present_object(name: str, aim: Aim) -> ReachTarget:
+    def present_object(name: str, aim: Aim, faces: bool) -> ReachTarget:
         found = world.objects.get(name)
         if found is None or found.role != "target":
             raise UnknownName("target of the offline world", name, [one for one, other in world.objects.items() if other.role == "target"])
-        target = ReachTarget(found.position, found.size[0], aim)
+        target = ReachTarget(found.position, found.size[0], aim, faces=faces)
         plant.present(target)
         return target
 
@@ -182,18 +184,20 @@ def _reach(arguments: argparse.Namespace, setup: Setup) -> Result:
             raise UserError(f"{arguments.run} has learned to reach with {agent.marker!r}, not with {marker!r}", BAD_INPUT)
         marker, why = agent.marker, ""
     if arguments.object is None:
-        target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim)
+        target = ReachTarget(np.array(arguments.target), arguments.radius, arguments.aim, faces=arguments.facing)
         _require_outside(setup, part, marker, target.position)
         setup.plant.present(target)
     else:
-        target = setup.present_object(arguments.object, arguments.aim)
+        target = setup.present_object(arguments.object, arguments.aim, arguments.facing)
         _require_outside(setup, part, marker, target.position)
     found = nearest_posture(setup.model, part, marker, target.position, setup.q())
     setup.plant.measure(part)
     learned: dict[str, Any] = {}
     if agent is not None:
         learned["path"], learned["avoided"], learned["expected"] = go_to_pre_reach(agent, target)
+    q = setup.q()
     outcome = setup.plant.reach(part, marker, arguments.stay)
+    q[setup.robot.part(part).slice] = outcome.q
     return Result(
         **learned,
         part=part,
@@ -201,6 +205,7 @@ def _reach(arguments: argparse.Namespace, setup: Setup) -> Result:
         why=why,
         target=target,
         outcome=outcome,
+        angle=marker_error(setup.model, marker, target, q).angle if arguments.facing else None,
         nearest=found,
         reward=reward_of(outcome.missing),
         first_motion=setup.first_motion(),

@@ -136,7 +136,14 @@ def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Setup]:
             logging.getLogger().setLevel(logging.CRITICAL)  # the verb itself prints what the user needs
             plant = LivePlant(service, robot, hand.part, settings["modality"])
             service.ready()
-            yield Setup(robot, plant, hand, lambda: plant.q, plant.present_object, plant.first_motion)
+            yield Setup(
+                robot,
+                plant,
+                hand,
+                lambda: plant.q,
+                lambda name, aim, faces: plant.present_object(name, aim, faces=faces),
+                plant.first_motion,
+            )
             plant.leave()
 
 

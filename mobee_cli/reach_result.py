@@ -23,6 +23,7 @@ class Result:
 
     `why`: how marker and part were chosen; "" if they were given.  `path`: the states before the reach; empty without a run.
     `avoided`: transitions that were expected to fail, as pairs (state, goal).  `expected`: reward; None without a run.
+    `angle`: rad, between the marker's normal and the direction to the target at the end; None if it need not face the target.
     `first_motion`: time from the request to the first command that moves [s]; None offline.
     """
 
@@ -34,6 +35,7 @@ class Result:
     nearest: Nearest
     reward: float
     first_motion: float | None
+    angle: float | None = None
     path: tuple[int, ...] = ()
     avoided: tuple[tuple[int, int], ...] = ()
     expected: float | None = None
@@ -69,6 +71,7 @@ class Result:
             "avoided": [{"state": state, "goal": goal} for state, goal in self.avoided],
             "expected_reward": self.expected,
             "reward": self.reward,
+            "angle": self.angle,
             "settled": outcome.settled,
             "touched": list(outcome.touched),
             "duration": outcome.duration,
@@ -86,6 +89,8 @@ def lines(result: Result) -> list[str]:
         f"{result.marker} {verdict} the target at {_place(result.target.position)}: {1e3 * outcome.missing:.0f} mm from its {aim}, "
         f"at {_place(outcome.marker)}, after {outcome.duration:.1f} s{'' if outcome.settled else ', still moving'}.",
     ]
+    if result.angle is not None:
+        text.append(f"Its normal points {np.rad2deg(result.angle):.0f} deg beside the target.")
     if not result.reached:
         text.append(_why(result))
     if result.path:

@@ -74,7 +74,7 @@ class Reach(ctypes.Structure):
     """A reach in progress; the caller keeps the tables alive."""
 
     _fields_ = (
-        *((name, INTEGER) for name in ("part", "to_surface", "turns_normal", "joint_count")),
+        *((name, INTEGER) for name in ("part", "to_surface", "turns_normal", "faces_target", "joint_count")),
         *((name, View) for name in ("joints", "drives", "motors")),
         ("curvature", ADDRESS),
         ("target", _VECTOR), ("target_normal", _VECTOR), ("radius", REAL), ("point", _VECTOR), ("normal", _VECTOR),

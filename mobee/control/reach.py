@@ -98,11 +98,14 @@ def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> Ma
     """Return position and error of a marker at q (n,) rad."""
     pose = model.evaluate(q)
     position = pose.position(marker)
-    if target.normal is None:
-        return MarkerError(position, target.position - position, 0.0)
+    wanted, apart = target.normal, target.position - position
+    if target.faces:
+        wanted = apart / max(float(np.linalg.norm(apart)), 1e-12)
+    if wanted is None:
+        return MarkerError(position, apart, 0.0)
     normal = pose.normal(marker)
-    turn = np.cross(normal, target.normal)
-    angle = float(np.arctan2(np.linalg.norm(turn), normal @ target.normal))
+    turn = np.cross(normal, wanted)
+    angle = float(np.arctan2(np.linalg.norm(turn), normal @ wanted))
     return MarkerError(position, np.concatenate([target.position - position, ARM * turn]), angle)
 
 

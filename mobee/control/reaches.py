@@ -43,7 +43,8 @@ class Reaching:
 
     def aim(self, target: ReachTarget) -> None:
         """Set the target."""
-        self.struct.to_surface, self.struct.turns_normal = target.aim == "surface", target.normal is not None
+        self.struct.to_surface, self.struct.faces_target = target.aim == "surface", target.faces
+        self.struct.turns_normal = target.faces or target.normal is not None
         self.struct.target[:], self.struct.radius = target.position.tolist(), target.radius
         self.struct.target_normal[:] = [0.0] * 3 if target.normal is None else target.normal.tolist()
 

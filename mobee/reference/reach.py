@@ -29,6 +29,7 @@ FORCE_GAIN = math.radians(5000.0)  # rad/s^2 for a lever and a distance of 1 m; 
 
 RATE = 5.0  # 1/s: far below the rate at which commands three ticks old at 100 Hz oscillate (docs/law.md)
 ARM = 0.1  # m: an error of the normal by an angle counts as an error of the position by this times the angle
+FACING = 0.02  # m from the target's centre, within which the marker is turned less and less towards it
 LONGEST = 0.2  # m: the pull does not grow beyond this distance
 TOLERANCE = 2e-3  # m
 SOFT = 0.03  # damping, relative to the size of J E J^T
@@ -97,11 +98,14 @@ def view(r: Reach, q: Array) -> View:
     error = target.position - place
     if target.aim == "surface":
         error = error * max(0.0, 1.0 - target.radius / max(float(np.linalg.norm(error)), NOTHING))
-    wanted = normal if target.normal is None else target.normal
+    wanted, near = normal if target.normal is None else target.normal, 1.0
+    if target.faces:
+        apart = float(np.linalg.norm(target.position - place))
+        wanted, near = (target.position - place) / max(apart, NOTHING), min(1.0, apart / FACING)
     joints = joints_to(r.robot, r.robot.marker(r.marker).link)[::-1]
     columns = np.array([joint_column(r.robot, frames, j, place) for j in joints])
     drives = r.robot.coupling[0][joints][:, r.motors] * motor_units(r.robot)[r.motors]
-    return View(error, np.cross(normal, wanted), float(normal @ wanted), columns, drives)
+    return View(error, near * np.cross(normal, wanted), float(normal @ wanted), columns, drives)
 
 
 def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
@@ -156,7 +160,7 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
     """Return Jacobian (rows, m) and error (rows,), in m: three rows, or six with a wanted normal."""
-    if r.target.normal is None:
+    if r.target.normal is None and not r.target.faces:
         return v.jacobian[:3], v.error
     return v.jacobian * np.repeat([1.0, ARM], 3)[:, None], np.concatenate([v.error, ARM * v.turn])
 

@@ -50,7 +50,7 @@ class ReachClient:
                 self._call("remove", OneName, name=TARGET)
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
-    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
+    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
         """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
         Raises UnknownName; InvalidValue if its role is not target, because it then repels hands.
@@ -62,7 +62,7 @@ class ReachClient:
                 f"by {keys.world_rpc('role')}, or reach for a free position."
             )
         self.present(None)
-        self._target, self._object = ReachTarget(np.array(found.position), _inner_radius(found.geometry), aim, normal), name
+        self._target, self._object = ReachTarget(np.array(found.position), _inner_radius(found.geometry), aim, normal, faces), name
         return self._target
 
     def asked(self) -> dict[str, object]:
@@ -79,6 +79,7 @@ class ReachClient:
             "radius": target.radius,
             "aim": target.aim,
             "normal": None if target.normal is None else target.normal.tolist(),
+            "faces": target.faces,
         }
 
     def has_ended(self, part: str, action_id: str) -> bool:
@@ -210,12 +211,12 @@ class BusPlant:
         """See mobee.reach.ReachPlant; raises ActionInterrupted while the model does not answer."""
         self._reaches.present(target)
 
-    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None) -> ReachTarget:
+    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
         """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
         Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted while the model does not answer.
         """
-        return self._reaches.present_object(name, aim, normal)
+        return self._reaches.present_object(name, aim, normal, faces)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """See mobee.reach.ReachPlant."""

@@ -51,7 +51,8 @@ class Reaches:
 
     def begin(self, part: str, asked: ReachFor) -> None:
         """Start to pull the part's marker to its target; raises InvalidValue or UnknownName if the part cannot reach for it."""
-        target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, None if asked.normal is None else np.array(asked.normal))
+        normal = None if asked.normal is None else np.array(asked.normal)
+        target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, normal, asked.faces)
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
         if len(others) >= MAX_HANDS:
             raise InvalidValue(f"{' and '.join(sorted(others))} are reaching: at most {MAX_HANDS} markers may reach at once")

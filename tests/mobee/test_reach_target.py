@@ -39,3 +39,8 @@ def test_the_reward_falls_with_the_distance_in_units_of_the_scale() -> None:
     assert reward_of(0.01) == pytest.approx(0.5)
     assert reward_of(0.09) == pytest.approx(0.1)
     assert reward_of(1.0, scale=1.0) == 0.5
+
+
+def test_a_marker_either_faces_the_target_or_has_a_normal() -> None:
+    with pytest.raises(InvalidValue, match="not both"):
+        ReachTarget(np.zeros(3), normal=np.array([0.0, 0.0, 1.0]), faces=True)

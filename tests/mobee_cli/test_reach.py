@@ -44,6 +44,14 @@ def test_what_it_says_fits_together(side: str, capsys: pytest.CaptureFixture[str
     assert (result["path"], result["expected_reward"], result["first_motion"]) == ([], None, None)
 
 
+def test_a_palm_that_is_to_face_the_target_says_how_well_it_does(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--target", "-0.3", "0.2", "0.1", "--world", "none", "--aim", "surface", "--facing"]
+    code, result = reach(*words, capsys=capsys)
+    assert code == 0 and result["angle"] < np.deg2rad(5.0)
+    assert main(["reach", "--offline", *words]) == 0
+    assert "deg beside the target." in capsys.readouterr().out
+
+
 def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest.CaptureFixture[str]) -> None:
     code, result = reach("--target", "-3", "0.2", "0.1", capsys=capsys)
     assert (code, result["reached"]) == (1, False)

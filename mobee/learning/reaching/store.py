@@ -111,7 +111,7 @@ class ReachStore(AgentFile):
         made = json_of(self.path, what, text)
         try:
             normal = None if made["normal"] is None else np.array(made["normal"], dtype=float)
-            return ReachTarget(np.array(made["position"], dtype=float), made["radius"], made["aim"], normal)
+            return ReachTarget(np.array(made["position"], dtype=float), made["radius"], made["aim"], normal, made.get("faces", False))
         except (LookupError, TypeError, ValueError):  # InvalidValue is a ValueError
             raise damaged(self.path, f"{what} is not what MoBeE writes") from None
 
@@ -146,4 +146,5 @@ def _row(step: Step) -> tuple[Any, ...]:
 
 def _written(target: ReachTarget) -> str:
     normal = None if target.normal is None else target.normal.tolist()
-    return json.dumps({"position": target.position.tolist(), "radius": target.radius, "aim": target.aim, "normal": normal})
+    made = {"position": target.position.tolist(), "radius": target.radius, "aim": target.aim, "normal": normal}
+    return json.dumps({**made, "faces": True} if target.faces else made)

@@ -37,8 +37,9 @@ def drawn_target(rng: Rng, robot: Robot, marker: str) -> ReachTarget:
     """Where the marker may be, close by it or far out of reach."""
     place = marker_at(robot, link_frames(robot, rng.uniform(*robot.limits.T)), marker)[0]
     place = place + rng.normal(size=3) * rng.choice([0.0, 0.01, 0.3, 3.0])
-    normal = rng.normal(size=3) if rng.random() < 0.5 else None
-    return ReachTarget(place, float(rng.uniform(0.01, 0.2)), AIMS[rng.integers(2)], normal)
+    turning = rng.random()
+    normal = rng.normal(size=3) if turning < 0.4 else None
+    return ReachTarget(place, float(rng.uniform(0.01, 0.2)), AIMS[rng.integers(2)], normal, faces=bool(turning > 0.7))
 
 
 def agree(robot: Robot, gains: Gains, part: str | None, marker: str, rng: Rng, ticks: int = 16) -> None:

@@ -209,6 +209,20 @@ def test_the_target_repels_the_arm_but_not_the_reaching_hand() -> None:
     assert pushed(elbow, True) == pytest.approx(pushed(elbow, False)) and pushed(elbow, True) > 0.1
 
 
+def test_a_palm_turns_towards_what_it_reaches_for() -> None:
+    robot, place = load_robot("icub"), np.array([-0.3, 0.2, 0.1])
+    cosines = []
+    for faces in (False, True):
+        plant = OfflinePlant(Model(robot), 0, active=["right_arm"])
+        plant.present(ReachTarget(place, 0.04, "surface", faces=faces))
+        outcome = plant.reach("right_arm", "right_palm", stay=True)
+        assert outcome.missing < 2e-3
+        ahead = place - outcome.marker
+        cosines.append(float(plant.model.evaluate(plant.q).normal("right_palm") @ ahead / np.linalg.norm(ahead)))
+    assert cosines[0] < np.cos(np.deg2rad(30.0))
+    assert cosines[1] > np.cos(np.deg2rad(5.0))
+
+
 def test_both_hands_reach_at_once() -> None:
     plant = OfflinePlant(Model(ICUB), 0, Gains.published_2014(), dt=0.02, active=("left_arm", "right_arm"))
     plant.present(ReachTarget((-0.3, 0.0, 0.1)))

@@ -70,7 +70,7 @@ def test_a_reach_request_names_the_presented_target(client: ReachClient) -> None
     with pytest.raises(InvalidValue, match=r"no target is presented.* present\(ReachTarget"):
         client.asked()
     client.present(ReachTarget(np.array(AT), aim="surface", normal=np.array([0.0, 0.0, 2.0])))
-    expected = {"object": TARGET, "position": AT, "radius": 0.05, "aim": "surface", "normal": [0.0, 0.0, 1.0]}
+    expected = {"object": TARGET, "position": AT, "radius": 0.05, "aim": "surface", "normal": [0.0, 0.0, 1.0], "faces": False}
     assert client.asked() == expected
 
 
