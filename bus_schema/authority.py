@@ -17,6 +17,8 @@ from bus_schema.rpc import CALLS
 from bus_schema.stream import EVERYONE, READERS_OF_ALL, Party
 
 AGENT = "agent_"
+BEHAVIOURS = ("assist", "gaze")
+"""The behaviours by the names of their services, in ascending rank (services/controller/precedence.py)."""
 TOKENS = "alive/{service}/*"
 ROUTER = "router"
 
@@ -38,10 +40,12 @@ class Rights:
 
 
 def party_of(name: str) -> Party:
-    """Return the party of a name: that of a service, `agent` for agent_<part>, or `client` for any other program."""
+    """Return the party of a name: that of a service, `agent` for agent_<part>, `behaviour`, or `client` for any other program."""
     if name.startswith(AGENT):
         return "agent"
-    return next((party for party in EVERYONE if party == name and party != "agent"), "client")
+    if name in BEHAVIOURS:
+        return "behaviour"
+    return next((party for party in EVERYONE if party == name and party not in ("agent", "behaviour")), "client")
 
 
 @lru_cache(1024)

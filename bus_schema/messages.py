@@ -84,7 +84,7 @@ class Tick(Clock, frozen=True, kw_only=True):
         "tick",
         "CONTROL",
         writers=("robot_sim",),
-        readers=("model", "controller", "port_filter", "agent", "gaze", "renderer"),
+        readers=("model", "controller", "port_filter", "agent", "behaviour", "renderer"),
         when="every tick",
     )
 
@@ -182,7 +182,7 @@ class Motion(Message, frozen=True, kw_only=True):
         "{part}/motion",
         "CONTROL",
         writers=("controller",),
-        readers=("agent", "gaze", "monitor"),
+        readers=("agent", "behaviour", "monitor"),
         when="at once after a change, else up to 100 per second",
     )
 
@@ -204,7 +204,7 @@ class Follow(Message, frozen=True, kw_only=True):
     stream: ClassVar[Stream] = Stream(
         "{part}/follow",
         "LATEST",
-        writers=("gaze", "client"),
+        writers=("behaviour", "client"),
         readers=("controller",),
         when="while a behaviour moves a part, at least 20 times per second",
     )
@@ -339,7 +339,7 @@ class Geometry(Struct, frozen=True, forbid_unknown_fields=True):
 class WorldObject(Message, frozen=True, kw_only=True):
     """An object as perceived by vision."""
 
-    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "gaze", "monitor"))
+    stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "behaviour", "monitor"))
 
     name: Name
     geometry: Geometry

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 Delivery = Literal["CONTROL", "LATEST", "STEP", "STOP", "DATA", "BULK", "EVENTS", "NEWEST"]
 
 Party = Literal[
-    "robot_sim", "renderer", "model", "controller", "port_filter", "agent", "gaze", "vision", "monitor", "recorder", "launcher",
+    "robot_sim", "renderer", "model", "controller", "port_filter", "agent", "behaviour", "vision", "monitor", "recorder", "launcher",
     "operator", "observer", "client", "driver",
 ]  # fmt: skip
 """A service, or a kind of program that connects to a running system; `agent` is the agent of each part (bus_schema/authority.py)."""

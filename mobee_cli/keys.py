@@ -9,13 +9,13 @@ import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
-from bus_schema.authority import AGENT, party_of
+from bus_schema.authority import AGENT, BEHAVIOURS, party_of
 from bus_schema.stream import Party
 from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, OK
 from services.common.identity import KEYS, ROUTER, BadKeys, default_folder
 
-SERVICES = ("robot_sim", "renderer", "model", "controller", "port_filter", "gaze", "vision", "monitor", "recorder", "launcher")
+SERVICES = ("robot_sim", "renderer", "model", "controller", "port_filter", *BEHAVIOURS, "vision", "monitor", "recorder", "launcher")
 PERSONS = ("operator", "observer")
 _PARTS = ("head", "torso", "left_arm", "right_arm")  # of the iCub
 _DAYS = 365

@@ -17,10 +17,10 @@ LEASH = np.deg2rad(15.0)  # rad by which the reference may be ahead of its motor
 class Reference:
     """The moving reference of some motors; arrays (m,) in rad and rad/s."""
 
-    def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array) -> None:
-        """Start at rest at q, to stay between `low` and `high`; `where`: the motors."""
+    def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array, speed: float = SPEED) -> None:
+        """Start at rest at q, to stay between `low` and `high`; `where`: the motors; `speed`: share of their largest speed."""
         table = robot.motor_table[where]
-        self._fastest = SPEED * np.array([motor.max_velocity for motor in table])
+        self._fastest = speed * np.array([motor.max_velocity for motor in table])
         self._hardest = ACCELERATION * np.array([motor.max_acceleration for motor in table])
         self._low, self._high = np.minimum(low, q), np.maximum(high, q)
         self.q, self.velocity = q.copy(), np.zeros(len(q))

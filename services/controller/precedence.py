@@ -8,12 +8,11 @@ keeps the part until it releases it or ends; two agents, clients or commands are
 
 from __future__ import annotations
 
-BEHAVIOURS = ("gaze",)
-"""The behaviours by the names of their services, in ascending rank; everyone else is above them."""
+from bus_schema.authority import BEHAVIOURS
 
 
 def rank_of(who: str) -> int:
-    """Return the rank of a service by its name."""
+    """Return the rank of a service by its name: behaviours in the order of BEHAVIOURS, everyone else above them."""
     return BEHAVIOURS.index(who) if who in BEHAVIOURS else len(BEHAVIOURS)
 
 

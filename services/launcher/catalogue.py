@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-AGENT = "agent_"
+from bus_schema.authority import AGENT, BEHAVIOURS
+
 RECORDER = "recorder"
 
 
@@ -35,16 +36,19 @@ _ENTRIES = {
     "model": Entry("services.model", "services.model.config:Config", 1, after=(RECORDER,)),
     "controller": Entry("services.controller", "services.controller.config:Config", 2, after=("robot_sim", "model")),
     "port_filter": Entry("services.port_filter", "services.port_filter.config:Config", 2, after=("robot_sim",)),
-    "gaze": Entry(
-        "services.gaze",
-        "services.gaze.config:Config",
-        3,
-        after=("controller",),
-        nice=_NICE_PLANS,
-        vital=False,
-        participates=False,
-        real_time=True,
-    ),
+    **{
+        behaviour: Entry(
+            f"services.{behaviour}",
+            f"services.{behaviour}.config:Config",
+            3,
+            after=("controller",),
+            nice=_NICE_PLANS,
+            vital=False,
+            participates=False,
+            real_time=True,
+        )
+        for behaviour in BEHAVIOURS
+    },
     "renderer": Entry(
         "services.robot_sim.renderer",
         "services.robot_sim.config:RendererConfig",

@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any
 
 from bus_schema import keys
+from bus_schema.authority import AGENT
 from bus_schema.rpc import Empty, Stat
 from mobee.errors import MobeeError, OlderVersion, Simplified, UnknownName
 from mobee.robot.robot import Robot
@@ -20,7 +21,6 @@ from services.common import rpc
 from services.common.config import ConfigError, nearest
 from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
 from services.common.worlds import NO_WORLD
-from services.launcher.catalogue import AGENT
 from services.launcher.scenario import Part, Scenario
 
 _CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at once

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from bus_schema.authority import AGENT
 from bus_schema.rpc import Stat
-from services.launcher.catalogue import AGENT
 from services.launcher.child import Child
 
 

@@ -11,7 +11,15 @@ from bus_schema.stream import EVERYONE, Party
 
 @pytest.mark.parametrize(
     ("name", "party"),
-    [("robot_sim", "robot_sim"), ("agent_torso", "agent"), ("agent", "client"), ("operator", "operator"), ("my_tool", "client")],
+    [
+        ("robot_sim", "robot_sim"),
+        ("agent_torso", "agent"),
+        ("agent", "client"),
+        ("gaze", "behaviour"),
+        ("behaviour", "client"),
+        ("operator", "operator"),
+        ("my_tool", "client"),
+    ],
 )
 def test_a_name_has_a_party(name: str, party: Party) -> None:
     assert party_of(name) == party

@@ -17,8 +17,12 @@ from bus_schema.rpc import CALLS
 from bus_schema.stream import EVERYONE
 
 ROOT = Path(__file__).parents[2]
-SHARED = {"bus_plant.py": "agent", "followed_part.py": "gaze"}  # files of services/common that one service uses
-FOLDERS = {"agents": "agent"}  # whose parties have another name
+SHARED = {
+    "bus_plant.py": "agent",
+    "behaviour.py": "behaviour",
+    "followed_part.py": "behaviour",
+}  # files of services/common that one service uses
+FOLDERS = {"agents": "agent", "gaze": "behaviour", "assist": "behaviour"}  # whose parties have another name
 IMPLIED = {"on_clock": "Clock", "on_tick": "Tick", "Body": "State", "StopLine": "EStop"}  # functions that read one stream
 PROGRAMS = {"client", "driver"}  # of a user, outside of this repository
 MIRRORS = "port_filter"  # publishes the robot's own streams to its clients

@@ -108,7 +108,7 @@ def test_without_a_target_the_part_is_left_alone(stage: Stage) -> None:
 
 def test_the_head_turns_to_the_target_and_the_gaze_says_so(stage: Stage) -> None:
     stage.head.target = AHEAD
-    assert stage.said("gaze_follows") == "the gaze follows ball"
+    assert stage.said("gaze_follows") == "gaze follows ball"
     wait_for(lambda: stage.head.error(AHEAD) < 1.0, "the target in both centres")
     assert stage.rig.stat("gaze").text == "follows ball"
 
@@ -116,7 +116,7 @@ def test_the_head_turns_to_the_target_and_the_gaze_says_so(stage: Stage) -> None
 def test_a_stale_target_pauses_the_gaze_which_holds_and_later_releases_the_part(stage: Stage) -> None:
     """As when the camera is gone, the light is out, or something hides the target."""
     stage.head.target = None
-    assert "no place of ball for 0.6 s" in stage.said("gaze_paused")
+    assert "no place of ball for 0.6 s" in stage.said("gaze_pauses")
     held = wait_for(lambda: stage.head.follows[-1] if not any(stage.head.follows[-1].dq) else None, "the hold")
     begun = stage.rig.bus.k
     wait_for(lambda: stage.rig.bus.k > begun + 50, "ticks")
@@ -130,16 +130,16 @@ def test_a_part_that_another_service_took_is_taken_again_when_it_is_free(stage: 
     with stage.head._lock:
         stage.head.epoch, stage.head.owner = stage.head.epoch + 1, "another"
         stage.rig.alive.add(("gaze", "another"))
-    assert "belongs to another service" in stage.said("gaze_paused")
+    assert "belongs to another service" in stage.said("gaze_pauses")
     with stage.head._lock:
         stage.rig.alive.discard(("gaze", "another"))
         stage.head.owner = ""
     assert stage.said("gaze_follows")
 
 
-def test_a_part_in_hold_pauses_the_gaze_which_goes_on_from_where_the_part_is(stage: Stage) -> None:
+def test_a_part_in_hold_pauses_the_gaze_which_continues_from_where_the_part_is(stage: Stage) -> None:
     stage.head.hold()
-    assert "head is in hold" in stage.said("gaze_paused")
+    assert "head is in hold" in stage.said("gaze_pauses")
     with stage.head._lock:
         stage.head.q = ROBOT.home[HEAD]
     stage.head.follows.clear()
@@ -149,7 +149,7 @@ def test_a_part_in_hold_pauses_the_gaze_which_goes_on_from_where_the_part_is(sta
     assert np.abs(np.array(first.q) - ROBOT.home[HEAD]).max() < 0.05
 
 
-def test_the_gaze_goes_on_in_a_new_run_and_with_a_new_controller(stage: Stage) -> None:
+def test_the_gaze_continues_in_a_new_run_and_with_a_new_controller(stage: Stage) -> None:
     stage.head.new_run()
     stage.said("gaze_follows")
     stage.head.restart()

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A behaviour as a process: moves the attractor of a part by what it sees, pauses when it cannot, and reports why (docs/behaviours.md)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from bus_schema.messages import Tick, WorldObject
+from mobee.arrays import Array
+from mobee.behaviours.target import TargetTrack
+from mobee.control.gains import Gains
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import link_transforms
+from mobee.robot.motor_units import limit_zones
+from mobee.robot.robot import Robot
+from services.common.config import ServiceConfig
+from services.common.followed_part import FollowedPart
+from services.common.rate import NOT_MEASURED, Percentiles
+from services.common.service import Service
+
+LONGEST_STEP = 0.1  # s: after a longer gap between two ticks the motion continues as if only this time had passed
+
+
+class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
+    """Settings of every behaviour."""
+
+    part: str = ""
+    """Part that it moves."""
+    target: str = "ball"
+    """What it follows: an object that vision finds, or a marker of the robot."""
+    gains: Literal["default", "derived", "published_2014"] = "published_2014"
+    """Name of the controller's set of gains; motors that it never moves are left out."""
+    rate: Annotated[float, Meta(ge=20, le=200)] = 50.0
+    """Times per second at which the goal of the part moves on."""
+    patience: Annotated[float, Meta(ge=0.1, le=5)] = 0.6
+    """Time without a new place of the target after which the part stops and holds, in s of simulated time."""
+    release_after: Annotated[float, Meta(ge=0.1, le=3600)] = 10.0
+    """Time without a target after which the part is released, in s of simulated time."""
+
+    def margin(self, robot: Robot) -> Array:
+        """Return the widths (n,) of the zones before the limits in which the control law pushes inward."""
+        zones: Array = limit_zones(robot, Gains.named(self.gains).of_robot("limit_width", robot)).max(axis=1)
+        return zones
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What a behaviour sees in one step; positions and velocities are those of the tick."""
+
+    q: Array  # (n,) rad, encoders
+    velocity: Array  # (n,) rad/s, as commanded
+    place: Array  # (3,) m, of the target
+    place_velocity: Array  # (3,) m/s
+    dt: float  # s since the last step
+
+
+class Behaviour:
+    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the motion so far."""
+
+    def __init__(
+        self,
+        service: Service,
+        config: BehaviourConfig,
+        robot: Robot,
+        step: Callable[[Scene], tuple[Array, Array]],
+        reset: Callable[[], None],
+    ) -> None:
+        self._service, self._config, self._robot, self._step, self._reset = service, config, robot, step, reset
+        self._track, self._part = TargetTrack(config.patience), FollowedPart(service, robot, config.part)
+        self._marker = robot.markers.get(config.target)
+        self._last = -np.inf  # s, bus clock, of the last step
+        self._seen = -np.inf  # s, bus clock, of the last step with a target
+        self._hold: Array | None = None  # (n_part,) rad, where the part holds
+        self._pause = f"no place of {config.target} yet"  # why it pauses; empty: it follows
+        self._times = Percentiles()
+        self.mark()
+        service.on_run(self._forget)
+        if self._marker is None:
+            service.on_newest(WorldObject, self._note_object, config.target)
+        service.on_tick(self._tick)
+
+    @property
+    def status(self) -> str:
+        """What it does, or why it pauses, as a text."""
+        return f"pauses: {self._pause}" if self._pause else f"follows {self._config.target}"
+
+    def numbers(self) -> Mapping[str, float]:
+        """Return the numbers of the measurement under way."""
+        times = {f"step_ms_p{p}": self._times.at(p) if self._steps else NOT_MEASURED for p in (50, 99)}
+        return {"steps": self._steps, "follows": not self._pause, **times}
+
+    def mark(self) -> None:
+        """Start a measurement."""
+        self._steps = 0
+        self._times.clear()
+
+    def _note_object(self, thing: WorldObject) -> None:
+        try:
+            self._track.note(thing.t_capture * 1e-9, np.array(thing.position))
+        except InvalidValue as error:
+            self._service.bus.reject("value", str(error))
+
+    def _tick(self, tick: Tick) -> None:
+        now = tick.t * 1e-9
+        if tick.mode == "paused" or now - self._last < 1.0 / self._config.rate - 1e-6:
+            return
+        begin, dt, self._last = time.perf_counter(), min(now - self._last, LONGEST_STEP), now
+        q = np.array(tick.q)
+        if self._marker is not None:
+            link = link_transforms(self._robot, q)[self._marker.link]
+            self._track.note(now, link[:3, :3] @ self._marker.position + link[:3, 3])
+        known = self._track.at(now)
+        if known is None:
+            self._report(f"no place of {self._config.target} for {self._config.patience:g} s")
+            self._wait(q, now)
+            return
+        self._seen, self._hold = now, None
+        why = self._part.why_not()
+        self._report(why)
+        if why:
+            self._reset()
+            self._part.take()
+            return
+        self._part.move(*self._step(Scene(q, self._part.velocities(), *known, dt)))
+        self._steps += 1
+        self._times.add(1e3 * (time.perf_counter() - begin))
+
+    def _wait(self, q: Array, now: float) -> None:
+        """Hold the part where it is, and release it when there was no target for long."""
+        self._reset()
+        if not self._part.is_owned:
+            self._hold = None
+            return
+        if self._hold is None:
+            self._hold = q[self._robot.part(self._config.part).slice]
+        self._part.move(self._hold, np.zeros(len(self._hold)))
+        if now - self._seen > self._config.release_after:
+            self._part.release()
+
+    def _report(self, why: str) -> None:
+        """Publish an event when the behaviour pauses or continues."""
+        if why != self._pause:
+            who, self._pause = self._service.who, why
+            self._service.bus.event("info", f"{who}_pauses" if why else f"{who}_follows", f"{who} {self.status}")
+
+    def _forget(self) -> None:
+        self._track.forget()
+        self._reset()
+        self._part.forget()
+        self._last = self._seen = -np.inf
+        self._hold = None
