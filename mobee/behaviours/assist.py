@@ -23,7 +23,7 @@ from mobee.robot.robot import Robot
 Worth = Callable[[Array], Array]
 """How well an arm reaches for places (k, 3) m, with its base at home: (k,) numbers, at most 1; below 0 out of reach."""
 
-LEVELS = 7  # postures of each motor that are compared
+LEVELS = 7  # positions of each motor that are compared
 INSIDE = np.deg2rad(10.0)  # rad before each limit that are not used, at most a quarter of the range
 EFFORT = 0.1  # per rad^2: cost of a motion
 LEAST_GAIN = 0.05  # by which another posture must be better, so that the part does not move for a little
@@ -42,8 +42,8 @@ class Assistance:
 class Assist:
     """Chooses postures of a part that carries an arm."""
 
-    def __init__(self, model: Model, part: str, arm: str, worth: Worth) -> None:
-        """`part`: that moves, such as "torso"; `arm`: the part that reaches.
+    def __init__(self, model: Model, part: str, arm: str, worth: Worth, levels: int = LEVELS) -> None:
+        """`part`: that moves, such as "torso"; `arm`: the part that reaches; `levels`: positions of each motor that are compared.
 
         Raises InvalidValue if the part does not carry the arm, and UnknownName.
         """
@@ -55,8 +55,8 @@ class Assist:
         self._home = link_transforms(robot, robot.home)[self._base]
         low, high = robot.limits[span].T
         spare = np.minimum(INSIDE, 0.25 * (high - low))
-        levels = [np.linspace(a, b, LEVELS) for a, b in zip(low + spare, high - spare, strict=True)]
-        self._postures = np.stack(np.meshgrid(*levels, indexing="ij"), axis=-1).reshape(-1, len(levels))
+        compared = [np.linspace(a, b, levels) for a, b in zip(low + spare, high - spare, strict=True)]
+        self._postures = np.stack(np.meshgrid(*compared, indexing="ij"), axis=-1).reshape(-1, len(compared))
 
     def posture(self, q: Array, target: Array) -> Assistance:
         """Return where the part should be for a target (3,) m, with all other motors at q (n,) rad.

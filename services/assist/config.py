@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from mobee.behaviours.assist import Assist, learned_worth, manipulability_worth
+from mobee.behaviours.assist import LEVELS, Assist, learned_worth, manipulability_worth
 from mobee.learning.reaching.record import load_reaches
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
@@ -17,6 +17,8 @@ from mobee.store import STORE
 from services.common.behaviour import BehaviourConfig
 from services.common.hands import hand_of
 from services.common.worlds import world_around
+
+LEARNED_LEVELS = 5  # positions of each motor that are compared by a learned map: a prediction takes milliseconds
 
 
 class Config(BehaviourConfig, frozen=True, kw_only=True):
@@ -45,4 +47,5 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
             worth = learned_worth(load_reaches(Path(self.learned) / STORE, OfflinePlant(Model(robot)), self.arm).predictor)
         else:
             worth = manipulability_worth(robot, self.arm, hand_of(robot, self.arm), self.seed)
-        return Assist(Model(robot, world_around(self.world, self.robot)), self.part, self.arm, worth)
+        levels = LEARNED_LEVELS if self.learned else LEVELS
+        return Assist(Model(robot, world_around(self.world, self.robot)), self.part, self.arm, worth, levels)
