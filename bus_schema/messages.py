@@ -188,6 +188,7 @@ class Motion(Message, frozen=True, kw_only=True):
 
     action_id: Text  # empty: none yet
     epoch: Count  # goal epoch in force, 0 = no owner
+    owner: Text = ""  # service that owns the goal
     status: MotionStatus
     since_k: Count  # tick at which the status began
     start_k: Count  # tick at which the action began

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from bus_schema import keys
+from bus_schema.authority import BEHAVIOURS
 from bus_schema.messages import Follow, Motion
 from bus_schema.rpc import Done, Take, Taken, WithEpoch
 from mobee.arrays import Array
@@ -48,7 +49,7 @@ class FollowedPart:
             return f"{self._part} is in hold"
         if self.is_owned:
             return ""
-        return f"the goal of {self._part} belongs to another service" if motion.epoch else f"the goal of {self._part} is not taken yet"
+        return f"the goal of {self._part} belongs to {motion.owner}" if motion.owner else f"the goal of {self._part} is not taken yet"
 
     def velocities(self) -> Array:
         """Return the commanded velocities of all motors, (n,) rad/s."""
@@ -58,8 +59,13 @@ class FollowedPart:
         return found
 
     def take(self) -> None:
-        """Try to take the part, at most every RETRY_PERIOD; `is_owned` becomes true when the controller has agreed."""
-        now = time.monotonic()
+        """Try to take the part if it is free, at most every RETRY_PERIOD; `is_owned` becomes true when the controller has agreed.
+
+        A behaviour that has it is asked too: the controller knows the ranks.
+        """
+        now, motion = time.monotonic(), self._motions.get(self._part)
+        if motion is None or motion.owner not in ("", self._service.who, *BEHAVIOURS):
+            return
         if self.is_owned or now < self._next_try or not self._service.alive.get("controller"):
             return
         self._next_try = now + RETRY_PERIOD

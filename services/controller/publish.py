@@ -67,6 +67,7 @@ class MotionPublisher:
                 t=tick.t,
                 action_id=action.id,
                 epoch=action.owner.epoch if action.owner is not None else 0,
+                owner=action.owner.who if action.owner is not None else "",
                 status=action.status,
                 since_k=action.since_k,
                 start_k=action.start_k,

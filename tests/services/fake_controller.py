@@ -31,7 +31,7 @@ class FakeController:
         self.takes = 0
         limits = rig.robot.limits[rig.robot.part(part).slice]
         self.q = limits.mean(axis=1)
-        self.epoch, self.owner = 1000, ""
+        self.epoch, self.owner, self.owner_name = 1000, "", ""
         self.status, self.action_id, self.since_k, self.start_k = "idle", "", 0, 0
         self._target = self.q
         self._started: dict[str, Started] = {}  # by request
@@ -92,6 +92,7 @@ class FakeController:
         self._motion.put(
             action_id=self.action_id,
             epoch=self.epoch if self.owner else 0,
+            owner=self.owner_name if self.owner else "",
             status=self.status,
             since_k=self.since_k,
             start_k=self.start_k,
@@ -109,7 +110,7 @@ class FakeController:
         with self._lock:
             if self.owner not in ("", request.instance) and (request.who, self.owner) in self.rig.alive:
                 raise Refusal("owned")
-            self.owner, self.epoch, self.takes = request.instance, self.epoch + 1, self.takes + 1
+            self.owner, self.owner_name, self.epoch, self.takes = request.instance, request.who, self.epoch + 1, self.takes + 1
             return Taken(v=VERSION, epoch=self.epoch)
 
     def _release(self, request: WithEpoch, key: str) -> Done:

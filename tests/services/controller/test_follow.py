@@ -64,6 +64,7 @@ def test_everyone_may_take_a_part_from_a_behaviour_which_gets_it_back_when_it_is
     follow(run, epoch, 5)
     agent, _ = run.own("head", "agent_head")
     run.tick()
+    assert run.motion("head").owner == "agent_head"
     goal = run.motion("head").goal
     follow(run, epoch, 5)  # of an ownership that has ended
     assert run.motion("head").goal == goal

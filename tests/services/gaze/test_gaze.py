@@ -126,13 +126,14 @@ def test_a_stale_target_pauses_the_gaze_which_holds_and_later_releases_the_part(
     assert stage.said("gaze_follows")
 
 
-def test_a_part_that_another_service_took_is_taken_again_when_it_is_free(stage: Stage) -> None:
+def test_a_part_that_an_agent_took_is_taken_again_when_it_is_free(stage: Stage) -> None:
     with stage.head._lock:
-        stage.head.epoch, stage.head.owner = stage.head.epoch + 1, "another"
-        stage.rig.alive.add(("gaze", "another"))
-    assert "belongs to another service" in stage.said("gaze_pauses")
+        stage.head.epoch, stage.head.owner, stage.head.owner_name = stage.head.epoch + 1, "another", "agent_head"
+    assert "belongs to agent_head" in stage.said("gaze_pauses")
+    taken, begun = stage.head.takes, stage.rig.bus.k
+    wait_for(lambda: stage.rig.bus.k > begun + 150, "ticks")
+    assert stage.head.takes == taken and stage.head.owner == "another"  # it did not even ask
     with stage.head._lock:
-        stage.rig.alive.discard(("gaze", "another"))
         stage.head.owner = ""
     assert stage.said("gaze_follows")
 
