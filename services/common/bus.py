@@ -15,7 +15,7 @@ import zenoh.ext
 from zenoh.handlers import Callback, RingChannel
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
-from bus_schema.messages import Event, Message
+from bus_schema.messages import Event, Message, Tick
 from bus_schema.stream import Delivery
 from mobee.errors import MobeeError
 
@@ -157,6 +157,8 @@ class Bus:
             message = decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.robot_size)
             if not any_run and message.run != self.run:
                 raise Refused("run", f"{cls.__name__} of run {message.run}, the present run is {self.run}")
+            if isinstance(message, Tick) and self.part_sizes and message.parts.keys() != self.part_sizes.keys():
+                raise Refused("part", f"Tick with the parts {', '.join(message.parts)}; this robot has {', '.join(self.part_sizes)}")
         except Refused as refused:
             self.reject(refused.reason, f"{sample.key_expr}: {refused}")
             return None

@@ -110,14 +110,7 @@ class Listener:
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
         """Call a handler at each tick of the clock, with the newest state of every part."""
-
-        def whole(tick: Tick) -> None:
-            if tick.parts.keys() == self.bus.part_sizes.keys():
-                handler(tick)
-            else:
-                self.bus.reject("part", f"Tick with the parts {', '.join(tick.parts)}; this robot has {', '.join(self.bus.part_sizes)}")
-
-        self._on_time(Tick, whole)
+        self._on_time(Tick, handler)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
         """Handle only those ticks that wait for this service; in lockstep, instead of `on_clock`."""
