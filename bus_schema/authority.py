@@ -19,6 +19,7 @@ from bus_schema.stream import EVERYONE, READERS_OF_ALL, Party
 AGENT = "agent_"
 BEHAVIOURS = ("assist", "gaze")
 """The behaviours by the names of their services, in ascending rank (services/controller/precedence.py)."""
+HOST_LAUNCHER = "launcher_"  # prefix of the name of a launcher that has joined from another host
 TOKENS = "alive/{service}/*"
 ROUTER = "router"
 
@@ -40,9 +41,11 @@ class Rights:
 
 
 def party_of(name: str) -> Party:
-    """Return the party of a name: that of a service, `agent` for agent_<part>, `behaviour`, or `client` for any other program."""
+    """Return the party of a name: that of a service, or `agent`, `launcher` or `behaviour` by its form; `client` for any other program."""
     if name.startswith(AGENT):
         return "agent"
+    if name.startswith(HOST_LAUNCHER):
+        return "launcher"
     if name in BEHAVIOURS:
         return "behaviour"
     return next((party for party in EVERYONE if party == name and party not in ("agent", "behaviour")), "client")

@@ -257,7 +257,7 @@ CALLS = (
     Call("{service}/rpc/{verb}", ("stat",), Empty, Stat, EVERYONE, EVERYONE),
     Call("{service}/rpc/{verb}", ("pulse",), Empty, Pulse, EVERYONE, ("launcher", "operator")),
     Call("{service}/rpc/{verb}", ("mark", "shutdown"), Empty, Done, EVERYONE, ("launcher", "operator")),
-    Call("{service}/rpc/{verb}", ("config",), Empty, Config, EVERYONE, _READERS),
+    Call("{service}/rpc/{verb}", ("config",), Empty, Config, EVERYONE, ("launcher", *_READERS)),
     Call("{service}/rpc/{verb}", ("rest", "resume"), Empty, Done, ("agent",), _PERSONS),
     Call("{service}/rpc/{verb}", ("explore",), Explore, Done, ("agent",), _PERSONS),
     Call("{part}/meta", (), Empty, PartMeta, ("robot_sim",), ("controller", "port_filter", *_READERS)),

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+import socket
 from pathlib import Path
 
 from experiments.kit.command_line import positive_number, positive_whole
@@ -46,11 +48,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keys", type=Path, metavar="DIR", help=text)
     text = "allow an ADDRESS that other hosts reach, without --secure: every program that reaches it can move the robot"
     parser.add_argument("--insecure", action="store_true", help=text)
+    hosts = parser.add_argument_group("several hosts", "The first names what others start, and the others join it (docs/hosts.md).")
+    text = "services that another host starts, which joins this one; they are waited for, and reported with their host"
+    hosts.add_argument("--elsewhere", type=_names, default=(), metavar="SERVICE,..", help=text)
+    hosts.add_argument("--join", type=endpoint, metavar="ADDRESS", help="start services of the system whose router is at that address")
+    hosts.add_argument("--only", type=_names, default=(), metavar="SERVICE,..", help="with --join: the services to start here")
+    text = "with --join: the name of this host in status and events (default: the computer's name)"
+    hosts.add_argument("--host", metavar="NAME", help=text)
     parser.add_argument("--runs", type=Path, default=Path("runs"), metavar="DIR", help="parent of the run's folder (default: runs)")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r}: write the names of services with commas between them, such as vision,monitor")
+    return tuple(dict.fromkeys(names))
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    """Raise UserError for options that do not go together."""
+    for option, value in (("--only", arguments.only), ("--host", arguments.host)):
+        if value and arguments.join is None:
+            raise UserError(f"{option} is for a host that joins another one's system: give --join ADDRESS too", BAD_INPUT)
+    if arguments.join is not None and not arguments.only:
+        raise UserError("--join needs --only: the services to start on this host, such as --only vision,monitor", BAD_INPUT)
+    for option, value in (("--endpoint", arguments.endpoint), ("--elsewhere", arguments.elsewhere), ("--insecure", arguments.insecure)):
+        if value and arguments.join is not None:
+            raise UserError(f"{option} is for the host with the router: leave it out with --join", BAD_INPUT)
+
+
+def _computer() -> str:
+    """Return the computer's name, as a name on the bus."""
+    return re.sub(r"[^a-z0-9_]+", "_", socket.gethostname().partition(".")[0].lower()).strip("_") or "other"
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Launch, and return at the end."""
+    _check(arguments)
     if arguments.keys is not None and not arguments.secure:
         raise UserError("--keys is for --secure: give both, or neither", BAD_INPUT)
     if arguments.secure and arguments.insecure:
@@ -70,5 +104,9 @@ def run(arguments: argparse.Namespace) -> int:
             runs=arguments.runs,
             keys=(arguments.keys or default_folder()) if arguments.secure else None,
             insecure=arguments.insecure,
+            elsewhere=arguments.elsewhere,
+            join=arguments.join,
+            only=arguments.only,
+            host=arguments.host or _computer(),
         )
     )

@@ -46,8 +46,9 @@ class LivePlant(BusPlant):
     def __init__(self, service: Service, robot: Robot, part: str, modality: str) -> None:
         super().__init__(service, robot, (part,))
         self._service, self._where, self._moves = service, robot.part(part).slice, MOVES[modality]
-        self._asked = self._begun = np.inf  # s, monotonic clock: of the request, and of the controller's start of the reach
-        self._commands: list[tuple[float, Array]] = []  # time and value: the last before the request, and those after it
+        self._asked = self._heard = np.inf  # s, monotonic clock: of the request, and of the first message of the reach
+        self._begun = np.inf  # s, the controller's clock, which may be that of another host: of that message
+        self._commands: list[tuple[float, Array]] = []  # time by that clock, and value: the last before the request, and those after it
         service.on_each(Reach, self._note_reach, part)
         service.on_each(Commands, self._note_commands)
 
@@ -74,14 +75,14 @@ class LivePlant(BusPlant):
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Do the same as `BusPlant`, but raise an error after REACH_TIMEOUT."""
-        self._asked, self._begun = time.monotonic(), np.inf
+        self._asked, self._heard, self._begun = time.monotonic(), np.inf, np.inf
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().reach(part, marker, stay)
 
     def first_motion(self) -> float | None:
         """Return the time from the last request to the first command that moves [s]; None if there was none."""
         moved = first_moving_command(self._commands, self._begun, self._moves)
-        return None if moved is None else moved - self._asked
+        return None if moved is None else self._heard - self._asked + moved - self._begun
 
     @contextmanager
     def _timeout(self, patience: float, why: str) -> Iterator[None]:
@@ -99,16 +100,15 @@ class LivePlant(BusPlant):
             waits = False
 
     def _note_reach(self, reach: Reach) -> None:
-        """Note when the controller began the reach; its clock is that of this machine."""
-        if reach.phase == "reaching" and reach.tw * 1e-9 > self._asked:
-            self._begun = min(self._begun, reach.tw * 1e-9)
+        """Note when the first message of the reach was sent, by the controller's clock, and when it came, by this process's."""
+        if reach.phase == "reaching" and not np.isfinite(self._begun):
+            self._heard, self._begun = time.monotonic(), reach.tw * 1e-9
 
     def _note_commands(self, commands: Commands) -> None:
-        sent = commands.tw * 1e-9
-        if sent < self._asked:
+        if not np.isfinite(self._asked):
             self._commands.clear()
-        if sent < self._asked + RECORDED_TIME:
-            self._commands.append((sent, np.array(commands.ref[self._where])))
+        if time.monotonic() < self._asked + RECORDED_TIME:
+            self._commands.append((commands.tw * 1e-9, np.array(commands.ref[self._where])))
 
 
 def first_moving_command(commands: list[tuple[float, Array]], begun: float, moves: float) -> float | None:

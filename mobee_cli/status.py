@@ -19,6 +19,7 @@ from services.common.text import printable
 
 _LISTEN = 0.3  # s: longer than the pause between two states of a part
 _RESTARTS = "restarts_"
+_HOST = "host_"
 _AGENT = "agent_"
 NO_COMMAND = -1  # age of the command in force, in a State
 
@@ -50,8 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[str, Any]:
-    """Return the state of every service that is present or that the launcher supervises."""
+    """Return the state of every service that is present or that the launcher supervises; `host`: None for that of the launcher."""
     launcher = answers.get("launcher")
+    words = launcher.words if launcher else {}
     restarts = {
         name.removeprefix(_RESTARTS): int(count or 0)
         for name, count in (launcher.numbers if launcher else {}).items()
@@ -64,6 +66,7 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
             continue
         services[who] = {
             "state": "down" if who not in present else "silent" if stat is None else "ready" if stat.ready else "starting",
+            "host": words.get(f"{_HOST}{who}"),
             "pid": stat.pid if stat else None,
             "uptime_s": stat.uptime if stat else None,
             "restarts": restarts.get(who),
@@ -86,13 +89,14 @@ def _part(received: Received) -> dict[str, Any]:
 
 def _as_text(status: dict[str, Any]) -> str:
     columns = shutil.get_terminal_size().columns  # 80 in a pipe
-    lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>7}{'restarts':>10}  says"]
+    width = 11 if any(service["host"] for service in status["services"].values()) else 0  # on one host there is no such column
+    lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>7}{'restarts':>10}  {'host'[:width]:<{width}}says"]
     for who, service in status["services"].items():
         refused = sum(service["rejected"].values())
         says = f"refused {refused}; {service['text']}" if refused else service["text"]
         lines.append(
             f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>7}{_say(service['restarts']):>10}  "
-            f"{printable(' '.join(says.split()))}"[:columns].rstrip()
+            f"{_say(service['host'])[: max(0, width - 1)]:<{width}}{printable(' '.join(says.split()))}"[:columns].rstrip()
         )
     pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
     lines += [f"page  {page}" for page in pages]  # not cut to the width of the terminal

@@ -104,11 +104,25 @@ class KeyFolder:
         known = {one.name: one for one in self.issued()}
         for name in names:
             Identity(self.path, name).require()
-            if known[name].days_left() < 0:
+            self._require_valid(known[name])
+
+    def require_certificates(self, names: Iterable[str]) -> None:
+        """Raise BadKeys for the first of these identities, whose private keys may be elsewhere, that nothing could connect with now."""
+        known = {one.name: one for one in self.issued()}
+        for name in names:
+            if name not in known:
                 raise BadKeys(
-                    f"the certificate of {name} in {self.path} expired on {known[name].until:%Y-%m-%d}: "
-                    f"renew it with `mobee keys add {name} --keys {self.path}`"
+                    f"{self.path / name}.crt is missing, so that {name} of another host cannot connect: make it with `mobee keys add "
+                    f"{name} --keys {self.path}`"
                 )
+            self._require_valid(known[name])
+
+    def _require_valid(self, one: Issued) -> None:
+        if one.days_left() < 0:
+            raise BadKeys(
+                f"the certificate of {one.name} in {self.path} expired on {one.until:%Y-%m-%d}: "
+                f"renew it with `mobee keys add {one.name} --keys {self.path}`"
+            )
 
     def _authority(self) -> x509.Certificate:
         path = self.path / f"{AUTHORITY}.crt"

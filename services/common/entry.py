@@ -19,15 +19,16 @@ from services.common.session import BusUnreachable
 from services.common.text import printable
 
 HELD = "MOBEE_HELD"
-"""Environment variable: the instance of the launcher that has started this process, and closes its standard input when it may join."""
+"""Environment variable of a process that a launcher has started: the instance of the router that it may join, and, if its launcher has
+joined from another host, the launcher's name and instance.  The launcher closes the process's standard input when it may join."""
 
 
-def wait_until_released() -> str:
-    """Wait until the services on which this one depends are ready, if a launcher has started it; return the launcher's instance, or ""."""
-    launcher = os.environ.pop(HELD, "")
-    if launcher:
+def wait_until_released() -> tuple[str, ...]:
+    """Wait until the services on which this one depends are ready, if a launcher has started it; return the words of HELD, or ()."""
+    held = os.environ.pop(HELD, "").split()
+    if held:
         os.read(sys.stdin.fileno(), 1)  # returns at the end of the file, also when the launcher has died
-    return launcher
+    return tuple(held)
 
 
 def robot_of(config: ServiceConfig) -> Robot:

@@ -81,7 +81,8 @@ class Service(Listener):
         if config.mode == "lock":
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
-        self._launcher = wait_until_released() if session is None else ""
+        held = wait_until_released() if session is None else ()
+        self._launcher, self._host_launcher = (held or ("",))[0], held[1:]  # instance of the first one; name and instance of the own one
         self._lease = lease
         session = session or self._open_session()
         with ExitStack() as failed:
@@ -109,8 +110,10 @@ class Service(Listener):
         self.started = time.monotonic()
         self.describe: Callable[[], tuple[str, Mapping[str, float]]] = lambda: ("", {})
         self.words: Callable[[], Mapping[str, str]] = dict  # of `stat`: values that are not numbers
+        self.configuration: Callable[[], bytes] = lambda: msgspec.json.encode(self.config)  # JSON, the answer to `config`
         self.mark: Callable[[], None] = lambda: None  # called at the start of a measurement: sets the counters of `describe` to 0
         self.end: Callable[[], None] = _leave  # called after a shutdown call
+        self.on_new_system: Callable[[], None] = _leave_old_system  # called when another launcher or router answers
         self._answering = Answering(self.bus)
         self._stats: deque[float] = deque([0.0] * FRESH_STATS, FRESH_STATS)  # monotonic times of the newest answers that were computed
         self._last_stat: Stat | None = None
@@ -206,7 +209,7 @@ class Service(Listener):
         self.inbox.spin(until, enough)
 
     def run(self) -> None:
-        """Run handlers until SIGTERM, a shutdown call, or ten seconds without a router."""
+        """Run handlers until SIGTERM, a shutdown call, or ten seconds without a router or its own launcher."""
         spin = self.inbox.serve if self._serves else self.inbox.spin
         while True:
             spin(time.monotonic() + 1.0)
@@ -218,16 +221,28 @@ class Service(Listener):
         raise SystemExit(OK)
 
     def check_router(self) -> None:
-        """End the process after ten seconds without a router, and after a signal whose exception was lost, as in a finalizer."""
+        """End the process after ten seconds without a router or its own launcher, and after a signal whose exception was lost."""
         if self._signalled:
             raise SystemExit(OK)
-        if self._router in self.alive.get("router", ()):
+        missing = self._missing()
+        if not missing:
             self._router_seen = time.monotonic()
         elif time.monotonic() - self._router_seen > ORPHANED:
             self.log.error(
-                "no router at %s for %g s: this service ends; start the system again with `mobee launch`", self.config.endpoint, ORPHANED
+                "no %s at %s for %g s: this service ends; start the system again with `mobee launch`",
+                missing,
+                self.config.endpoint,
+                ORPHANED,
             )
             raise SystemExit(ENVIRONMENT)
+
+    def _missing(self) -> str:
+        """Return which process this service cannot be without and does not see; empty if it sees all."""
+        if self._router not in self.alive.get("router", ()):
+            return "router"
+        if self._host_launcher and self._host_launcher[1] not in self.alive.get(self._host_launcher[0], ()):
+            return self._host_launcher[0]
+        return ""
 
     def _watch_liveliness(self) -> None:
         def enqueue(sample: zenoh.Sample) -> None:
@@ -269,8 +284,9 @@ class Service(Listener):
         if not isinstance(answer, Stat) or self.who == who:
             return
         if answer.instance != self._router:
-            self.log.error("another %s answers at %s, of a new system: this service ends", who, self.config.endpoint)
-            raise SystemExit(ENVIRONMENT)
+            self.log.error("another %s answers at %s: the system of this process has ended", who, self.config.endpoint)
+            self.on_new_system()
+            return
         self._strays.add(router)
 
     def _check_health(self) -> None:
@@ -315,7 +331,7 @@ class Service(Listener):
         return Done(v=VERSION)
 
     def _config(self, request: Empty, key: str) -> Config:
-        return Config(v=VERSION, config=msgspec.json.encode(self.config).decode())
+        return Config(v=VERSION, config=self.configuration().decode())
 
     def _shutdown(self, request: Empty, key: str) -> Done:
         self.log.info("%s requested the end", request.who)
@@ -339,6 +355,10 @@ def return_free_memory() -> None:
 
 def _leave() -> None:
     raise SystemExit(OK)
+
+
+def _leave_old_system() -> None:
+    raise SystemExit(ENVIRONMENT)
 
 
 def _ignore_signals() -> None:

@@ -15,6 +15,8 @@ import zenoh
 
 from services.common.identity import LONGEST_SOCKET, Identity, secured
 
+Session = zenoh.Session  # for modules that do not import zenoh
+
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s

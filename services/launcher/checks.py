@@ -53,22 +53,30 @@ def _remedy(package: str, extra: str) -> str:
     return f': pip install "mobee[{extra}]"'
 
 
-def check_ports(scenario: Scenario, endpoint: str) -> None:
-    """Raise SystemRuns if a system runs at the endpoint; else PortInUse for the first `..._port` setting whose loopback port is taken.
-
-    A port may belong to a system at the default endpoint: then SystemRuns describes that one.
-    """
-    ports = [(part.who, name, getattr(part.config, name)) for part in scenario.parts for name in part.config.__struct_fields__]
-    ports = [(who, name, port) for who, name, port in ports if name.endswith("_port")]
-    taken = [(who, name, port) for who, name, port in ports if not _is_free(port)]
+def check_endpoint(scenario: Scenario, endpoint: str) -> None:
+    """Raise SystemRuns if a system runs at the endpoint, or, at the default endpoint, one that may hold a port of this scenario."""
+    ports = _ports(scenario)
+    taken = any(not _is_free(port) for _, _, port in ports)
     for place in dict.fromkeys([endpoint, *([DEFAULT_ENDPOINT] if taken else [])]):
         if stat := launcher_at(place):
             raise SystemRuns(_two_systems(stat, place, endpoint, ports))
-    for who, name, port in taken:
+
+
+def check_ports(scenario: Scenario) -> None:
+    """Raise PortInUse for the first `..._port` setting whose loopback port is taken."""
+    for who, name, port in _ports(scenario):
+        if _is_free(port):
+            continue
         raise PortInUse(
             f"port {port} of {who} is in use: choose another with --set services.{who}.{name}={_free_port(port + 1)}, "
             f"or leave {who} out with --headless"
         )
+
+
+def _ports(scenario: Scenario) -> list[tuple[str, str, int]]:
+    """Return service, name and value of each `..._port` setting."""
+    settings = [(part.who, name, getattr(part.config, name)) for part in scenario.parts for name in part.config.__struct_fields__]
+    return [(who, name, port) for who, name, port in settings if name.endswith("_port")]
 
 
 def launcher_at(endpoint: str) -> Stat | None:

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from bus_schema.rpc import Stat
 from services.common.entry import HELD
@@ -22,6 +22,42 @@ Phase = Literal["waiting", "starting", "ready", "failed", "fault", "ended"]
 _ONE_THREAD = {
     f"{pool}_NUM_THREADS": "1" for pool in ("OMP", "OPENBLAS", "MKL", "RAYON", "NUMEXPR", "VECLIB_MAXIMUM")
 }  # the processes are the parallelism
+
+
+class Watched(Protocol):
+    """What a launcher shows of a service, which it has started or another host."""
+
+    @property
+    def who(self) -> str:
+        """The service's name."""
+
+    @property
+    def host(self) -> str:
+        """The host that has started it; empty: this one, or not known."""
+
+    @property
+    def phase(self) -> Phase:
+        """The phase."""
+
+    @property
+    def pid(self) -> int:
+        """The process id on its host; 0 while no process runs."""
+
+    @property
+    def restarts(self) -> int:
+        """How often it was started again."""
+
+    @property
+    def stat(self) -> Stat | None:
+        """The last answer of the present process."""
+
+    @property
+    def reason(self) -> str:
+        """Why it failed last."""
+
+    @property
+    def lets_others_start(self) -> bool:
+        """Whether services that come after it may start."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +97,7 @@ class Child:
     advanced_at: float = 0.0  # monotonic time at which the inbox was last seen to advance
     starvation: Starvation | None = None  # of it and the launcher, in the present silence
     reason: str = ""  # of the last failure
+    host: str = ""
 
     @property
     def who(self) -> str:
@@ -72,12 +109,17 @@ class Child:
         """The process id; 0 while no process runs."""
         return 0 if self.process is None else self.process.pid
 
+    @property
+    def lets_others_start(self) -> bool:
+        """Whether services that come after it may start: it is ready, or is not needed and has failed."""
+        return self.phase in ("ready", "ended") or (bool(self.failures) and not self.program.vital)
+
     def enter(self, phase: Phase) -> None:
         """Change the phase."""
         self.phase, self.since = phase, time.monotonic()
 
     def spawn(self, launcher: str) -> None:
-        """Start the process for the launcher of that instance, in its own group, so that Ctrl-C in a terminal reaches the launcher only.
+        """Start the process, in its own group, so that Ctrl-C in a terminal reaches the launcher only; `launcher`: the words of HELD.
 
         It stays in the same session, because with autogroup scheduling niceness counts only within one.  The service imports its
         packages, reads its robot, and then waits for `release` before it joins the system.

@@ -8,11 +8,13 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import FrameType
+
+import msgspec
 
 from bus_schema import keys
 from bus_schema.rpc import Done
@@ -21,25 +23,16 @@ from services.common.config import ConfigError, ServiceConfig
 from services.common.emergency_stop import BY_LAUNCHER, StopRecord
 from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
-from services.common.identity import BadKeys, assume, is_local, secured
-from services.common.refusals import RefusalLog
+from services.common.identity import BadKeys, secured
 from services.common.rpc import CallFailed
-from services.common.service import Service
-from services.common.session import (
-    DEFAULT_ENDPOINT,
-    LEASE,
-    LOCAL_ENDPOINT,
-    BusUnreachable,
-    local_endpoint,
-    open_client,
-    open_router,
-    spare_threads,
-)
+from services.common.service import ORPHANED, Service
+from services.common.session import LOCAL_ENDPOINT, BusUnreachable
 from services.launcher.catalogue import RECORDER
 from services.launcher.checks import (
     MissingExtra,
     PortInUse,
     SystemRuns,
+    check_endpoint,
     check_extras,
     check_gains,
     check_lockstep,
@@ -48,17 +41,22 @@ from services.launcher.checks import (
     check_robots,
     check_services,
 )
-from services.launcher.child import Program
+from services.launcher.child import Program, Watched
+from services.launcher.connection import Connection, default_endpoint, join_bus, open_bus
+from services.launcher.hosts import JoinRefused, agreement, check_elsewhere, check_names
+from services.launcher.remote import SERVICES, Remote, Remotes
 from services.launcher.run_directory import make_run_directory
 from services.launcher.scenario import Scenario, read_scenario
 from services.launcher.screen import Screen
-from services.launcher.security import LAUNCHER, Refusals, Security
+from services.launcher.security import Refusals
 from services.launcher.stops import EmergencyStops
 from services.launcher.summary import as_text, summarise
 from services.launcher.supervisor import Supervisor
 
 _REDRAW = 0.5  # s
 _NO_LIMIT = 1e6  # s
+_PATIENCE_BEYOND_A_NETWORK = 10.0  # s without an answer after which a service of a joined host, whose router is elsewhere, can be frozen
+_JOIN_AGAIN = -1  # in place of an exit code
 _START_NOTICE = 5.0  # s after all are ready: a run in lockstep that is still at tick 0 is reported
 
 
@@ -79,19 +77,31 @@ class Options:
     runs: Path = Path("runs")
     keys: Path | None = None  # folder of keys; with it the system is secured
     insecure: bool = False  # an address that other hosts reach is allowed without keys
+    elsewhere: tuple[str, ...] = ()  # services that other hosts start
+    join: str | None = None  # endpoint of the system of another host, of which this one starts `only`
+    only: tuple[str, ...] = ()
+    host: str = ""  # name of this host, with `join`
 
 
 def launch(options: Options) -> int:
-    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C."""
-    with contextlib.ExitStack() as open_meanwhile:
-        return _launch(options, open_meanwhile)
+    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C.
+
+    If the system that it has joined was started again, it joins the new one.
+    """
+    while True:
+        with contextlib.ExitStack() as open_meanwhile:
+            code = _launch(options, open_meanwhile)
+        if code != _JOIN_AGAIN:
+            return code
 
 
 def refused_now(options: Options) -> int:
     """Print why the scenario cannot be started beside what runs now, and return the exit code; 0 if it can."""
     try:
         scenario = _read(options)
-        check_ports(scenario, _endpoint(options, scenario))
+        endpoint = options.endpoint or default_endpoint(scenario)
+        check_endpoint(scenario, endpoint if options.keys is None else secured(endpoint))
+        check_ports(scenario)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
     except (PortInUse, SystemRuns) as error:
@@ -99,76 +109,66 @@ def refused_now(options: Options) -> int:
     return OK
 
 
-def _endpoint(options: Options, scenario: Scenario) -> str:
-    endpoint = options.endpoint or str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
-    return endpoint if options.keys is None else secured(endpoint)
-
-
 def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
-    started, local = time.monotonic(), ""
+    started = time.monotonic()
     try:
         scenario = _read(options)
-        endpoint = _endpoint(options, scenario)
-        security = _security(options, scenario, endpoint)
-        log = None if security is None else RefusalLog.open()
+        here = _of_this_host(options, scenario)
         library()  # if the core cannot be loaded: one error here instead of one from each service
         check_gains(scenario)
         check_lockstep(scenario)
         robots = check_robots(scenario)
-        check_services(scenario, robots)
+        check_services(here, robots)
         check_rate(scenario, robots)
-        check_extras(scenario)
-        check_ports(scenario, endpoint)
-        lease = LEASE
-        if scenario.is_locked:
-            spare_threads()
-            lease = max(part.config.patience for part in scenario.parts)
-            local = "" if security else open_meanwhile.enter_context(local_endpoint())  # a socket shows no certificate
-        identity, access = (security.router, security.access) if security else (None, None)
-        router = open_meanwhile.enter_context(open_router(endpoint, lease, local, identity, access))
-        session = open_client(local or endpoint, lease=lease)  # the router itself runs no Python, so that nothing here delays a message
+        check_extras(here)
+        if options.join is None:
+            endpoint = options.endpoint or default_endpoint(scenario)
+            bus = open_bus(scenario, here, endpoint, options.keys, options.insecure, options.elsewhere, open_meanwhile)
+        else:
+            bus = join_bus(scenario, here, options.join, options.host, options.keys)
     except ConfigError as error:
         return _refuse(str(error), BAD_INPUT)
-    except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable, BadKeys) as error:
+    except (CoreUnavailable, MissingExtra, PortInUse, SystemRuns, BusUnreachable, BadKeys, JoinRefused) as error:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before any service was started", INTERRUPTED)
     try:
-        directory = make_run_directory(options.runs, scenario, endpoint)
-        record = StopRecord.of_endpoint(endpoint)
-        record.create()
-        service = Service("launcher", ServiceConfig(endpoint=endpoint), session=session)
-        service.log = service.bus.log = set_up_log("launcher", directory / "logs" / "launcher.log")
+        directory = make_run_directory(options.runs, here, bus.endpoint)
+        record = _stop_record(bus, scenario, here)
+        service = Service(bus.who, ServiceConfig(endpoint=bus.endpoint), session=bus.session)
+        service.log = service.bus.log = set_up_log(bus.who, directory / "logs" / f"{bus.who}.log")
     except OSError as error:
         return _refuse(
             f"cannot write {error.filename or options.runs}: {error.strerror}; choose another folder of runs with --runs, "
             "or of the record of emergency stops with the variable XDG_STATE_HOME",
             ENVIRONMENT,
         )
-    with service, router.liveliness().declare_token(keys.alive("router", service.instance)):
-        run = _Run(service, scenario, directory, options, local, security, record)
-        if log is not None:
-            Refusals(service, log)
+    router = bus.router  # its token ends before the session of the service
+    token = contextlib.nullcontext() if router is None else router.liveliness().declare_token(keys.alive("router", service.instance))
+    with service, token:
+        run = _Run(service, bus, scenario, here, directory, options, record)
+        if bus.refusals is not None:
+            Refusals(service, bus.refusals)
         return run.execute(started)
 
 
-def _security(options: Options, scenario: Scenario, endpoint: str) -> Security | None:
-    """Return the keys of a secured launch, and give this process the launcher's; raises ConfigError for an open endpoint without them."""
-    if options.keys is None:
-        assume(None)
-        if not is_local(endpoint):
-            if not options.insecure:
-                raise ConfigError(
-                    f"other hosts can reach {endpoint}: launch with --secure, for which `mobee keys new` makes the keys, or with "
-                    "--insecure: then every program that reaches it can move the robot"
-                )
-            print(f"mobee launch: every program that reaches {endpoint} can move the robot", file=sys.stderr)
+def _of_this_host(options: Options, scenario: Scenario) -> Scenario:
+    """Return the services that this host starts; raises ConfigError for names that are not in the scenario."""
+    if options.join is None:
+        check_elsewhere(options.elsewhere, scenario)
+        return scenario.only([part.who for part in scenario.parts if part.who not in options.elsewhere])
+    check_names("--only", options.only, scenario)
+    return scenario.only(options.only)
+
+
+def _stop_record(bus: Connection, scenario: Scenario, here: Scenario) -> StopRecord | None:
+    """Return the record of emergency stops, which is on the host of robot_sim; None if that is another one.  Raises OSError."""
+    is_elsewhere = bus.first is not None or any(part.who == "robot_sim" for part in scenario.parts)
+    if is_elsewhere and not any(part.who == "robot_sim" for part in here.parts):
         return None
-    security = Security(options.keys, scenario)
-    assume(security.identity(LAUNCHER))
-    if security.expiring:
-        print(f"mobee launch: keys expire soon, renew them with `mobee keys add`: {', '.join(security.expiring)}", file=sys.stderr)
-    return security
+    record = StopRecord.of_endpoint(bus.endpoint)
+    record.create()
+    return record
 
 
 def _read(options: Options) -> Scenario:
@@ -199,21 +199,42 @@ class _Run:
     def __init__(
         self,
         service: Service,
+        bus: Connection,
         scenario: Scenario,
+        here: Scenario,
         directory: Path,
         options: Options,
-        local: str,
-        security: Security | None,
-        record: StopRecord,
+        record: StopRecord | None,
     ) -> None:
-        """`local`: the address at which the services connect to the router, if not its endpoint; `record`: of emergency stops."""
-        self._service, self._scenario, self._directory, self._options = service, scenario, directory, options
+        """`scenario`: all services; `here`: those of this host; `record`: of emergency stops, None if it is on another host."""
+        self._service, self._bus, self._scenario, self._directory, self._options = service, bus, scenario, directory, options
         self._screen = Screen(scenario.title or scenario.name)
         self._record = record
         self._stops = EmergencyStops(service, record, self._announce)
-        self._supervisor = Supervisor(service, _programs(scenario, directory, local, security), self._stops, self._announce)
+        first = bus.first
+        elsewhere = {part.who: part.entry.vital for part in scenario.parts if part not in here.parts}
+        self._remotes = Remotes(service, elsewhere, self._announce, self._give_up) if first is None else Remotes(service, elsewhere)
+        self._supervisor = Supervisor(
+            service,
+            _programs(here, directory, bus),
+            self._stops,
+            self._announce,
+            held=service.instance if first is None else f"{first.instance} {service.who} {service.instance}",
+            elsewhere=self._remotes.services,
+            is_reachable=lambda: first is None or first.instance in service.alive.get("router", ()),
+        )
         self._children = self._supervisor.children.values()
-        self._stop_requested, self._starting = False, True
+        self._judged: Sequence[Remote] = list(self._remotes.services.values()) if first is None else ()
+        self._shown: Sequence[Watched] = [*self._children, *self._judged]
+        self._stop_requested, self._starting, self._join_again = False, True, False
+        if first is None:
+            text = msgspec.json.encode(agreement(scenario, service.instance, options.elsewhere))
+            service.configuration = lambda: text
+            service.words = lambda: {f"host_{remote.who}": remote.host for remote in self._judged if remote.host}
+        else:
+            service.words = lambda: {SERVICES: " ".join(child.who for child in self._children)}
+            service.on_new_system = self._note_new_system
+            service.on_alive(self._note_router)
 
     def execute(self, started: float) -> int:
         """Start, supervise and stop the services, and report; return the exit code; `started`: monotonic time of the launch [s]."""
@@ -222,7 +243,8 @@ class _Run:
         self._service.ready()
         ready, duration = self._live(started)
         with contextlib.suppress(OSError):  # one that is left does no harm
-            self._record.remove()
+            if self._record is not None:
+                self._record.remove()
         return self._report(ready, duration)
 
     def _live(self, started: float) -> tuple[float | None, float]:
@@ -231,8 +253,11 @@ class _Run:
         try:
             self._draw()
             self._announce_stop()
+            if self._judged:
+                self._announce(self._how_to_join())
+            self._remotes.begin()
             self._supervisor.begin()
-            self._spin(_NO_LIMIT, self._supervisor.settled)
+            self._spin(_NO_LIMIT, self._is_settled)
             if not self._over():
                 self._starting = False
                 ready = time.monotonic() - started
@@ -248,11 +273,16 @@ class _Run:
                 self._ask_final_numbers()
             duration = 0.0 if begun is None else time.monotonic() - begun
             self._announce("stopping")
+            if self._bus.first is None:
+                self._remotes.end_hosts()
             self._supervisor.stop()
         finally:
             self._supervisor.kill_all()
-            self._screen.draw(self._children, self._directory, last=True)
+            self._screen.draw(self._shown, self._directory, last=True)
         return ready, duration
+
+    def _is_settled(self) -> bool:
+        return self._supervisor.settled() and all(remote.phase in ("ready", "fault") for remote in self._judged)
 
     def _over(self) -> bool:
         """Return whether to end: on request, or because the robot is stopped permanently in a run without a user."""
@@ -263,9 +293,9 @@ class _Run:
         self._service.spin(time.monotonic() + seconds, lambda: self._over() or enough())
 
     def _mark(self) -> None:
-        """Start the measurement of every service now."""
+        """Start the measurement of every service now; those of a joined host belong to the first host's measurement."""
         waiting: set[str] = set()
-        for child in self._children:
+        for child in self._shown if self._bus.first is None else ():
             if child.phase == "ready":
                 waiting.add(child.who)
                 done = partial(_note_marked, waiting, child.who)
@@ -278,7 +308,38 @@ class _Run:
         for child in self._children:
             if child.phase == "ready":
                 self._supervisor.ask(child)
-        self._service.spin(asked + 2.0, lambda: not any(child.asking for child in self._children))
+        for remote in self._judged:
+            if remote.phase == "ready":
+                self._remotes.ask(remote)
+        self._service.spin(asked + 2.0, lambda: not self._is_asking())
+
+    def _is_asking(self) -> bool:
+        return any(child.asking for child in self._children) or any(remote.asking for remote in self._judged)
+
+    def _give_up(self, remote: Remote) -> None:
+        self._supervisor.report_fault(f"{remote.who} {remote.reason}", remote.vital)
+
+    def _how_to_join(self) -> str:
+        names = ",".join(remote.who for remote in self._judged)
+        secure = " --secure" if self._bus.security else ""
+        return f"{names}: started on another host with `mobee launch {self._options.scenario} --only {names} --join ADDRESS{secure}`"
+
+    def _note_router(self, who: str, instance: str, up: bool) -> None:
+        """Report on a joined host whether the router of the first one is reachable."""
+        if self._bus.first is None or who != "router" or instance != self._bus.first.instance:
+            return
+        if up:
+            self._announce(f"connected with the router at {self._bus.endpoint}")
+        elif not self._stop_requested:
+            self._announce(
+                f"the router at {self._bus.endpoint} is not reachable: services end after {ORPHANED:g} s, and start again when it is"
+            )
+
+    def _note_new_system(self) -> None:
+        """End the services of a joined host when the system of the first one was started again, to join the new one."""
+        self._announce(f"the system at {self._bus.endpoint} was started again: this host joins it")
+        self._join_again = True
+        self._request_stop()
 
     def _handle_signals(self) -> None:
         """Handle signals: the first one stops the services in order, a second one kills them."""
@@ -309,22 +370,22 @@ class _Run:
 
     def _announce_stop(self) -> None:
         """Report the stop of an earlier run, or release it if an earlier launcher, which has ended, said it."""
-        stop = self._record.read()
-        if stop is not None and stop.source == BY_LAUNCHER:
+        stop = None if self._record is None else self._record.read()
+        if self._record is not None and stop is not None and stop.source == BY_LAUNCHER:
             self._record.release()
         elif stop is not None:
             self._announce(f"the robot is stopped, `mobee estop --reset` releases it: {stop}")
 
     def _draw(self) -> None:
-        self._screen.draw(self._children, self._directory)
+        self._screen.draw(self._shown, self._directory)
         self._service.inbox.at(time.monotonic() + _REDRAW, self._draw)
 
     def _describe(self) -> tuple[str, dict[str, int]]:
-        ready = sum(child.phase == "ready" for child in self._children)
+        ready = sum(child.phase == "ready" for child in self._shown)
         fault = f", FAULT: {'; '.join(self._supervisor.faults)}" if self._supervisor.faults else ""
-        numbers = {f"restarts_{child.who}": child.restarts for child in self._children}
+        numbers = {f"restarts_{child.who}": child.restarts for child in self._shown}
         stop = f", {self._stops.waiting}, not confirmed by robot_sim" if self._stops.waiting else ""
-        return f"{self._scenario.name}: {ready} of {len(self._children)} ready{stop}{fault}, {self._directory}"[:2000], numbers
+        return f"{self._scenario.name}: {ready} of {len(self._shown)} ready{stop}{fault}, {self._directory}"[:2000], numbers
 
     def _report(self, ready: float | None, duration: float) -> int:
         summary = {
@@ -333,11 +394,13 @@ class _Run:
             "duration_s": duration,
             "seconds_to_ready": ready,
             "faults": self._supervisor.faults,
-            **summarise(self._children),
+            **summarise(self._shown),
         }
         text = json.dumps(summary, indent=2)
         with contextlib.suppress(OSError):  # a full disk does not make the run a failure
             (self._directory / "summary.json").write_text(text + "\n")
+        if self._join_again:
+            return _JOIN_AGAIN
         print(text if self._options.json else as_text(summary), flush=True)
         if self._supervisor.bad_settings:
             return BAD_INPUT
@@ -348,7 +411,8 @@ def _note_marked(waiting: set[str], who: str, answer: Done | CallFailed) -> None
     waiting.discard(who)
 
 
-def _programs(scenario: Scenario, directory: Path, local: str, security: Security | None) -> list[Program]:
+def _programs(here: Scenario, directory: Path, bus: Connection) -> list[Program]:
+    patience = 0.0 if bus.first is None else _PATIENCE_BEYOND_A_NETWORK
     return [
         Program(
             who=part.who,
@@ -359,11 +423,11 @@ def _programs(scenario: Scenario, directory: Path, local: str, security: Securit
             nice=part.entry.nice,
             vital=part.entry.vital,
             may_end=part.entry.may_end,
-            patience=part.config.patience if scenario.is_locked else 0.0,
+            patience=part.config.patience if here.is_locked else patience,
             environment={
-                **({LOCAL_ENDPOINT: local} if local and part.entry.vital else {}),  # nothing waits for the others
-                **(security.identity(part.who).environment() if security else {}),
+                **({LOCAL_ENDPOINT: bus.local} if bus.local and part.entry.vital else {}),  # nothing waits for the others
+                **(bus.security.identity(part.who).environment() if bus.security else {}),
             },
         )
-        for part in scenario.parts
+        for part in here.parts
     ]

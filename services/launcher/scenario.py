@@ -6,13 +6,14 @@ from __future__ import annotations
 import importlib
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from msgspec import Struct, structs, to_builtins
 
+from bus_schema.authority import HOST_LAUNCHER
 from services.common.config import ConfigError, ServiceConfig, WorldConfig, convert, line_of, nearest
 from services.common.worlds import effective_world, is_path
 from services.launcher.catalogue import NAMES, RECORDER, Entry, entry_of
@@ -52,6 +53,10 @@ class Scenario:
     def is_locked(self) -> bool:
         """Whether it runs in lockstep."""
         return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
+
+    def only(self, names: Collection[str]) -> Scenario:
+        """Return the scenario with these services alone."""
+        return replace(self, parts=tuple(part for part in self.parts if part.who in names))
 
     def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
         """Return the scenario as tables of a TOML file, with every setting of every service."""
@@ -197,7 +202,7 @@ def _where_or_shared(file: _File, where: Callable[[str], str]) -> Callable[[str]
 
 def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Callable[[str], str]) -> Part:
     place = f"services.{who}"
-    if not re.fullmatch(r"[a-z0-9_]+", who) or who in ("launcher", "router"):
+    if not re.fullmatch(r"[a-z0-9_]+", who) or who in ("launcher", "router") or who.startswith(HOST_LAUNCHER):
         raise ConfigError(f"{where(place)}: {who!r} is no valid name of a service: use a-z, 0-9 and _, but not launcher or router")
     own = {key: value for key, value in table.items() if key != "module"}
     entry = entry_of(who, table.get("module"))

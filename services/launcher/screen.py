@@ -12,7 +12,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from services.common.text import printable
-from services.launcher.child import Child
+from services.launcher.child import Watched
 
 _LOG_LINES = 5  # newest lines on the screen
 _COLOURS = {"ready": "32", "fault": "1;31", "failed": "33", "starting": "36"}
@@ -33,7 +33,7 @@ class Screen:
         if not self._terminal:
             print(line, file=sys.stderr, flush=True)
 
-    def draw(self, children: Collection[Child], directory: Path, *, last: bool = False) -> None:
+    def draw(self, children: Collection[Watched], directory: Path, *, last: bool = False) -> None:
         """Draw the screen over the last one; in a pipe, nothing."""
         if not self._terminal:
             return
@@ -54,12 +54,14 @@ class Screen:
         self._height = len(lines)
 
 
-def _row(child: Child) -> str:
+def _row(child: Watched) -> str:
     status = child.reason if child.phase in ("failed", "fault") else child.stat.text if child.stat else ""
+    if child.host and child.phase not in ("failed", "fault"):
+        status = f"on {child.host}: {status}"
     return f"{child.who:<16}{child.phase:<10}{child.pid or '-':>8}{child.restarts:>10}  {printable(' '.join(status.split()))}"
 
 
-def _pages(children: Collection[Child]) -> list[str]:
+def _pages(children: Collection[Watched]) -> list[str]:
     """Return the addresses of pages in the status lines of services."""
     return [page for child in children if child.stat for page in re.findall(r"https?://\S+", child.stat.text)]
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from services.common.access import access_list
@@ -23,16 +24,20 @@ _AT_ONCE = 4  # reports of one check: who tries a new key each time must not fil
 class Security:
     """The keys of one launch."""
 
-    def __init__(self, folder: Path, scenario: Scenario) -> None:
-        """Check the keys of all services; raises BadKeys, with a remedy, for the first that cannot be used."""
+    def __init__(self, folder: Path, here: Scenario, *, launcher: str = LAUNCHER, elsewhere: Sequence[str] = ()) -> None:
+        """Check the keys of this host; raises BadKeys, with a remedy, for the first that cannot be used.
+
+        `here`: its services; `launcher`: name of its launcher; `elsewhere`: services of other hosts, whose certificates alone are needed.
+        """
         from services.common.certificates import SOON, KeyFolder  # 0.1 s, which a launch without keys does not wait for
 
         keys = KeyFolder(folder.resolve())
-        keys.require([ROUTER, LAUNCHER, *(part.who for part in scenario.parts)])
+        keys.require([*([ROUTER] if launcher == LAUNCHER else []), launcher, *(part.who for part in here.parts)])
+        keys.require_certificates(elsewhere)
         issued = keys.issued()
         self.folder = keys.path
         self.router = Identity(keys.path, ROUTER)
-        clients = next((part.config.clients for part in scenario.parts if hasattr(part.config, "clients")), "")
+        clients = next((part.config.clients for part in here.parts if hasattr(part.config, "clients")), "")
         self.access = access_list({one.name: one.party for one in issued if one.party is not None}, NAMESPACE, clients)
         self.expiring = [f"{one.name} on {one.until:%Y-%m-%d}" for one in issued if one.days_left() < SOON]
 

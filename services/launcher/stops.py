@@ -6,11 +6,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from bus_schema.authority import HOST_LAUNCHER
 from bus_schema.messages import EStop
 from services.common.emergency_stop import BY_LAUNCHER, Stop, StopLine, StopRecord, replaces
 from services.common.service import Service
 
 PERIOD = 0.05  # s between two checks for a stop, and between two repetitions
+JUST_RELEASED = 0.2  # s after a release in which a stop may be older than it: it is left to robot_sim, and to its sender, who repeats it
 
 
 class EmergencyStops:
@@ -20,8 +22,8 @@ class EmergencyStops:
     releases a stop.
     """
 
-    def __init__(self, service: Service, record: StopRecord, announce: Callable[[str], None]) -> None:
-        """`announce` is called with each line that a user should see."""
+    def __init__(self, service: Service, record: StopRecord | None, announce: Callable[[str], None]) -> None:
+        """`record`: None if it is on another host, that of robot_sim; `announce` is called with each line that a user should see."""
         self._service, self._record, self._announce = service, record, announce
         self._publisher = service.bus.publisher(EStop)
         self._waiting: Stop | None = None  # for robot_sim's confirmation
@@ -49,13 +51,25 @@ class EmergencyStops:
     def _note(self, message: EStop) -> None:
         if message.src == "robot_sim":
             self._waiting = None
-        elif message.src != self._service.who and message.tw > self._record.released_at():
+        elif not self._is_launcher(message.src) and not self._was_just_released():
             stop = Stop(message.source, message.reason, time.time())
             if replaces(stop, self._waiting):
                 self._keep(stop)
 
+    def _is_launcher(self, who: str) -> bool:
+        """Return whether a launcher has sent a stop: each repeats its own, and two would repeat each other's without end."""
+        return who == self._service.who or who == BY_LAUNCHER or who.startswith(HOST_LAUNCHER)
+
+    def _was_just_released(self) -> bool:
+        """Return whether robot_sim has recorded a release a moment ago, by the clock of this host, which is also robot_sim's."""
+        if self._record is None:
+            return False
+        return 0 <= time.monotonic_ns() - self._record.released_at() < 1e9 * JUST_RELEASED
+
     def _keep(self, stop: Stop) -> None:
         self._waiting = stop
+        if self._record is None:
+            return
         if replaces(stop, self._record.read()):
             try:
                 self._record.latch(stop)

@@ -8,10 +8,10 @@ from typing import Any
 
 from bus_schema.authority import AGENT
 from bus_schema.rpc import Stat
-from services.launcher.child import Child
+from services.launcher.child import Watched
 
 
-def summarise(children: Iterable[Child]) -> dict[str, Any]:
+def summarise(children: Iterable[Watched]) -> dict[str, Any]:
     """Return the numbers of a run; None for a number that was not measured.
 
     Lengths in m, times in s; ages in ticks; counters since every service was ready, or since the service's last restart.

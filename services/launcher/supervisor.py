@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from bus_schema import keys
 from bus_schema.rpc import Pulse, Stat
 from services.common.exit_codes import BAD_INPUT
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.launcher.child import Child, Program
+from services.launcher.child import Child, Program, Watched
 from services.launcher.stops import EmergencyStops
 
 CHECK_PERIOD = 0.05  # s between two checks of the processes
@@ -31,14 +31,34 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 class Supervisor:
     """Starts and supervises the launcher's child processes; all work is done by handlers in the inbox of `service`."""
 
-    def __init__(self, service: Service, programs: Sequence[Program], stops: EmergencyStops, announce: Callable[[str], None]) -> None:
-        """`stops` stops the robot when a vital service is given up; `announce` is called with each line that a user should see."""
+    def __init__(
+        self,
+        service: Service,
+        programs: Sequence[Program],
+        stops: EmergencyStops,
+        announce: Callable[[str], None],
+        held: str = "",
+        elsewhere: Mapping[str, Watched] | None = None,
+        is_reachable: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Start nothing before `begin`.
+
+        Args:
+            service: the launcher.
+            programs: of the services that it starts.
+            stops: stops the robot when a vital service is given up.
+            announce: called with each line that a user should see.
+            held: the words of HELD for its processes; empty: the launcher's own instance.
+            elsewhere: services that other hosts start, for which some of these wait.
+            is_reachable: returns whether the router can be reached, without which no service can start or answer.
+        """
         self.children = {program.who: Child(program) for program in programs}
         self.faults: list[str] = []  # one line for each service that was given up
         self.stopped_robot = False  # a vital service was given up
         self.bad_settings = False  # a service was given up because it cannot use its settings
         self._service, self._announce, self._stopping = service, announce, False
-        self._stops = stops
+        self._stops, self._held, self._is_reachable = stops, held or service.instance, is_reachable
+        self._elsewhere = elsewhere or {}
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
@@ -50,7 +70,7 @@ class Supervisor:
     def _spawn(self, child: Child) -> bool:
         """Start a process; if the operating system refuses to start it, it counts as failed, and the launcher continues."""
         try:
-            child.spawn(self._service.instance)
+            child.spawn(self._held)
         except OSError as error:
             self._fail(child, f"cannot be started: {error}")
             return False
@@ -97,10 +117,10 @@ class Supervisor:
 
     def _check(self, child: Child, now: float) -> None:
         if child.phase == "waiting":
-            before = (self.children[who] for who in child.program.after if who in self.children)
-            if all(other.phase in ("ready", "ended") or (other.failures and not other.program.vital) for other in before):
+            services: Mapping[str, Watched] = {**self._elsewhere, **self.children}
+            if all(services[who].lets_others_start for who in child.program.after if who in services):
                 child.release()
-        elif child.phase == "failed" and now >= child.again_at:
+        elif child.phase == "failed" and now >= child.again_at and self._is_reachable():
             child.restarts += 1
             if self._spawn(child):
                 child.release()
@@ -113,6 +133,9 @@ class Supervisor:
         code = child.exit_code()
         if code is not None:
             self._note_end(child, code)
+        elif not self._is_reachable():
+            child.note_answer(now)
+            child.since = now
         elif child.phase == "starting" and now - child.since > READY_TIMEOUT:
             self._fail(child, f"was not ready within {READY_TIMEOUT:g} s")
         elif child.phase == "ready" and self._is_frozen(child, now):
@@ -211,11 +234,15 @@ class Supervisor:
     def _give_up(self, child: Child, reason: str) -> None:
         child.reason = reason
         child.enter("fault")
-        self.faults.append(f"{child.who} {reason}")
-        self._service.bus.event("error", "fault", self.faults[-1])
-        self._announce(f"FAULT: {self.faults[-1]} (its log: {child.program.log})")
-        if child.program.vital:
-            self._stop_robot(self.faults[-1])
+        self.report_fault(f"{child.who} {reason}", child.program.vital, f" (its log: {child.program.log})")
+
+    def report_fault(self, fault: str, vital: bool, more: str = "") -> None:
+        """Report that a service was given up, and stop the robot if it is vital; `more`: for the user, after the fault."""
+        self.faults.append(fault)
+        self._service.bus.event("error", "fault", fault)
+        self._announce(f"FAULT: {fault}{more}")
+        if vital:
+            self._stop_robot(fault)
 
     def _stop_robot(self, reason: str) -> None:
         self.stopped_robot = True

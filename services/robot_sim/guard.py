@@ -39,7 +39,7 @@ class Guard:
         if not service.locked:
             self._newest = service.bus.latest(Commands)
         self._estop = service.bus.publisher(EStop)
-        # Epochs grow over restarts too: what a controller holds from before never fits again.
+        # Epochs grow over restarts too, if the clock does: what a controller holds from before does not fit again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
         self._line = StopLine(service.second_session())
         self._declare()

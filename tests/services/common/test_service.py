@@ -422,6 +422,24 @@ def test_a_service_whose_launcher_died_during_its_start_does_not_join_the_next_s
             child.kill()
 
 
+def test_a_service_of_a_joined_host_ends_without_its_own_launcher(tmp_path: Path, bus: Rig) -> None:
+    with rig(tmp_path, bus.robot) as parent:
+        own = parent.bus.session.liveliness().declare_token(keys.alive("launcher_desk", "i1_desk"))
+        argv = (sys.executable, *PROBE, "--endpoint", parent.endpoint, "--orphaned", "0.5")
+        child = Child(ChildProgram("probe", argv, tmp_path / "probe.log"))
+        child.spawn("rig launcher_desk i1_desk")
+        try:
+            child.release()
+            wait_for(lambda: parent.instances("probe"), "the service", 30.0)
+            time.sleep(1.5)
+            assert child.running()
+            own.undeclare()
+            assert child.process is not None and child.process.wait(10.0) == 3
+            assert "no launcher_desk at" in (tmp_path / "probe.log").read_text()
+        finally:
+            child.kill()
+
+
 def test_a_second_token_of_a_router_alone_ends_nothing(tmp_path: Path, bus: Rig) -> None:
     with rig(tmp_path, bus.robot) as parent:
         program, events = another(parent), parent.record(Event, "probe")

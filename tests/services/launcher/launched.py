@@ -28,13 +28,14 @@ def toys(**behaviours: str) -> str:
 
 
 class Launched:
-    """`mobee launch` of a scenario text, in a folder of its own, at an endpoint of its own."""
+    """`mobee launch` of a scenario text, in a folder of its own, at an endpoint of its own; None: it joins that of another."""
 
-    def __init__(self, folder: Path, endpoint: str, scenario: str, *options: str) -> None:
+    def __init__(self, folder: Path, endpoint: str | None, scenario: str, *options: str) -> None:
         self.folder, self.endpoint = folder, endpoint
         file = folder / "toys.toml"
         file.write_text(scenario)
-        argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--json", "--endpoint", endpoint, "--runs", str(folder / "runs")]
+        argv = [sys.executable, "-m", "mobee_cli", "launch", str(file), "--json", "--runs", str(folder / "runs")]
+        argv += ["--endpoint", endpoint] if endpoint else []
         self._news = (folder / "news").open("wb+")
         self.process = subprocess.Popen([*argv, *options], stdout=subprocess.PIPE, stderr=self._news, cwd=ROOT)
 

@@ -17,6 +17,8 @@ from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, Supervis
 class Silent:
     """Stands in for the bus: nothing is published, nobody is heard."""
 
+    instance = "i1_launcher"
+
     def on_alive(self, handler: object) -> None: ...
 
 

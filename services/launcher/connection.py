@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bus of a launch: the router that it opens, or a session with that of another host, which it joins."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from services.common.config import ConfigError
+from services.common.identity import assume, is_local, secured
+from services.common.refusals import RefusalLog
+from services.common.session import DEFAULT_ENDPOINT, LEASE, Session, local_endpoint, open_client, open_router, spare_threads
+from services.launcher.checks import check_endpoint, check_ports
+from services.launcher.hosts import LAUNCHER, Agreement, agreement, check_agreement, check_free, name_of, request_agreement
+from services.launcher.scenario import Scenario
+from services.launcher.security import Security
+
+JOIN_PATIENCE = 10.0  # s within which the router of another host must answer
+
+
+@dataclass(frozen=True)
+class Connection:
+    """How this launcher and its services reach the bus."""
+
+    who: str  # name of this launcher on the bus
+    endpoint: str  # at which its services reach the router
+    session: Session
+    router: Session | None = None  # None: it is on another host
+    local: str = ""  # another address of the router, for services of this host in lockstep
+    security: Security | None = None
+    refusals: RefusalLog | None = None
+    first: Agreement | None = None  # with the launcher of another host, which this one joins; None: this is the first
+
+
+def open_bus(
+    scenario: Scenario, here: Scenario, endpoint: str, keys: Path | None, insecure: bool, elsewhere: Sequence[str], stack: ExitStack
+) -> Connection:
+    """Open the router and a session with it, which `stack` closes; raises ConfigError, SystemRuns, PortInUse, BusUnreachable, BadKeys.
+
+    Args:
+        scenario: all services.
+        here: those that this host starts.
+        endpoint: at which the router listens.
+        keys: folder of keys; None: not secured.
+        insecure: other hosts may reach the endpoint without keys.
+        elsewhere: services that other hosts start.
+        stack: closes what was opened.
+    """
+    place = endpoint if keys is None else secured(endpoint)
+    security = None if keys is None else Security(keys, here, elsewhere=elsewhere)
+    _assume(security, LAUNCHER)
+    if security is None and not is_local(place):
+        if not insecure:
+            raise ConfigError(
+                f"other hosts can reach {place}: launch with --secure, for which `mobee keys new` makes the keys, or with "
+                "--insecure: then every program that reaches it can move the robot"
+            )
+        _warn(f"every program that reaches {place} can move the robot")
+    if elsewhere and is_local(place):
+        _warn(f"only this computer reaches {place}: for services of another host give --endpoint, as in docs/hosts.md")
+    refusals = None if security is None else RefusalLog.open()
+    check_endpoint(here, place)
+    check_ports(here)
+    lease, local = LEASE, ""
+    if scenario.is_locked:
+        spare_threads()
+        lease = max(part.config.patience for part in scenario.parts)
+        local = "" if security else stack.enter_context(local_endpoint())  # a socket shows no certificate
+    identity, access = (security.router, security.access) if security else (None, None)
+    router = stack.enter_context(open_router(place, lease, local, identity, access))
+    session = open_client(local or place, lease=lease)  # the router itself runs no Python, so that nothing here delays a message
+    return Connection(LAUNCHER, place, session, router, local, security, refusals)
+
+
+def join_bus(scenario: Scenario, here: Scenario, endpoint: str, host: str, keys: Path | None) -> Connection:
+    """Open a session with the router of another host, if both agree; raises ConfigError, BusUnreachable, BadKeys, PortInUse, JoinRefused.
+
+    `scenario`: all services; `here`: those that this host starts; `host`: its name; `keys`: folder of keys, None: not secured.
+    """
+    who, place = name_of(host), endpoint if keys is None else secured(endpoint)
+    security = None if keys is None else Security(keys, here, launcher=who)
+    _assume(security, who)
+    check_ports(here)
+    if scenario.is_locked:
+        spare_threads()
+    session = open_client(place, patience=JOIN_PATIENCE, lease=LEASE)
+    with ExitStack() as refused:
+        refused.enter_context(session)
+        only = [part.who for part in here.parts]
+        first = request_agreement(session, who, place)
+        check_agreement(first, agreement(scenario), only, place)
+        check_free(session, who, only, place)
+        refused.pop_all()
+    return Connection(who, place, session, security=security, first=first)
+
+
+def default_endpoint(scenario: Scenario) -> str:
+    """Return the address at which a scenario's router listens unless another is given."""
+    return str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
+
+
+def _assume(security: Security | None, who: str) -> None:
+    assume(None if security is None else security.identity(who))
+    if security is not None and security.expiring:
+        _warn(f"keys expire soon, renew them with `mobee keys add`: {', '.join(security.expiring)}")
+
+
+def _warn(text: str) -> None:
+    print(f"mobee launch: {text}", file=sys.stderr)
