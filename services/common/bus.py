@@ -57,6 +57,7 @@ class Publisher(Generic[_M]):
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
         self._has_subscribers: bool | None = None  # None: not requested yet
+        self._key = key.encode()
         how = _SETTINGS[bus.control if delivery == "CONTROL" else delivery]
         settings: dict[str, Any] = {
             "encoding": encoding_of(cls),
@@ -84,7 +85,7 @@ class Publisher(Generic[_M]):
             **fields,
         )
         self._seq += 1
-        self._publisher.put(encode(message))
+        self._publisher.put(encode(message), attachment=self._key)
 
     @property
     def has_subscribers(self) -> bool:
@@ -115,6 +116,16 @@ class Latest(Generic[_M]):
 def part_of(cls: type[Message], name: str) -> str | None:
     """Return the part to whose motors the vectors of a message refer; None if its key has no part."""
     return name if cls.stream.variable == "part" and name != "*" else None
+
+
+def require_key(received: zenoh.Sample | zenoh.Query) -> None:
+    """Raise Refused if the sender has attached another key than that under which a message or call has come.
+
+    Zenoh sends numbers in place of keys; when a connection ends and a new one begins, a number can stand for another key for a moment.
+    """
+    attached = received.attachment
+    if attached is not None and (sent := attached.to_bytes()) != str(received.key_expr).encode():
+        raise Refused("key", f"sent as {sent[:200].decode(errors='replace')}")
 
 
 class Bus:
@@ -153,6 +164,7 @@ class Bus:
         if self.run == NO_RUN and not any_run:
             return None
         try:
+            require_key(sample)
             size = None if part is None else self.part_sizes[part]
             message = decode(cls, sample.payload.to_bytes(), str(sample.encoding), part=size, robot=self.robot_size)
             if not any_run and message.run != self.run:

@@ -49,7 +49,7 @@ class StopRecord:
     @classmethod
     def of_endpoint(cls, endpoint: str) -> StopRecord:
         """The record of the robot that is reached at an endpoint of this machine; all its runs share it."""
-        endpoint = re.sub("^tls/", "tcp/", endpoint)  # a stop stays in force if the system is launched again with or without security
+        endpoint = re.sub("^(tls|quic)/", "tcp/", endpoint)  # a stop stays in force with or without security
         states = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
         return cls(states / FOLDER / f"{re.sub(r'[^A-Za-z0-9]+', '-', endpoint).strip('-')}.json")
 

@@ -17,7 +17,7 @@ from bus_schema.authority import may_call
 from bus_schema.messages import Served
 from bus_schema.rpc import Empty, Failure, Reply, Request
 from mobee.errors import MobeeError
-from services.common.bus import Bus
+from services.common.bus import Bus, require_key
 from services.common.identity import Identity
 
 _R = TypeVar("_R", bound=Reply)
@@ -51,7 +51,7 @@ def call(
     payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
     for left in reversed(range(tries)):
         try:
-            for answer in session.get(key, payload=payload, encoding=encoding_of(request), timeout=timeout):
+            for answer in session.get(key, payload=payload, encoding=encoding_of(request), attachment=key, timeout=timeout):
                 return _read(key, answer, reply)
         except CallFailed as failed:
             if failed.code != "no_answer" or not left:
@@ -87,6 +87,7 @@ def ask(
         key,
         payload=encode(message),
         encoding=encoding_of(request),
+        attachment=key,
         timeout=timeout,
         handler=Callback(answers.append, finish),
         consolidation=None if wanted is None else zenoh.ConsolidationMode.NONE,
@@ -169,6 +170,7 @@ class Answering:
     def _reply(
         self, query: zenoh.Query, cls: type[_Q], handler: Callable[[_Q, str], Reply], key: str, part_of_key: bool
     ) -> tuple[type[Reply], bytes]:
+        require_key(query)
         size = None
         if part_of_key:
             part = key.split("/")[0]

@@ -59,6 +59,8 @@ def open_bus(
                 "--insecure: then every program that reaches it can move the robot"
             )
         _warn(f"every program that reaches {place} can move the robot")
+    if place.startswith("tls/") and not is_local(place):
+        _warn(f"{place}: a silent cut of the network is noticed late over TLS: use quic/ between hosts, as in docs/hosts.md")
     if elsewhere and is_local(place):
         _warn(f"only this computer reaches {place}: for services of another host give --endpoint, as in docs/hosts.md")
     refusals = None if security is None else RefusalLog.open()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from services.launcher.scenario import FILES, Part, Scenario
 
 LAUNCHER = "launcher"
 _OF_A_HOST = ("endpoint", "run_dir", "stop_record", "bind", "serve", "record")  # settings that may differ between hosts, as all ports may
+_PATIENCE = 5.0  # s within which the first launcher must be ready
 _TRIES = 4  # of the first call, for a router that is at work
 
 
@@ -92,6 +94,9 @@ def _digest(path: Path) -> str:
 
 def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
     """Ask the launcher at an endpoint what it starts; raises JoinRefused."""
+    give_up = time.monotonic() + _PATIENCE
+    while LAUNCHER not in alive(session) and time.monotonic() < give_up:
+        time.sleep(0.1)
     try:
         answer = rpc.call(session, who, keys.service_rpc(LAUNCHER, "config"), Empty, Config, timeout=1.0, tries=_TRIES)
         return msgspec.json.decode(answer.config, type=Agreement)

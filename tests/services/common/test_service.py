@@ -78,10 +78,11 @@ def ball(publisher: Any, name: str = "ball") -> None:
     )
 
 
-def send(bus: Rig, key: str, request: Any) -> list[tuple[bool, bytes, str]]:
+def send(bus: Rig, key: str, request: Any, attachment: str | None = None) -> list[tuple[bool, bytes, str]]:
     """A call by hand: (ok, payload, encoding) of every answer."""
     found = []
-    for answer in bus.session.get(key, payload=encode(request), encoding=encoding_of(type(request)), timeout=10.0):
+    how: dict[str, Any] = {"encoding": encoding_of(type(request)), "attachment": attachment, "timeout": 10.0}
+    for answer in bus.session.get(key, payload=encode(request), **how):
         part = answer.ok if answer.ok is not None else answer.err
         found.append((answer.ok is not None, part.payload.to_bytes(), str(part.encoding)))
     return found
@@ -205,6 +206,19 @@ def test_an_answer_of_the_wrong_type_is_a_failure(bus: Rig) -> None:
 
 
 # Streams
+
+
+def test_what_comes_under_another_key_than_it_was_sent_is_refused(bus: Rig, clock: Any) -> None:
+    """As for a moment after a cut of the network, when Zenoh's numbers stand for other keys."""
+    before, k = rejected(bus).get("key", 0), bus.bus.k
+    misled = Clock(v=VERSION, run="r0", src="r", seq=0, k=k + 1000, t=0, tw=0, dt=10_000_000, mode="free", rate=1.0)
+    bus.session.put(Clock.stream.key(), encode(misled), encoding=encoding_of(Clock), attachment="tick")
+    wait_for(lambda: rejected(bus).get("key", 0) == before + 1, "the refusal")
+    assert numbers(bus)["k"] == k
+    call = Empty(v=VERSION, id="misled", who="test")
+    [(ok, payload, encoding)] = send(bus, keys.service_rpc("probe", "shutdown"), call, attachment=keys.service_rpc("probe", "stat"))
+    assert not ok and decode(Failure, payload, encoding).code == "key"
+    assert numbers(bus)["k"] == k  # it still runs
 
 
 def test_messages_of_another_run_are_refused_and_counted(bus: Rig, clock: Any) -> None:
