@@ -17,7 +17,7 @@ OPERATOR = "operator"  # the identity of the commands at a terminal, unless anot
 ROUTER = "router"  # the only identity that a process may listen with
 AUTHORITY = "ca"
 LONGEST_SOCKET = 90  # bytes; a socket's name holds 104 on macOS, 108 on Linux, and its lock file is a little longer
-_PLAIN, _ON_ONE_HOST, _BETWEEN_HOSTS = "tcp/", "tls/", "quic/"
+_SECURED, _PLAIN = "tls/", "tcp/"
 
 
 class BadKeys(MobeeError):
@@ -124,13 +124,8 @@ def default_folder() -> Path:
 
 
 def secured(endpoint: str) -> str:
-    """Return the address at which a secured router listens: in place of plain TCP, TLS on one host and QUIC between hosts.
-
-    Zenoh notices a silent cut of the network at once with QUIC, and with TLS not as long as data waits to be sent (docs/decisions.md).
-    """
-    if not endpoint.startswith(_PLAIN):
-        return endpoint
-    return (_ON_ONE_HOST if is_local(endpoint) else _BETWEEN_HOSTS) + endpoint.removeprefix(_PLAIN)
+    """Return the address at which a secured router listens: TLS in place of plain TCP."""
+    return _SECURED + endpoint.removeprefix(_PLAIN) if endpoint.startswith(_PLAIN) else endpoint
 
 
 def is_local(endpoint: str) -> bool:

@@ -12,9 +12,18 @@ from pathlib import Path
 from services.common.config import ConfigError
 from services.common.identity import assume, is_local, secured
 from services.common.refusals import RefusalLog
-from services.common.session import DEFAULT_ENDPOINT, LEASE, Session, local_endpoint, open_client, open_router, spare_threads
+from services.common.session import (
+    DEFAULT_ENDPOINT,
+    LEASE,
+    BusUnreachable,
+    Session,
+    local_endpoint,
+    open_client,
+    open_router,
+    spare_threads,
+)
 from services.launcher.checks import check_endpoint, check_ports
-from services.launcher.hosts import LAUNCHER, Agreement, agreement, check_agreement, check_free, name_of, request_agreement
+from services.launcher.hosts import LAUNCHER, Agreement, JoinRefused, agreement, check_agreement, check_free, name_of, request_agreement
 from services.launcher.scenario import Scenario
 from services.launcher.security import Security
 
@@ -59,8 +68,6 @@ def open_bus(
                 "--insecure: then every program that reaches it can move the robot"
             )
         _warn(f"every program that reaches {place} can move the robot")
-    if place.startswith("tls/") and not is_local(place):
-        _warn(f"{place}: a silent cut of the network is noticed late over TLS: use quic/ between hosts, as in docs/hosts.md")
     if elsewhere and is_local(place):
         _warn(f"only this computer reaches {place}: for services of another host give --endpoint, as in docs/hosts.md")
     refusals = None if security is None else RefusalLog.open()
@@ -88,7 +95,13 @@ def join_bus(scenario: Scenario, here: Scenario, endpoint: str, host: str, keys:
     check_ports(here)
     if scenario.is_locked:
         spare_threads()
-    session = open_client(place, patience=JOIN_PATIENCE, lease=LEASE)
+    try:
+        session = open_client(place, patience=JOIN_PATIENCE, lease=LEASE)
+    except BusUnreachable as error:
+        raise JoinRefused(
+            f"{str(error).partition('. ')[0]}. Does the system run there, and is its --endpoint one that this host reaches? "
+            "If it is secured, join with --secure"
+        ) from None
     with ExitStack() as refused:
         refused.enter_context(session)
         only = [part.who for part in here.parts]

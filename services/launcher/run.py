@@ -321,8 +321,8 @@ class _Run:
 
     def _how_to_join(self) -> str:
         names = ",".join(remote.who for remote in self._judged)
-        secure = " --secure" if self._bus.security else ""
-        return f"{names}: started on another host with `mobee launch {self._options.scenario} --only {names} --join ADDRESS{secure}`"
+        options = f"--only {names} --join ADDRESS{' --secure' if self._bus.security else ''}"
+        return f"waits for another host to start {names}, with `mobee launch {self._options.scenario} {options}`"
 
     def _note_router(self, who: str, instance: str, up: bool) -> None:
         """Report on a joined host whether the router of the first one is reachable."""

@@ -92,7 +92,7 @@ RUN_ELSEWHERE = {
     r"mobee keys add launcher_desk": "tests/mobee_cli/test_keys.py",
     r"mobee launch --secure.*": "tests/system/test_intruders.py",
     r"mobee launch --(elsewhere|join) .*": "needs a second host: tests/services/launcher/test_hosts.py, tests/system/test_network.py",
-    r"mobee status( --endpoint quic/robot:7447)?": "tests/mobee_cli/test_status.py",
+    r"mobee status( --endpoint tls/robot:7447)?": "tests/mobee_cli/test_status.py",
     r"mobee record --to FOLDER": "needs a system that was started without a launcher",
     r"mobee launch filtered": "tests/services/port_filter/test_process.py",
     r"mobee reach --target [-. 0-9]+": "tests/system/test_reach.py",

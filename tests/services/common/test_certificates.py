@@ -122,9 +122,8 @@ def test_an_identity_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch,
         ("tcp/[::]:7447", False),
         ("tcp/10.0.0.5:7447", False),
         ("tls/robot:7447", False),
-        ("quic/robot:7447", False),
     ],
 )
 def test_an_endpoint_is_local_or_others_reach_it(endpoint: str, local: bool) -> None:
     assert is_local(endpoint) is local
-    assert secured(endpoint) == endpoint.replace("tcp/", "tls/" if local else "quic/")
+    assert secured(endpoint) == endpoint.replace("tcp/", "tls/")

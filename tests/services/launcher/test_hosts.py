@@ -14,6 +14,7 @@ from experiments.kit.live.launch import free_endpoint
 from mobee_cli.__main__ import main
 from services.common.observe import Received, alive, listen
 from services.common.session import open_client
+from services.launcher.connection import join_bus
 from services.launcher.hosts import Agreement, JoinRefused, agreement, check_agreement
 from services.launcher.scenario import read_scenario
 from tests.services.launcher.launched import Launched, mobee, toys, wait_until
@@ -39,7 +40,7 @@ def two_hosts(launch: Launch, elsewhere: str) -> tuple[Launched, Launched, str]:
     """A first launcher, one that has joined it as desk, and their endpoint."""
     endpoint = free_endpoint()
     first = launch("--elsewhere", elsewhere, at=endpoint)
-    first.wait_for(f"{elsewhere}: started on another host with `mobee launch")
+    first.wait_for(f"waits for another host to start {elsewhere}, with `mobee launch")
     first.wait_for("one is ready")
     second = launch("--join", endpoint, "--host", "desk", "--only", elsewhere)
     first.wait_for("all ready")
@@ -139,6 +140,13 @@ def test_options_that_do_not_fit_are_refused(options: tuple[str, ...], said: str
         raise SystemExit(main(["launch", "kinematic", *options]))
     assert end.value.code == 2
     assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_host_that_cannot_be_reached_is_named(free_port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.launcher.connection.JOIN_PATIENCE", 0.0)
+    here = read_scenario("kinematic").only(["model"])
+    with pytest.raises(JoinRefused, match=rf"no router at tcp/127.0.0.1:{free_port} within 0 s .*Does the system run there"):
+        join_bus(read_scenario("kinematic"), here, f"tcp/127.0.0.1:{free_port}", "desk", None)
 
 
 def test_another_version_of_mobee_is_named() -> None:
