@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from services.common.certificates import KeyFolder
 from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
 
 
@@ -136,10 +138,19 @@ def test_stop_ends_everything(tmp_path: Path, free_port: int) -> None:
         launched.leave_nothing()
 
 
-def test_the_router_alone_serves_services_started_by_hand(free_port: int) -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port}"
-    router = subprocess.Popen([sys.executable, "-m", "mobee_cli", "router", "--listen", endpoint], stderr=subprocess.DEVNULL)
-    toy = subprocess.Popen([sys.executable, "-m", "tests.services.toy_service", "--endpoint", endpoint], stderr=subprocess.DEVNULL)
+@pytest.mark.parametrize("secure", [False, True])
+def test_the_router_alone_serves_services_started_by_hand(
+    free_port: int, secure: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    endpoint, options, toy_is = f"tcp/127.0.0.1:{free_port}", [], {}
+    if secure:
+        keys = KeyFolder.new(tmp_path / "keys", [("router", None), ("toy", "client"), ("operator", "operator")]).path
+        monkeypatch.setenv("MOBEE_KEYS", str(keys))
+        options, toy_is = ["--secure", "--keys", str(keys)], {"MOBEE_IDENTITY": "toy"}
+    argv = [sys.executable, "-m", "mobee_cli", "router", "--listen", endpoint, *options]
+    router = subprocess.Popen(argv, stderr=subprocess.DEVNULL)
+    argv = [sys.executable, "-m", "tests.services.toy_service", "--endpoint", endpoint]
+    toy = subprocess.Popen(argv, stderr=subprocess.DEVNULL, env={**os.environ, **toy_is})
     try:
         give_up = time.monotonic() + 60
         while '"toy"' not in mobee("status", "--json", "--endpoint", endpoint).stdout and time.monotonic() < give_up:
