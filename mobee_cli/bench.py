@@ -113,6 +113,16 @@ BENCHES = {
             "--shrink": _number("performances to shrink a schedule that breaks a promise (default: none)"),
         },
     ),
+    "network": Bench(
+        "a system on two hosts while packets are delayed, lost and reordered and the network is cut: what is obeyed, hold, recovery",
+        quick="three faults instead of seven",
+        options={
+            "--layouts": {"nargs": "+", "choices": ("agent", "control"), "help": "what is beyond the network (default: both in turn)"},
+            "--seconds": _number("how long each fault lasts (default: 4)", positive_number, "S"),
+            "--rounds": _number("how often each fault (default: 1)"),
+            "--seed": _number("of delayed, lost and reordered packets (default: 1)", int),
+        },
+    ),
     "fuzz": Bench(
         "nearly valid messages, calls and tokens to a live system: processes that end, memory that grows",
         quick="40 000 messages",

@@ -43,7 +43,7 @@ class Observer:
     """Records the states of all parts and the transitions that agents publish."""
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
-    motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, with their time
+    motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, when they came
     published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
     conflicts: list[str] = field(default_factory=list)  # a line for each number under which two different transitions were published
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -76,7 +76,7 @@ class Observer:
         with self.lock:
             changes = self.motions.setdefault(received.key.partition("/")[0], [])
             if not changes or changes[-1][1:] != (motion["status"], motion["action_id"]):
-                changes.append((1e-9 * motion["tw"], motion["status"], motion["action_id"]))
+                changes.append((received.at, motion["status"], motion["action_id"]))
 
     def _note_transition(self, received: Received) -> None:
         made = received.content()

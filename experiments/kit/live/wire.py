@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A wire between two network interfaces, whose faults are drawn by a seed: delay, loss, reordering, and a cut that nothing reports.
+
+The kernel's own emulator (netem) has no seed before Linux 6.6 and is missing from many kernels; TUN interfaces are not.
+"""
+
+from __future__ import annotations
+
+import heapq
+import os
+import random
+import selectors
+import sys
+import time
+from contextlib import suppress
+from typing import BinaryIO
+
+import msgspec
+from msgspec import Struct
+
+_LARGEST = 65536  # bytes of a packet
+_AT_ONCE = 64  # packets that are read in a row
+
+
+class Faults(Struct, frozen=True):
+    """What happens to each packet, in both directions."""
+
+    delay: float = 0.0  # s
+    loss: float = 0.0  # share of packets that are lost
+    reorder: float = 0.0  # share of packets that are not delayed, so that they overtake others
+    cut: bool = False  # all are lost
+
+
+class Wire:
+    """Carries packets between two TUN interfaces."""
+
+    def __init__(self, ends: tuple[int, int], seed: int) -> None:
+        """`ends`: file descriptors of the interfaces."""
+        self.faults = Faults()
+        self.carried = self.lost = 0
+        self._other = {ends[0]: ends[1], ends[1]: ends[0]}
+        self._random = random.Random(seed)
+        self._under_way: list[tuple[float, int, int, bytes]] = []  # time of arrival, number, end, packet
+        for end in ends:
+            os.set_blocking(end, False)
+
+    def wait(self) -> float | None:
+        """Return the time until the next packet arrives, s; None if none is under way."""
+        return max(0.0, self._under_way[0][0] - time.monotonic()) if self._under_way else None
+
+    def take(self, end: int) -> None:
+        """Read the packets that an interface has sent."""
+        for _ in range(_AT_ONCE):
+            try:
+                packet = os.read(end, _LARGEST)
+            except OSError:  # none waits, or the interface is down
+                return
+            faults = self.faults
+            if faults.cut or self._random.random() < faults.loss:
+                self.lost += 1
+                continue
+            delay = 0.0 if self._random.random() < faults.reorder else faults.delay
+            self.carried += 1
+            heapq.heappush(self._under_way, (time.monotonic() + delay, self.carried, self._other[end], packet))
+
+    def deliver(self) -> None:
+        """Deliver the packets whose time has come."""
+        while self._under_way and self._under_way[0][0] <= time.monotonic():
+            *_, end, packet = heapq.heappop(self._under_way)
+            with suppress(OSError):  # the interface is down, or full: the packet is lost
+                os.write(end, packet)
+
+
+def run(ends: tuple[int, int], seed: int, commands: BinaryIO) -> None:
+    """Carry packets until `commands` ends; each line of it holds new Faults as JSON."""
+    wire = Wire(ends, seed)
+    with selectors.DefaultSelector() as selector:
+        for source in (*ends, commands.fileno()):
+            selector.register(source, selectors.EVENT_READ)
+        while True:
+            for key, _ in selector.select(wire.wait()):
+                if key.fd != commands.fileno():
+                    wire.take(key.fd)
+                elif line := commands.readline():
+                    wire.faults = msgspec.json.decode(line, type=Faults)
+                else:
+                    return
+            wire.deliver()
+
+
+if __name__ == "__main__":
+    run((int(sys.argv[1]), int(sys.argv[2])), int(sys.argv[3]), os.fdopen(0, "rb", buffering=0))
