@@ -20,7 +20,7 @@ from services.common.text import printable
 
 HELD = "MOBEE_HELD"
 """Environment variable of a process that a launcher has started: the instance of the router that it may join, and, if its launcher has
-joined from another host, the launcher's name and instance.  The launcher closes the process's standard input when it may join."""
+joined from another host, the launcher's process id.  The launcher closes the process's standard input when it may join."""
 
 
 def wait_until_released() -> tuple[str, ...]:

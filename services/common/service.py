@@ -82,7 +82,8 @@ class Service(Listener):
             spare_threads()
         lease = config.patience if config.mode == "lock" else LEASE
         held = wait_until_released() if session is None else ()
-        self._launcher, self._host_launcher = (held or ("",))[0], held[1:]  # instance of the first one; name and instance of the own one
+        self._launcher = held[0] if held else ""  # instance of the one that has the router
+        self._parent = int(held[1]) if held[1:] else 0  # process id of the own launcher, if that has joined from another host
         self._lease = lease
         session = session or self._open_session()
         with ExitStack() as failed:
@@ -237,12 +238,13 @@ class Service(Listener):
             raise SystemExit(ENVIRONMENT)
 
     def _missing(self) -> str:
-        """Return which process this service cannot be without and does not see; empty if it sees all."""
-        if self._router not in self.alive.get("router", ()):
-            return "router"
-        if self._host_launcher and self._host_launcher[1] not in self.alive.get(self._host_launcher[0], ()):
-            return self._host_launcher[0]
-        return ""
+        """Return which process this service cannot be without and does not see; empty if it sees it.
+
+        On a host that has joined, the launcher of that host decides: the router may be beyond a cut of the network for any time.
+        """
+        if self._parent:
+            return "" if os.getppid() == self._parent else "launcher"
+        return "" if self._router in self.alive.get("router", ()) else "router"
 
     def _watch_liveliness(self) -> None:
         def enqueue(sample: zenoh.Sample) -> None:

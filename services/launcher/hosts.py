@@ -154,5 +154,5 @@ def check_free(session: Session, who: str, only: Collection[str], endpoint: str)
             host = who.removeprefix(HOST_LAUNCHER)
             raise JoinRefused(f"a host named {host} has joined {endpoint} already{process}: end its launcher, or give another --host")
         raise JoinRefused(
-            f"{name} runs already at {endpoint}{process}: end its launcher first. Services whose launcher was killed end within 10 s"
+            f"{name} runs already at {endpoint}{process}: end its launcher first. Services whose launcher was killed end within 12 s"
         )

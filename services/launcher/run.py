@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import signal
 import sys
 import time
@@ -25,7 +26,7 @@ from services.common.entry import set_up_log
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, INTERRUPTED, OK
 from services.common.identity import BadKeys, secured
 from services.common.rpc import CallFailed
-from services.common.service import ORPHANED, Service
+from services.common.service import Service
 from services.common.session import LOCAL_ENDPOINT, BusUnreachable
 from services.launcher.catalogue import RECORDER
 from services.launcher.checks import (
@@ -219,7 +220,7 @@ class _Run:
             _programs(here, directory, bus),
             self._stops,
             self._announce,
-            held=service.instance if first is None else f"{first.instance} {service.who} {service.instance}",
+            held=service.instance if first is None else f"{first.instance} {os.getpid()}",
             elsewhere=self._remotes.services,
             is_reachable=lambda: first is None or first.instance in service.alive.get("router", ()),
         )
@@ -331,9 +332,7 @@ class _Run:
         if up:
             self._announce(f"connected with the router at {self._bus.endpoint}")
         elif not self._stop_requested:
-            self._announce(
-                f"the router at {self._bus.endpoint} is not reachable: services end after {ORPHANED:g} s, and start again when it is"
-            )
+            self._announce(f"the router at {self._bus.endpoint} is not reachable: the services of this host wait for it")
 
     def _note_new_system(self) -> None:
         """End the services of a joined host when the system of the first one was started again, to join the new one."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import socket
 import sys
@@ -436,20 +437,22 @@ def test_a_service_whose_launcher_died_during_its_start_does_not_join_the_next_s
             child.kill()
 
 
-def test_a_service_of_a_joined_host_ends_without_its_own_launcher(tmp_path: Path, bus: Rig) -> None:
+@pytest.mark.parametrize("launcher_lives", [True, False])
+def test_a_service_of_a_joined_host_ends_with_its_launcher_and_not_with_the_network(tmp_path: Path, bus: Rig, launcher_lives: bool) -> None:
     with rig(tmp_path, bus.robot) as parent:
-        own = parent.bus.session.liveliness().declare_token(keys.alive("launcher_desk", "i1_desk"))
         argv = (sys.executable, *PROBE, "--endpoint", parent.endpoint, "--orphaned", "0.5")
         child = Child(ChildProgram("probe", argv, tmp_path / "probe.log"))
-        child.spawn("rig launcher_desk i1_desk")
+        child.spawn(f"rig {os.getpid() if launcher_lives else 1}")
         try:
             child.release()
             wait_for(lambda: parent.instances("probe"), "the service", 30.0)
-            time.sleep(1.5)
-            assert child.running()
-            own.undeclare()
-            assert child.process is not None and child.process.wait(10.0) == 3
-            assert "no launcher_desk at" in (tmp_path / "probe.log").read_text()
+            parent.drop_token("router", "rig")
+            if launcher_lives:
+                time.sleep(2.5)
+                assert child.running()
+            else:
+                assert child.process is not None and child.process.wait(10.0) == 3
+                assert "no launcher at" in (tmp_path / "probe.log").read_text()
         finally:
             child.kill()
 

@@ -111,7 +111,7 @@ def test_what_another_host_runs_is_judged_and_not_killed_and_the_host_joins_a_ne
     assert "a second two, i1_stranger, is on the bus beside" in events[1].content()["text"]
     first.process.kill()
     first.process.wait()
-    second.wait_for("is not reachable: services end after 10 s")
+    second.wait_for("is not reachable: the services of this host wait for it")
     again = launch("--elsewhere", "two,three", at=endpoint)
     again.wait_for("all ready")
     assert "was started again: this host joins it" in second.news
