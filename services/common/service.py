@@ -36,7 +36,7 @@ from services.common.listener import Listener
 from services.common.rate import NOT_MEASURED
 from services.common.rpc import Answering
 from services.common.rpc import CallRefused as CallRefused
-from services.common.session import LEASE, LOCAL_ENDPOINT, open_client, spare_threads
+from services.common.session import LEASE, LOCAL_ENDPOINT, end_unreceived, open_client, spare_threads
 
 _Q = TypeVar("_Q", bound=Request)
 _R = TypeVar("_R", bound=Reply)
@@ -225,6 +225,7 @@ class Service(Listener):
         """End the process after ten seconds without a router or its own launcher, and after a signal whose exception was lost."""
         if self._signalled:
             raise SystemExit(OK)
+        end_unreceived(self.config.endpoint, self._lease)  # also of a connection that has taken the place of another one
         missing = self._missing()
         if not missing:
             self._router_seen = time.monotonic()

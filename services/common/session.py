@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import socket
 import tempfile
 import time
 from collections.abc import Iterator
@@ -65,6 +66,37 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
     return config
 
 
+def end_unreceived(endpoint: str, lease: float) -> None:
+    """Let the system end this process's connections at an endpoint whose data is not received for `lease` seconds; only Linux can.
+
+    Zenoh ends a silent connection after the lease, but with TLS not before the data that waits in its socket is sent: after a cut of the
+    network that is as long again as the cut.  A listener gives the limit to the connections that it accepts; a client that has connected
+    again must set it again.
+    """
+    port = endpoint.rpartition(":")[2]
+    if not hasattr(socket, "TCP_USER_TIMEOUT") or not port.isdecimal():
+        return
+    for name in os.listdir("/proc/self/fd"):
+        try:
+            one = socket.socket(fileno=int(name))
+        except OSError:  # no socket, or closed meanwhile
+            continue
+        try:
+            if one.family in (socket.AF_INET, socket.AF_INET6) and one.type == socket.SOCK_STREAM and int(port) in _ports(one):
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
+        except OSError:  # closed meanwhile
+            continue
+        finally:
+            one.detach()  # it stays Zenoh's
+
+
+def _ports(one: socket.socket) -> tuple[int, ...]:
+    """Return the port at which a socket listens, or the one to which it is connected."""
+    if one.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+        return (one.getsockname()[1],)
+    return (one.getpeername()[1],)
+
+
 def spare_threads() -> None:
     """Restrict Zenoh to one thread in this process; call it before the first session.
 
@@ -103,7 +135,9 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
     give_up = time.monotonic() + patience
     while True:
         try:
-            return zenoh.open(_config(namespace, lease, settings))
+            session = zenoh.open(_config(namespace, lease, settings))
+            end_unreceived(place, lease)
+            return session
         except zenoh.ZError as error:
             if time.monotonic() >= give_up:
                 secure = "its keys with --keys, if it is secured" if identity is None else f"other keys than {identity.folder} with --keys"
@@ -136,7 +170,9 @@ def open_router(
         settings |= _NOT_HELD_UP
     _allow_many_descriptors()
     try:
-        return zenoh.open(_config(NAMESPACE, lease, settings))
+        router = zenoh.open(_config(NAMESPACE, lease, settings))
+        end_unreceived(endpoint, lease)
+        return router
     except zenoh.ZError as error:
         raise BusUnreachable(
             f"cannot listen at {endpoint}: {_reason(error)}. If another system runs there, end it with `mobee stop --endpoint {endpoint}`, "
