@@ -118,14 +118,21 @@ def part_of(cls: type[Message], name: str) -> str | None:
     return name if cls.stream.variable == "part" and name != "*" else None
 
 
-def require_key(received: zenoh.Sample | zenoh.Query) -> None:
-    """Raise Refused if the sender has attached another key than that under which a message or call has come.
+def other_key(received: zenoh.Sample | zenoh.Query) -> str:
+    """Return the key that the sender has attached, if it is not that under which a message or call has come; else nothing.
 
     Zenoh sends numbers in place of keys; when a connection ends and a new one begins, a number can stand for another key for a moment.
     """
     attached = received.attachment
-    if attached is not None and (sent := attached.to_bytes()) != str(received.key_expr).encode():
-        raise Refused("key", f"sent as {sent[:200].decode(errors='replace')}")
+    if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
+        return ""
+    return sent[:200].decode(errors="replace") or "nothing"
+
+
+def require_key(received: zenoh.Sample | zenoh.Query) -> None:
+    """Raise Refused if a message or call has come under another key than its sender has attached."""
+    if sent := other_key(received):
+        raise Refused("key", f"sent as {sent}")
 
 
 class Bus:

@@ -15,6 +15,7 @@ from zenoh.handlers import Callback
 from bus_schema import UNDECODABLE, keys, type_of
 from bus_schema.rpc import Stat
 from services.common import rpc
+from services.common.bus import other_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +43,14 @@ class Received:
 def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None]) -> None:
     """Handle every message on a key expression, on a thread of Zenoh, until the session is closed; `handle` must not wait.
 
+    Messages that come under another key than they were sent are dropped.
+
     Raises ValueError if the key expression is not valid.
     """
 
     def enqueue(sample: zenoh.Sample) -> None:
+        if other_key(sample):
+            return
         handle(Received(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), time.monotonic()))
 
     try:

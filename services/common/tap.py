@@ -12,6 +12,7 @@ from msgspec import Struct
 from zenoh.handlers import Callback, RingChannel
 
 from bus_schema import type_of
+from services.common.bus import other_key
 from services.common.listener import stay_known
 
 
@@ -47,6 +48,8 @@ class Tap:
         for key, stream in self._streams:
             known = "" if "*" in key else key
             while (sample := stream.try_recv()) is not None:
+                if other_key(sample):
+                    continue
                 arrived.append(
                     Raw(known or str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), now, _published(sample, now))
                 )
