@@ -48,6 +48,7 @@ EXPERIMENTS = {
     "reward-decay": "experiments.claims.ch7_learning.reward_decay",
     "roadmap-density": "experiments.claims.ch8_reaching.roadmap_density",
     "roadmap-from-scratch": "experiments.claims.ch3_roadmaps.roadmap_from_scratch",
+    "robots-teaching-robots": "experiments.claims.ch4_vision.robots_teaching_robots",
     "shallow-contact-recovery": "experiments.claims.ch4_reflex.shallow_contact_recovery",
     "simulation-transfer": "experiments.claims.ch7_learning.simulation_transfer",
     "simultaneous-learning": "experiments.claims.ch8_reaching.simultaneous_learning",

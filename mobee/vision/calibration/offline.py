@@ -47,12 +47,12 @@ class Motion:
 class Watcher:
     """A simulated robot with imperfect cameras and a tag on its palm."""
 
-    def __init__(self, rig: Rig, model: Model, settings: CameraSettings, errors: CameraErrors, seed: int) -> None:
-        """`seed`: of the noise of encoders, stamps and pictures, of the room and of the clutter in it."""
+    def __init__(self, rig: Rig, model: Model, settings: CameraSettings, errors: CameraErrors, seed: int, has_clutter: bool = True) -> None:
+        """`seed`: of the noise of encoders, stamps and pictures, of the room and, if it has any, of the clutter on its table."""
         self.rig, self.settings, self.errors = rig, settings, errors
         self.plant = OfflinePlant(model, seed=seed)
         worn = [] if rig.tag is None else tag_solids(rig.tag, rig.robot, errors.tag)
-        around = [*room(seed), *clutter(model.world.objects.values(), seed)]
+        around = [*room(seed), *(clutter(model.world.objects.values(), seed) if has_clutter else ())]
         self.scene = Scene(rig.robot, model.world, rig.cameras, worn=worn, around=around)
         self._cameras = Cameras(self.scene, settings, errors, seed)
         self._rng = np.random.default_rng([seed, 0x7374616D70])

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The iCub and the Katana on its table in one model (thesis figure 4.5), both with fields, and the ball that the Katana carries."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.derivation.derive import derive
+from mobee.robot.join import join_robots
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
+from mobee.vision.teaching.postures import Carried
+
+ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katana_hand")
+"""The parts of both robots."""
+BASE = np.array([-0.5, 0.4, 0.106])  # m: of the Katana, as in icub_katana.xml
+BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]), 0.03)
+"""At the tips of the closed fingers."""
+CLOSED = 0.2  # rad, of the Katana's hand from its limit
+SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # degrees: arms out of the shared workspace
+
+
+@cache
+def two_robots() -> Robot:
+    """Return both robots joined; the Katana's fields are derived, since its file has none."""
+    robots = {"": load_robot("icub"), "katana": derive(load_robot("katana")).robot}
+    return join_robots(robots, {"katana": (BASE, np.eye(3))}, "icub_katana")
+
+
+def motors_of(parts: tuple[str, ...]) -> slice:
+    """Return the motors of adjacent parts."""
+    slices = [two_robots().part(part).slice for part in parts]
+    return slice(slices[0].start, slices[-1].stop)
+
+
+def watching() -> Array:
+    """Return a posture (n,) rad in which the iCub's arms are aside and the Katana's hand is closed; the rest is at home."""
+    robot = two_robots()
+    q: Array = robot.home.copy()
+    for side in "lr":
+        for name, degrees in SIDEWAYS.items():
+            q[robot.motor_index(f"{side}_{name}")] = np.deg2rad(degrees)
+    hand = robot.part("katana_hand").slice
+    q[hand] = robot.limits[hand, 0] + CLOSED
+    return q

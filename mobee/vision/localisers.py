@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Localisers: what learns the place of a thing from its pixels in two pictures and the encoders (thesis 4.1.2; Leitner et al. 2012).
+
+The inputs (N, 13) are those of `mobee.vision.teaching.lessons`: columns and rows of the thing in the left and right picture [px], then the
+encoders of torso and head [rad], the last three of which are the eyes' tilt, version and vergence, as on the iCub.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import NotInstalled, UnknownName
+from mobee.model.kinematics import link_transforms
+from mobee.vision.cartesian_programs import CartesianPrograms
+from mobee.vision.imperfections import CameraSettings
+from mobee.vision.lens import Lens
+from mobee.vision.mount import camera_frames
+from mobee.vision.rig import Rig
+from mobee.vision.teaching.lessons import seeing_motors
+
+DEGREE, PENALTIES = 2, np.logspace(-4.0, 3.0, 15)  # of the polynomial; of its coefficients, of which cross-validation chooses one
+HIDDEN, DECAY, STEPS = 20, 3e-3, 3000  # units; penalty of the weights; of L-BFGS
+LENGTH, LENGTHS, NOISE = 8.0, (0.1, 1e4), (1e-7, 1.0)  # of the Gaussian process: start and bounds, in deviations of the inputs
+SPREAD, FAR, ROUNDS = 0.01, 100.0, 12  # of corrected stereo: m, deviation of a place; its largest residual in these; steps
+FEATURES = 16  # of `eye_features`
+NEAREST = 0.08  # rad: the smallest angle between the rays of both eyes, of a thing 0.85 m away, out of reach
+
+
+class Localiser(Protocol):
+    """Learns places from inputs."""
+
+    def fit(self, inputs: Array, places: Array) -> None:
+        """Learn from inputs (N, d) and places (N, 3) m; forgets what it has learned before."""
+
+    def predict(self, inputs: Array) -> Array:
+        """Return the places (M, 3) m for inputs (M, d)."""
+
+
+def eye_features(inputs: Array, lens: Lens) -> Array:
+    """Return the inputs (N, 13) and three numbers more (N, 16): the place relative to the head up to a factor, by the angles of the eyes.
+
+    An eye that is turned by an angle and sees a thing at another angle has it at about their sum; the distance is about the inverse
+    of the angle between the rays of both eyes.  The kinematic model is not used.
+    """
+    flat = (inputs[:, :4].reshape(-1, 2, 2) - (lens.cx, lens.cy)) / (lens.fx, lens.fy)
+    tilt, version, vergence = inputs[:, -3:].T
+    aside, down = np.arctan(flat[..., 0]), np.arctan(flat[..., 1].mean(axis=1)) - tilt
+    left, right = aside[:, 0] + version + 0.5 * vergence, aside[:, 1] + version - 0.5 * vergence
+    far, middle = 1.0 / np.maximum(left - right, NEAREST), 0.5 * (left + right)
+    place = far[:, None] * np.stack([np.cos(down) * np.cos(middle), np.cos(down) * np.sin(middle), np.sin(down)], axis=1)
+    return np.concatenate([inputs, place], axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scale:
+    """Mean and standard deviation (d,) of columns."""
+
+    mean: Array
+    deviation: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> Scale:
+        """Return those of rows (N, d); a constant column has a deviation of 1."""
+        deviation = rows.std(axis=0)
+        return cls(rows.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
+
+    def standard(self, rows: Array) -> Array:
+        """Return rows (N, d) with the mean 0 and the deviation 1."""
+        found: Array = (rows - self.mean) / self.deviation
+        return found
+
+    def original(self, rows: Array) -> Array:
+        """Return rows (N, d) that were standardised."""
+        found: Array = rows * self.deviation + self.mean
+        return found
+
+
+class Regression:
+    """A localiser by a regression with the methods of scikit-learn, on standardised `eye_features` and places."""
+
+    def __init__(self, lens: Lens, make: Callable[[], Any]) -> None:
+        """`make`: returns a new estimator, of all three coordinates."""
+        self._lens, self._make = lens, make
+        self._estimator: Any = None
+        self._of_features = self._of_places = Scale(np.zeros(1), np.ones(1))
+
+    def fit(self, inputs: Array, places: Array) -> None:
+        """See `Localiser`."""
+        features = eye_features(inputs, self._lens)
+        self._of_features, self._of_places = Scale.of(features), Scale.of(places)
+        self._estimator = self._make()
+        with warnings.catch_warnings():  # a length scale at its bound: an input that says nothing
+            warnings.filterwarnings("ignore", message=".*close to the specified (upper|lower) bound.*")
+            self._estimator.fit(self._of_features.standard(features), self._of_places.standard(places))
+
+    def predict(self, inputs: Array) -> Array:
+        """See `Localiser`."""
+        features = self._of_features.standard(eye_features(inputs, self._lens))
+        found: Array = self._of_places.original(self._estimator.predict(features))
+        return found
+
+
+class CorrectedStereo:
+    """Stereo by the kinematic model, whose camera mounts and encoder offsets are learned from places, by robust least squares."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._x: Array = np.zeros(len(rig.names))
+
+    def fit(self, inputs: Array, places: Array) -> None:
+        """See `Localiser`; the tolerances of `CameraSettings` are the prior."""
+        from scipy.optimize import least_squares
+
+        rig = self._rig
+        scale = rig.deviations(CameraSettings().deviations)
+        used = slice(0, rig.where("encoder").stop)  # what a thing at rest says nothing about is behind
+
+        def parameters(y: Array) -> Array:
+            x = np.zeros(len(scale))
+            x[used] = scale[used] * y
+            return x
+
+        def residuals(y: Array) -> Array:
+            off = (stereo_places(rig, parameters(y), inputs) - places) / SPREAD
+            return np.concatenate([np.nan_to_num(off, nan=FAR, posinf=FAR, neginf=-FAR).clip(-FAR, FAR).ravel(), y])
+
+        start = np.zeros(len(scale[used]))
+        self._x = parameters(least_squares(residuals, start, loss="soft_l1", max_nfev=ROUNDS).x)
+
+    def predict(self, inputs: Array) -> Array:
+        """See `Localiser`."""
+        return stereo_places(self._rig, self._x, inputs)
+
+
+def stereo_places(rig: Rig, x: Array, inputs: Array) -> Array:
+    """Return the places (N, 3) m nearest to both rays, by the kinematic model with parameters x (P,) of cameras and encoders."""
+    q = np.repeat(rig.robot.home[None], len(inputs), axis=0)
+    q[:, seeing_motors(rig.robot)] = inputs[:, 4:]
+    transforms = link_transforms(rig.robot, rig.posture(x, q, np.zeros_like(q)))
+    normal, target = np.zeros((len(q), 3, 3)), np.zeros((len(q), 3))
+    for number, (name, camera) in enumerate(rig.cameras.items()):
+        position, rotation = camera_frames(camera, transforms, x[rig.where(name)])
+        rays = np.einsum("nij,nj->ni", rotation, rig.lens.unproject(inputs[:, 2 * number : 2 * number + 2]))
+        across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+        normal += across
+        target += np.einsum("nij,nj->ni", across, position)
+    found: Array = np.linalg.solve(normal, target[..., None])[..., 0]
+    return found
+
+
+def _polynomial(seed: int) -> Any:
+    sklearn = _sklearn()
+    polynomial = sklearn.preprocessing.PolynomialFeatures(DEGREE)
+    return sklearn.pipeline.make_pipeline(polynomial, sklearn.linear_model.RidgeCV(PENALTIES))
+
+
+def _gaussian_process(seed: int) -> Any:
+    process = _sklearn().gaussian_process
+    kernels = process.kernels
+    signal = kernels.ConstantKernel(10.0, (1e-2, 1e6)) * kernels.RBF(np.full(FEATURES, LENGTH), LENGTHS)
+    return process.GaussianProcessRegressor(signal + kernels.WhiteKernel(1e-3, NOISE), random_state=seed)
+
+
+def _network(seed: int) -> Any:
+    network = _sklearn().neural_network.MLPRegressor
+    return network(hidden_layer_sizes=(HIDDEN,), activation="tanh", solver="lbfgs", alpha=DECAY, max_iter=STEPS, random_state=seed)
+
+
+def _programs(seed: int) -> Any:
+    return CartesianPrograms(seed)
+
+
+def _sklearn() -> Any:
+    try:
+        import sklearn.gaussian_process
+        import sklearn.linear_model
+        import sklearn.neural_network
+        import sklearn.pipeline
+        import sklearn.preprocessing
+    except ImportError:
+        raise NotInstalled('this localiser needs scikit-learn: pip install "mobee[teach]"') from None
+    return sklearn
+
+
+REGRESSIONS: Mapping[str, Callable[[int], Any]] = {
+    "least squares": _polynomial,
+    "Gaussian process": _gaussian_process,
+    "neural network": _network,
+    "genetic programming": _programs,
+}
+"""Estimators by name, made from a seed, without the kinematic model."""
+CORRECTED = "corrected stereo"
+NAMES = (*REGRESSIONS, CORRECTED)
+
+
+def localiser(name: str, rig: Rig, seed: int) -> Localiser:
+    """Return a new localiser by name, one of NAMES; `rig`: the robot and its cameras, of which a regression uses the lens alone.
+
+    Raises UnknownName, and NotInstalled without scikit-learn.
+    """
+    if name == CORRECTED:
+        return CorrectedStereo(rig)
+    if name not in REGRESSIONS:
+        raise UnknownName("localiser", name, NAMES)
+    return Regression(rig.lens, lambda: REGRESSIONS[name](seed))

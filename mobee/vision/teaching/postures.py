@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chooses postures: of the teacher, which put the ball at places in a volume, and of the learner, from which its cameras see the ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import link_transforms
+from mobee.model.model import Model
+from mobee.vision.mount import camera_frames, into
+from mobee.vision.rig import Rig, see_points
+from mobee.vision.teaching.lessons import seeing_motors
+
+BATCH, ROUNDS = 4_000, 60  # postures drawn at once, and how often at most
+GAZES, STEPS, LEAP, DAMPING = 60, 6, 80.0, 20.0  # postures drawn at once; least squares: steps, px of one at most, px/rad
+STEEP = 5e3  # px/rad, above all slopes in a picture
+BORDER = 30.0  # px of the picture's border in which the ball is not looked for, since the cameras may be turned a little
+DISTANCES = (0.20, 0.65)  # m, of the ball from a camera
+LIMIT = 0.2  # rad, of the teacher from its limits, which push within 10 degrees
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """A ball that a robot carries: on a link of the joined robot, at `position` (3,) m of the root frame at zero pose; `radius` m."""
+
+    link: str
+    position: Array
+    radius: float
+
+    def place(self, rig: Rig, transforms: Array) -> Array:
+        """Return its place (..., 3) m for transforms of the links (..., L, 4, 4)."""
+        link = transforms[..., rig.robot.links.index(self.link), :3, :]
+        found: Array = link[..., :3] @ self.position + link[..., 3]
+        return found
+
+
+def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volume: tuple[Array, Array], count: int, seed: int) -> Array:
+    """Return postures (count, n) rad of the teacher, the others at `rest`, that put the ball into a volume without contact.
+
+    Args:
+        rig: the robots, joined.
+        model: of them in their world.
+        carried: the ball.
+        rest: posture (n,) rad of all motors that do not move the ball.
+        volume: the lowest and the highest corner (3,) m.
+        count: of postures.
+        seed: of the draws.
+
+    Raises:
+        InvalidValue: too few are found.
+    """
+    robot, rng = rig.robot, np.random.default_rng([seed, 0x74656163])
+    moving = _moving(rig, carried.link)
+    low, high = robot.limits[moving].T
+    kept = np.empty((0, len(rest)))
+    for _ in range(ROUNDS):
+        drawn = np.repeat(rest[None], BATCH, axis=0)
+        drawn[:, moving] = rng.uniform(low + LIMIT, high - LIMIT, (BATCH, len(moving)))
+        pose = model.evaluate(drawn)
+        at = carried.place(rig, pose.transforms)
+        kept = np.concatenate([kept, drawn[((at > volume[0]) & (at < volume[1])).all(axis=1) & (pose.count == 0)]])
+        if len(kept) >= count:
+            found: Array = kept[:count]
+            return found
+    raise InvalidValue(
+        f"only {len(kept)} of {ROUNDS * BATCH} postures of the teacher put the ball into the volume without contact, and {count} were "
+        "asked for. Give a larger volume, or ask for fewer."
+    )
+
+
+def gaze_postures(
+    rig: Rig, model: Model, carried: Carried, posture: Array, share: float, size: tuple[int, int], count: int, rng: np.random.Generator
+) -> Array:
+    """Return postures (K, n) rad, K <= count, of torso and head at random from which the model's cameras have the ball in their pictures.
+
+    `posture` (n,) rad: of all other motors; `share`: of the torso's range, about home, within which it is drawn; `size`: of a picture.
+    """
+    kept = np.empty((0, len(posture)))
+    motors = seeing_motors(rig.robot)
+    low, high = _ranges(rig, share)
+    for _ in range(ROUNDS):
+        drawn = np.repeat(posture[None], GAZES, axis=0)
+        drawn[:, motors] = rng.uniform(low[motors], high[motors], (GAZES, len(motors)))
+        turned = _turned(rig, carried, drawn, (low, high), rng.uniform(BORDER, np.array(size) - BORDER, (GAZES, 2, 2)))
+        transforms = link_transforms(rig.robot, turned)
+        seen = turned[_seen(rig, transforms, carried.place(rig, transforms), size)]
+        kept = np.concatenate([kept, seen[model.evaluate(seen).count == 0]]) if len(seen) else kept
+        if len(kept) >= count:
+            break
+    found: Array = kept[:count]
+    return found
+
+
+def _turned(rig: Rig, carried: Carried, postures: Array, limits: tuple[Array, Array], pixels: Array) -> Array:
+    """Turn the head of postures (B, n) rad until the model's cameras have the ball near pixels (B, cameras, 2), by damped least squares.
+
+    The head stays within limits (n,), (n,) rad, so that not all postures returned show the ball.
+    """
+    head, x, found = list(rig.head), np.zeros(len(rig.names)), postures.copy()
+    places = carried.place(rig, link_transforms(rig.robot, postures))[:, None]
+    for _ in range(STEPS):
+        seen = [see_points(rig, camera, x, found, np.zeros_like(found), places) for camera in rig.cameras]
+        missing = np.nan_to_num(pixels - np.stack([one.pixels[:, 0] for one in seen], axis=1))
+        slope = np.stack([one.by_posture[:, 0][..., head] for one in seen], axis=1)
+        slope[~(np.abs(slope) < STEEP)] = 0.0  # of a ball beside or behind the camera
+        jacobian, residual = slope.reshape(len(found), -1, len(head)), missing.reshape(len(found), -1, 1).clip(-LEAP, LEAP)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian + DAMPING**2 * np.eye(len(head))
+        step = np.linalg.solve(normal, np.swapaxes(jacobian, 1, 2) @ residual)[..., 0]
+        found[:, head] = np.clip(found[:, head] + step, limits[0][head], limits[1][head])
+    return found
+
+
+def _ranges(rig: Rig, share: float) -> tuple[Array, Array]:
+    """Return the ranges (n,), (n,) rad from which postures of the learner are drawn: of the torso a share about home."""
+    robot = rig.robot
+    low, high = robot.limits.T.copy()
+    torso = robot.part("torso").slice
+    low[torso] = robot.home[torso] + share * (low[torso] - robot.home[torso])
+    high[torso] = robot.home[torso] + share * (high[torso] - robot.home[torso])
+    return low, high
+
+
+def _seen(rig: Rig, transforms: Array, places: Array, size: tuple[int, int]) -> Array:
+    """Return whether all cameras, where the model has them, have places (B, 3) m in their pictures, at a fitting distance."""
+    fits = np.ones(len(places), bool)
+    for camera in rig.cameras.values():
+        local = into(*camera_frames(camera, transforms, np.zeros(6)), places)
+        pixels, distance = rig.lens.project(local), np.linalg.norm(local, axis=1)
+        inside = ((pixels > BORDER) & (pixels < np.array(size) - BORDER)).all(axis=1)
+        ahead = (local[:, :2] ** 2).sum(axis=1) < local[:, 2] ** 2  # beyond it the lens folds back
+        fits &= inside & ahead & (distance > DISTANCES[0]) & (distance < DISTANCES[1])
+    return fits
+
+
+def _moving(rig: Rig, link: str) -> Ints:
+    """Return the motors that move a link."""
+    robot, number = rig.robot, rig.robot.links.index(link)
+    moving = set[int]()
+    while number > 0:
+        moving |= set(np.flatnonzero(robot.coupling[0][number - 1]).tolist())
+        number = robot.joints[number - 1].parent
+    return np.array(sorted(moving), dtype=np.intp)
