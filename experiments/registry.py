@@ -50,6 +50,7 @@ EXPERIMENTS = {
     "roadmap-from-scratch": "experiments.claims.ch3_roadmaps.roadmap_from_scratch",
     "robots-teaching-robots": "experiments.claims.ch4_vision.robots_teaching_robots",
     "shallow-contact-recovery": "experiments.claims.ch4_reflex.shallow_contact_recovery",
+    "shared-workspace": "experiments.claims.ch4_reflex.shared_workspace",
     "simulation-transfer": "experiments.claims.ch7_learning.simulation_transfer",
     "simultaneous-learning": "experiments.claims.ch8_reaching.simultaneous_learning",
     "step-response": "experiments.claims.ch5_control.step_response",

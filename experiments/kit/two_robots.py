@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from mobee.derivation.derive import derive
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
+from mobee.robot.urdf.shapes import grown
 from mobee.vision.teaching.postures import Carried
 
 ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katana_hand")
@@ -19,14 +21,21 @@ ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katan
 BASE = np.array([-0.5, 0.4, 0.106])  # m: of the Katana, as in icub_katana.xml
 BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]), 0.03)
 """At the tips of the closed fingers."""
+WIDTH = 0.05  # m, of the Katana's fields against the iCub
 CLOSED = 0.2  # rad, of the Katana's hand from its limit
 SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # degrees: arms out of the shared workspace
 
 
 @cache
 def two_robots() -> Robot:
-    """Return both robots joined; the Katana's fields are derived, since its file has none."""
-    robots = {"": load_robot("icub"), "katana": derive(load_robot("katana")).robot}
+    """Return both robots joined.
+
+    The file of the Katana has no fields.  It gets those that are derived for its own links, which are narrow since they would overlap
+    otherwise, and wider ones that are tested against the iCub's fields alone.
+    """
+    katana = derive(load_robot("katana")).robot
+    wide = [grown(solid, WIDTH, f"{solid.name}_wide_field") for solid in katana.shapes if solid.role == "solid" and solid.link > 0]
+    robots = {"": load_robot("icub"), "katana": replace(katana, shapes=(*katana.shapes, *wide))}
     return join_robots(robots, {"katana": (BASE, np.eye(3))}, "icub_katana")
 
 
