@@ -35,6 +35,7 @@ SHORTEST = {
     "reward-decay": QUICK,
     "push-disturbance": ("--laws", "default", "--directions", "down-to-table"),
     "shallow-contact-recovery": ("--angles", "60", "--spots", "1", "--repeat", "1"),
+    "shared-workspace": ("--minutes", "0.03", "--seeds", "1"),
     "step-response": ("--gains", "default", "--periods", "20", "--postures", "1", "--motors", "l_elbow"),
 }
 SMALLER = {  # constants of the modules, where no option makes the run shorter
