@@ -21,7 +21,7 @@ ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katan
 BASE = np.array([-0.5, 0.4, 0.106])  # m: of the Katana, as in icub_katana.xml
 BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]), 0.03)
 """At the tips of the closed fingers."""
-WIDTH = 0.05  # m, of the Katana's fields against the iCub
+WIDTH = 0.06  # m, of the Katana's fields against the iCub: the widest of those that `derive` makes
 CLOSED = 0.2  # rad, of the Katana's hand from its limit
 SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # degrees: arms out of the shared workspace
 
@@ -33,9 +33,12 @@ def two_robots() -> Robot:
     The file of the Katana has no fields.  It gets those that are derived for its own links, which are narrow since they would overlap
     otherwise, and wider ones that are tested against the iCub's fields alone.
     """
-    katana = derive(load_robot("katana")).robot
+    icub, katana = load_robot("icub"), derive(load_robot("katana")).robot
     wide = [grown(solid, WIDTH, f"{solid.name}_wide_field") for solid in katana.shapes if solid.role == "solid" and solid.link > 0]
-    robots = {"": load_robot("icub"), "katana": replace(katana, shapes=(*katana.shapes, *wide))}
+    katana = replace(
+        katana, shapes=(*katana.shapes, *wide), least_lever=icub.least_lever
+    )  # else contacts of short levers push the iCub less
+    robots = {"": icub, "katana": katana}
     return join_robots(robots, {"katana": (BASE, np.eye(3))}, "icub_katana")
 
 

@@ -103,5 +103,5 @@ class CartesianPrograms:
         terms = self._terms(genes, x)
         normal = terms.T @ terms / len(x) + PENALTY * np.eye(terms.shape[1])
         right = terms.T @ y / len(x)
-        weights = np.linalg.solve(normal, right)
+        weights = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
         return float((y * y).mean(axis=0).sum() - (right * weights).sum()), weights

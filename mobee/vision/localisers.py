@@ -150,7 +150,7 @@ def stereo_places(rig: Rig, x: Array, inputs: Array) -> Array:
         across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
         normal += across
         target += np.einsum("nij,nj->ni", across, position)
-    found: Array = np.linalg.solve(normal, target[..., None])[..., 0]
+    found: Array = np.asarray(np.linalg.solve(normal, target[..., None])[..., 0], dtype=np.float64)
     return found
 
 
@@ -184,7 +184,7 @@ def _sklearn() -> Any:
         import sklearn.pipeline
         import sklearn.preprocessing
     except ImportError:
-        raise NotInstalled('this localiser needs scikit-learn: pip install "mobee[teach]"') from None
+        raise NotInstalled('this localiser needs scikit-learn: pip install "mobee[vision]"') from None
     return sklearn
 
 

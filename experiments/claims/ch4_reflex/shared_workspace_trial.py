@@ -25,6 +25,7 @@ REST = 1.0  # s after a position move, in which the motors arrive
 PATIENCE = 5.0  # s for which a reflex may be stuck, until its client accepts the pose
 DEEP = 2e-3  # m: a contact that counts as a collision
 ROBOTS = {"icub": ICUB, "katana": KATANA}
+GAINS = {"icub": Gains.default, "katana": Gains.derived}  # the latter for fields that were derived
 MARK = "katana_"  # begins the names of the Katana's shapes, motors and parts
 
 
@@ -117,11 +118,11 @@ class WithController:
 
     mode: Mode = "velocity"
 
-    def __init__(self, own: slice, seed: int, model: Model) -> None:
+    def __init__(self, own: slice, seed: int, model: Model, gains: Gains) -> None:
         alive = np.zeros(len(two_robots().motors), dtype=bool)
         alive[own] = True
         self._own, self._client = own, Client(own, seed)
-        self._controller = Controller(model, Gains.default(), speed_scale=SPEED, alive=alive)
+        self._controller = Controller(model, gains, speed_scale=SPEED, alive=alive)
         self._attractor = self._controller.attractor
         self._test = SettleTest(self._controller.gains.settle, 0.0)
         self._next(0.0)
@@ -241,7 +242,7 @@ def run_trial(protection: str, minutes: float, paces: Sequence[float], seed: int
             robots.append((own, guarded))
             reflexes.append(guarded.reflex)
         elif protection == "controllers":
-            robots.append((own, WithController(own, own_seed, model)))
+            robots.append((own, WithController(own, own_seed, model, GAINS[name]())))
     truth = babble(robots, model, minutes, seed)
     return {
         "minutes": minutes,
