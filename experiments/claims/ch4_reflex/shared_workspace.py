@@ -11,7 +11,8 @@ Protections: none; a reflex for each robot with its own history and waypoints, a
 fast; one reflex with one history of both robots; a controller for each robot.  A reflex is triggered by contacts of its robot's fields and
 solids, its limits and clauses.  Motors have lag, delay, play and encoder noise; ticks of 10 ms; all in one process.  Contacts are those of
 the true posture, by the model; solids do not stop each other.  The controllers have the gains of their robots: the default ones, and those
-for derived fields.  Widths and gains were chosen with seeds 0 to 4 in view; the record has seeds from 100 on.  A collision is a contact of solids of both robots deeper than 2 mm.
+for derived fields.  Widths and gains were chosen with seeds 0 to 4 in view; the record has seeds from 100 on.  A collision is a contact of
+solids of both robots deeper than 2 mm.
 Run time: three minutes on one core for an hour of robot time with controllers, and 20 minutes with each other protection.
 """
 
