@@ -19,7 +19,7 @@ from mobee.vision.teaching.postures import Carried
 ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katana_hand")
 """The parts of both robots."""
 BASE = np.array([-0.5, 0.4, 0.106])  # m: of the Katana, as in icub_katana.xml
-BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]), 0.03)
+BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]))
 """At the tips of the closed fingers."""
 WIDTH = 0.06  # m, of the Katana's fields against the iCub: the widest of those that `derive` makes
 CLOSED = 0.2  # rad, of the Katana's hand from its limit

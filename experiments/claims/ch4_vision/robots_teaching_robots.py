@@ -39,10 +39,10 @@ from mobee.vision.calibration.offline import Watcher, watch_hand
 from mobee.vision.calibration.postures import choose_postures
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.imperfections import CameraSettings, camera_errors
-from mobee.vision.localisers import CORRECTED, REGRESSIONS, localiser, stereo_places
 from mobee.vision.rig import Rig
 from mobee.vision.tag import Tag
 from mobee.vision.teaching.lessons import Lessons, split_by_pose
+from mobee.vision.teaching.localisers import CORRECTED, REGRESSIONS, localiser, stereo_places
 from mobee.vision.teaching.offline import watch_teacher
 from mobee.vision.teaching.postures import teacher_postures
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -29,12 +29,11 @@ def watch_teacher(
     looks: int,
     share: float,
     seed: int,
-    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Lesson]:
     """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures, and return what both cameras saw.
 
-    All motions pass the controller, which keeps the robots apart.  The teacher tells where the ball is by its own encoders.  Pictures in
-    which the detector finds no ball, or more than one, give no lesson.
+    All motions pass the controller, which keeps the robots apart.  The teacher tells where the ball is by its own encoders.  Of each
+    picture the largest ball counts; where there is none, or the sizes in both pictures differ, there is no lesson.
 
     Args:
         watcher: the robots, with a ball in their world.
@@ -44,7 +43,6 @@ def watch_teacher(
         looks: postures of the learner for each.
         share: of the torso's range that is used.
         seed: of the learner's postures.
-        progress: called with the finished share.
     """
     rng, found = np.random.default_rng([seed, 0x6C6F6F6B]), list[Lesson]()
     size, model = (watcher.settings.width, watcher.settings.height), watcher.plant.model
@@ -56,7 +54,6 @@ def watch_teacher(
             lesson = _look(watcher, carried, gaze, number)
             if lesson is not None:
                 found.append(lesson)
-        progress((number + 1) / len(postures))
     return found
 
 

@@ -25,11 +25,10 @@ LIMIT = 0.2  # rad, of the teacher from its limits, which push within 10 degrees
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """A ball that a robot carries: on a link of the joined robot, at `position` (3,) m of the root frame at zero pose; `radius` m."""
+    """A ball that a robot carries: on a link of the joined robot, its middle at `position` (3,) m of the root frame at zero pose."""
 
     link: str
     position: Array
-    radius: float
 
     def place(self, rig: Rig, transforms: Array) -> Array:
         """Return its place (..., 3) m for transforms of the links (..., L, 4, 4)."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch4_vision.robots_teaching_robots import CALIBRATED, EXPERIMENT, LEARNED, UNCALIBRATED, findings, plot
-from mobee.vision.localisers import CORRECTED
+from mobee.vision.teaching.localisers import CORRECTED
 from tests.experiments.options import options_of
 
 

@@ -13,9 +13,9 @@ from mobee.model.world_file import load_world
 from mobee.robot.cameras import cameras_of
 from mobee.vision.calibration.offline import Watcher
 from mobee.vision.imperfections import CameraErrors, CameraSettings
-from mobee.vision.localisers import stereo_places
 from mobee.vision.rig import Rig
 from mobee.vision.teaching.lessons import Lessons, seeing_motors, split_by_pose
+from mobee.vision.teaching.localisers import stereo_places
 from mobee.vision.teaching.offline import watch_teacher
 from mobee.vision.teaching.postures import gaze_postures, teacher_postures
 

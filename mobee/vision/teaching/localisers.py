@@ -17,11 +17,11 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.kinematics import link_transforms
-from mobee.vision.cartesian_programs import CartesianPrograms
 from mobee.vision.imperfections import CameraSettings
 from mobee.vision.lens import Lens
 from mobee.vision.mount import camera_frames
 from mobee.vision.rig import Rig
+from mobee.vision.teaching.cartesian_programs import CartesianPrograms
 from mobee.vision.teaching.lessons import seeing_motors
 
 DEGREE, PENALTIES = 2, np.logspace(-4.0, 3.0, 15)  # of the polynomial; of its coefficients, of which cross-validation chooses one
@@ -202,7 +202,7 @@ NAMES = (*REGRESSIONS, CORRECTED)
 def localiser(name: str, rig: Rig, seed: int) -> Localiser:
     """Return a new localiser by name, one of NAMES; `rig`: the robot and its cameras, of which a regression uses the lens alone.
 
-    Raises UnknownName, and NotInstalled without scikit-learn.
+    Raises UnknownName.  Without scikit-learn `fit` raises NotInstalled for those that need it.
     """
     if name == CORRECTED:
         return CorrectedStereo(rig)

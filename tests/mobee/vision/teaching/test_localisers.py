@@ -10,12 +10,12 @@ from mobee.errors import UnknownName
 from mobee.model.kinematics import link_transforms
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
-from mobee.vision.cartesian_programs import CartesianPrograms
 from mobee.vision.imperfections import CameraSettings, camera_errors
-from mobee.vision.localisers import CORRECTED, REGRESSIONS, eye_features, localiser, stereo_places
 from mobee.vision.mount import camera_frames, into
 from mobee.vision.rig import Rig
+from mobee.vision.teaching.cartesian_programs import CartesianPrograms
 from mobee.vision.teaching.lessons import seeing_motors
+from mobee.vision.teaching.localisers import CORRECTED, REGRESSIONS, eye_features, localiser, stereo_places
 
 ROBOT = load_robot("icub")
 RIG = Rig(ROBOT, cameras_of(ROBOT), CameraSettings().lens)
@@ -66,7 +66,7 @@ def test_corrected_stereo_learns_the_cameras_and_a_wrong_lesson_does_not_spoil_i
 @pytest.mark.parametrize("name", REGRESSIONS)
 def test_regressions_learn_places_of_poses_that_they_have_not_seen(name, monkeypatch):
     pytest.importorskip("sklearn")
-    monkeypatch.setattr("mobee.vision.localisers.CartesianPrograms", lambda seed: CartesianPrograms(seed, generations=60))
+    monkeypatch.setattr("mobee.vision.teaching.localisers.CartesianPrograms", lambda seed: CartesianPrograms(seed, generations=60))
     inputs, places = seen(150, 1)
     held_out, there = seen(60, 2)
     learner = localiser(name, RIG, 0)
