@@ -232,7 +232,7 @@ def plot(found: Cells) -> Any:
     """Draw the errors of all ways to place the ball, and how they fall with the number of lessons."""
     groups = grouped(found, "teacher", ("katana",))
     runs = groups["katana"]
-    drawing = new_figure(9.5, 3.8)
+    drawing = new_figure(9.5, 4.2)
     left, right = drawing.subplots(1, 2)
     names = (UNCALIBRATED, *LEARNED, CALIBRATED)
     colors = dict(zip(names, ("C7", "C1", "C0", "C2", "C4", "C3", "black"), strict=True))
@@ -241,7 +241,6 @@ def plot(found: Cells) -> Any:
         together = np.concatenate([run[_errors(name)] for run in runs])
         left.plot(1e2 * np.quantile(together, shares), shares, color=colors[name], linewidth=1.2, label=name)
     finish(left, xlabel="error on held-out poses, cm", ylabel="share of the looks", xscale="log", xlim=(0.05, 50.0))
-    left.legend(fontsize=7, loc="upper left")
     shared: Ints = np.array([count for count in COUNTS if all(count in run["counts"] for run in runs)], dtype=np.intp)
     at = [*shared.tolist(), float(np.mean([run["counts"][-1] for run in runs]))]
     for name in LEARNED:
@@ -252,6 +251,7 @@ def plot(found: Cells) -> Any:
     finish(right, xlabel="lessons", ylabel="median error on held-out poses, cm", xscale="log", yscale="log")
     right.set_xticks(at, [f"{count:.0f}" for count in at], minor=False)
     right.minorticks_off()
+    drawing.legend(handles=left.get_lines(), loc="outside lower center", ncols=len(names), fontsize=7)
     return drawing
 
 

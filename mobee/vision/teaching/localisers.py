@@ -95,8 +95,8 @@ class Regression:
         features = eye_features(inputs, self._lens)
         self._of_features, self._of_places = Scale.of(features), Scale.of(places)
         self._estimator = self._make()
-        with warnings.catch_warnings():  # a length scale at its bound: an input that says nothing
-            warnings.filterwarnings("ignore", message=".*close to the specified (upper|lower) bound.*")
+        with warnings.catch_warnings():  # a length at its bound is that of an input that says nothing; STEPS are enough
+            warnings.filterwarnings("ignore", message=".*(close to the specified (upper|lower) bound|lbfgs failed to converge).*")
             self._estimator.fit(self._of_features.standard(features), self._of_places.standard(places))
 
     def predict(self, inputs: Array) -> Array:
