@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detects things by their colour: regions of the thing's hue, and their outlines to a fraction of a pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+from scipy.spatial import ConvexHull, QhullError
+
+from mobee.arrays import Array
+from mobee.rendering.scene import Picture
+from mobee.rendering.solid import Color
+from mobee.vision.objects.detection import Detection, Detector
+from mobee.vision.objects.thing import Thing
+from mobee.vision.regions import boxes, label, without_holes
+
+HUE = float(np.tan(np.deg2rad(20.0)))  # of the largest angle from the thing's hue
+PALE = 0.35  # share of the thing's saturation below which a pixel is not of its colour
+LEAST = 30  # of 255: brightness of colour below which there is only noise
+AREA = 40.0  # px: smaller regions are ignored
+AROUND = 5  # px: side of the square in which the colour of a whole pixel is looked up
+FEWEST = 16  # points of an outline
+MOST = 100  # points of an outline that are kept
+SOLID = 0.6  # share of its convex hull that a region must fill: the things are convex
+STEPS = ((0, 1), (0, -1), (1, 0), (-1, 0))  # row and column of the neighbours of a pixel
+
+
+def by_color(things: Sequence[Thing]) -> Detector:
+    """Return the detector that finds regions of the colours of things."""
+
+    def detect(picture: Picture) -> list[Detection]:
+        channels = np.ascontiguousarray(picture.reshape(-1, 3).T)
+        spread = channels.max(axis=0) - channels.min(axis=0)
+        colored = np.flatnonzero(spread >= LEAST)
+        pixels = channels[:, colored].astype(np.float32)
+        found = []
+        for thing in things:
+            likeness = np.zeros(picture.shape[:2], np.float32)
+            likeness.flat[colored] = _likeness(pixels, thing.color)
+            found += _regions(thing.name, likeness)
+        return found
+
+    return detect
+
+
+def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
+    """Return how much of a colour is in each of some pixels (3, m): linear in the share of the pixel that has the colour; else 0."""
+    wanted = np.array(color, np.float32)
+    chroma = wanted - wanted.mean()
+    strength = float(np.linalg.norm(chroma))
+    chroma /= strength
+    along: NDArray[np.float32] = chroma @ pixels
+    along[along < np.maximum(LEAST, PALE * strength / float(wanted.max()) * pixels.max(axis=0))] = 0.0
+    some = np.flatnonzero(along)
+    chosen = pixels[:, some]
+    across = ((chosen - chosen.mean(axis=0)) ** 2).sum(axis=0) - along[some] ** 2
+    along[some[across > (HUE * along[some]) ** 2]] = 0.0
+    return along
+
+
+def _regions(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
+    """Return the regions with a likeness, as detections."""
+    height, width = likeness.shape
+    rough = label(likeness > 0.0, diagonal=True)
+    found = []
+    for number, (rows, columns) in enumerate(boxes(rough), start=1):
+        if (rough[rows, columns] == number).sum() < AREA:
+            continue
+        inside = np.s_[max(0, rows.start - 1) : rows.stop + 1, max(0, columns.start - 1) : columns.stop + 1]
+        corner = np.array([inside[1].start, inside[0].start])
+        own = np.where(rough[inside] == number, likeness[inside], 0.0)
+        share = np.minimum(own / np.maximum(maximum_filter(own, AROUND), 1.0), 1.0)
+        parts = label(share >= 0.5, diagonal=False)
+        for part, where in enumerate(boxes(parts), start=1):
+            if (parts[where] == part).sum() < AREA:
+                continue
+            region = without_holes(parts == part)
+            outline = _outline(region, share) + corner
+            within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
+            area, filled = float(region.sum()), _filled(region)
+            if within.sum() < FEWEST or filled < SOLID:
+                continue
+            every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
+            found.append(Detection(name, outline[within][every], area, filled * float(within.mean())))
+    return found
+
+
+def _outline(region: NDArray[np.bool_], share: Array) -> Array:
+    """Return points (m, 2) where the outline crosses the lines between neighbouring pixels, column and row, around the region.
+
+    `share`: how much of each pixel is of the region's colour, from which the place between two pixels follows.
+    """
+    wide, shares = np.pad(region, 1), np.pad(share, 1)
+    points = []
+    for step in STEPS:
+        outside = ~np.roll(wide, (-step[0], -step[1]), axis=(0, 1))
+        rows, columns = np.nonzero(wide & outside)
+        next_rows, next_columns = rows + step[0], columns + step[1]
+        covered = shares[rows, columns] + np.where(wide[next_rows, next_columns], 0.0, shares[next_rows, next_columns]) - 0.5
+        points.append(np.stack([columns + step[1] * covered, rows + step[0] * covered], axis=1) - 1.0)
+    found = np.concatenate(points)
+    middle = found.mean(axis=0)
+    around: Array = found[np.argsort(np.arctan2(found[:, 1] - middle[1], found[:, 0] - middle[0]))]
+    return around
+
+
+def _filled(region: NDArray[np.bool_]) -> float:
+    """Return the share of its convex hull that a region fills."""
+    rows, columns = np.nonzero(region)
+    corners = np.concatenate([np.stack([rows + dy, columns + dx], axis=1) for dy in (-0.5, 0.5) for dx in (-0.5, 0.5)])
+    try:
+        return float(region.sum() / ConvexHull(corners).volume)
+    except QhullError:
+        return 0.0

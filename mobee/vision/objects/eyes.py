@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the cameras are at the stamp of a picture, and how uncertain that is, for both cameras together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms, point_jacobian
+from mobee.vision.encoders import Moment
+from mobee.vision.lens import Lens
+from mobee.vision.mount import camera_frames, right_slope, rotation_of
+from mobee.vision.rig import Rig
+
+NEGLIGIBLE = 1e-12  # share of the largest variance below which a direction is left out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eye:
+    """A camera in the root frame: optical centre (3,) m, rotation (3, 3) with the columns right, down, ahead, and lens."""
+
+    position: Array
+    rotation: Array
+    lens: Lens
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eyes:
+    """The cameras of a robot at one stamp, in the order of their names.
+
+    Their uncertainty is a factor F with the covariance F F' of the displacements [m] and turns [rad] of all cameras, about their centres in
+    the root frame, (6 E, r).  `noise` is new in each picture (encoders and stamp), `bias` the same in pictures of one gaze (calibration).
+    """
+
+    names: tuple[str, ...]
+    eyes: tuple[Eye, ...]
+    noise: Array
+    bias: Array
+
+
+def eyes_at(rig: Rig, x: Array, moment: Moment, uncertainty: Array | None = None, jitter: float = 0.0) -> Eyes:
+    """Return the cameras of a rig at the stamp of a picture.
+
+    Args:
+        rig: the robot and its cameras.
+        x: the calibration's parameters (P,).
+        moment: encoders at the stamp.
+        uncertainty: covariance (P, P) of the parameters; None: they are exact.
+        jitter: standard deviation of the stamp, s.
+    """
+    transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
+    eyes, motions, slopes = [], [], []
+    for name, camera in rig.cameras.items():
+        mount = x[rig.where(name)]
+        position, rotation = camera_frames(camera, transforms, mount)
+        by_posture = point_jacobian(rig.robot, transforms, camera.link, position)
+        by_parameters = np.zeros((6, len(x)))
+        first = rig.where(name).start
+        by_parameters[:3, first : first + 3] = rotation @ rotation_of(mount[3:]).T
+        by_parameters[3:, first + 3 : first + 6] = rotation @ right_slope(mount[3:])
+        by_parameters[:, rig.where("encoder")] = by_posture[:, list(rig.head)]
+        by_parameters[:, rig.where("latency")] = -(by_posture @ moment.dq)[:, None]
+        eyes.append(Eye(position, rotation, rig.lens))
+        motions.append(by_posture)
+        slopes.append(by_parameters)
+    motion, slope = np.concatenate(motions), np.concatenate(slopes)
+    late = jitter * (motion @ moment.dq)
+    noise = _factor((motion * moment.variance) @ motion.T + np.outer(late, late))
+    bias = np.zeros((len(slope), 0)) if uncertainty is None else _factor(slope @ uncertainty @ slope.T)
+    return Eyes(tuple(rig.cameras), tuple(eyes), noise, bias)
+
+
+def _factor(covariance: Array) -> Array:
+    """Return F (n, r) with F F' = covariance."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))  # displacements and turns have different units
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = values > NEGLIGIBLE * max(values.max(), 1e-30)
+    factor: Array = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    return factor

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The things that a robot knows by sight: name, kind of shape, usual size and colour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from mobee.errors import InvalidValue
+from mobee.model.world import World
+from mobee.rendering.solid import Color
+
+Kind = Literal["sphere", "cylinder", "box"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+TOLERANCE = 0.1  # relative standard deviation of a size from the usual one
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A thing that may be seen, alone or several times.
+
+    `kind`, `size`: as of `mobee.Geometry`, m; a cylinder and a box stand upright.  `color`: red, green, blue, 0 to 1.  `tolerance`:
+    relative standard deviation of each length from `size`; 0: the size is known.
+    """
+
+    name: str
+    kind: Kind
+    size: tuple[float, ...]
+    color: Color
+    tolerance: float = TOLERANCE
+
+
+def things_in(world: World) -> list[Thing]:
+    """Return the things that the targets of a world look like: those with a colour that are spheres, cylinders or boxes.
+
+    Their places in the world are not used.  Raises InvalidValue if there are none.
+    """
+    kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
+    found = [
+        Thing(item.name, kinds[item.kind], item.size, item.color[:3])
+        for item in world.objects.values()
+        if item.role == "target" and item.kind in kinds and item.color is not None
+    ]
+    if not found:
+        raise InvalidValue(
+            f"nothing to find: the world has no target that is a {', '.join(KINDS[:-1])} or {KINDS[-1]} and has a colour. "
+            'Add one to its file, as <sphere name="ball" radius="0.03" role="target" color="0.9 0.05 0.05"/>'
+        )
+    return found

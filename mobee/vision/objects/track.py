@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One tracked object: a Kalman filter of position, velocity and the bias of the cameras, and averages of size and orientation."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.settings import Range, Settings
+from mobee.vision.objects.placing import Placed
+from mobee.vision.objects.silhouette import upright
+from mobee.vision.objects.thing import Thing
+
+P, V, B = slice(0, 3), slice(3, 6), slice(6, 9)  # of the state: position m, velocity m/s, bias m
+_SEEN = np.concatenate([np.eye(3), np.zeros((3, 3)), np.eye(3)], axis=1)  # a place is position and bias
+LOOKS = 8  # over which size and orientation are averaged at least
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackSettings(Settings):
+    """Settings of tracks.
+
+    The place of an object at rest is a slow random walk; the velocity of one that moves is an Ornstein-Uhlenbeck process about 0.
+
+    Args:
+        hits: looks that must show a new object before it counts.
+        of: looks within which these hits must be.
+        gate: squared Mahalanobis distance (3 dimensions) within which a place may belong to a track.
+        surprise: the same, above which an object at rest is taken to move.
+        wander: of an object at rest, standard deviation along each axis after a second, m: nothing stands quite still in the root frame.
+        speed: of an object that moves, standard deviation of the velocity along each axis, m/s.
+        persistence: time constant of velocities, s.
+        moves_for: s for which an object that moved counts as moving.
+        turn: rad by which the gaze must turn until the bias of the cameras is another one.
+        forget_after: s after which an object that was not seen again loses its name.
+        most: objects of each thing that get a name.
+    """
+
+    hits: Annotated[int, Range(ge=1, le=100)] = 3
+    of: Annotated[int, Range(ge=1, le=100)] = 5
+    gate: Annotated[float, Range(gt=0.0)] = 16.3
+    surprise: Annotated[float, Range(gt=0.0)] = 16.3
+    wander: Annotated[float, Range(gt=0.0, le=1.0)] = 0.001
+    speed: Annotated[float, Range(gt=0.0, le=10.0)] = 0.25
+    persistence: Annotated[float, Range(gt=0.0, le=10.0)] = 0.5
+    moves_for: Annotated[float, Range(ge=0.0, le=60.0)] = 1.0
+    turn: Annotated[float, Range(gt=0.0, le=7.0)] = 0.3
+    forget_after: Annotated[float, Range(gt=0.0, le=3600.0)] = 60.0
+    most: Annotated[int, Range(ge=1, le=100)] = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Innovation:
+    """A place against the prediction of a track: difference (3,) m, its covariance (3, 3), and the predicted state with covariance."""
+
+    difference: Array
+    covariance: Array
+    mean: Array
+    spread: Array
+
+    @property
+    def distance(self) -> float:
+        """The squared Mahalanobis distance."""
+        return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
+
+    @property
+    def cost(self) -> float:
+        """Twice the negative logarithm of the likelihood, up to a constant."""
+        return self.distance + float(np.linalg.slogdet(self.covariance)[1])
+
+
+class Track:
+    """An object that is followed from look to look.
+
+    `name`: unique; empty until the object counts.  `born`, `t`, `seen`: s, of the first look, the newest, and the newest that showed it.
+    """
+
+    def __init__(self, thing: Thing, first: Placed, t: float, settings: TrackSettings) -> None:
+        self.thing, self.name, self.born, self.t, self.seen = thing, "", t, t, t
+        self._settings = settings
+        self._mean = np.concatenate([first.position, np.zeros(6)])
+        self._spread = np.zeros((9, 9))
+        self._spread[P, P] = first.covariance
+        self._spread[V, V] = settings.speed**2 * np.eye(3)
+        self._spread[P, B] = self._spread[B, P] = -first.bias
+        self._spread[B, B] = first.bias
+        self._bias = first.bias
+        self._moving_until = t + settings.moves_for  # it may have been put there just now
+        self._size, self._information = first.size.copy(), first.size_deviation**-2.0
+        self._yaw, self._looks = _yaw_of(first.rotation), 1
+        self.looks: deque[bool] = deque([True], maxlen=settings.of)
+
+    @property
+    def position(self) -> Array:
+        """The position (3,) m at time `t`, root frame."""
+        return self._mean[P].copy()
+
+    @property
+    def velocity(self) -> Array:
+        """The velocity (3,) m/s at time `t`."""
+        return self._mean[V].copy()
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance (3, 3) m^2 of the position."""
+        return self._spread[P, P].copy()
+
+    @property
+    def rotation(self) -> Array:
+        """The rotation (3, 3) of the shape's axes."""
+        return upright(self._yaw)
+
+    @property
+    def size(self) -> Array:
+        """The lengths (g,) m of the shape."""
+        return self._size.copy()
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the object moved a moment ago."""
+        return self.t <= self._moving_until
+
+    def innovation(self, placed: Placed, t: float, turned: float, moving: bool) -> Innovation:
+        """Return a place at time t [s] against the prediction, for a gaze that has turned by an angle [rad] since the last look."""
+        mean, spread = self._predicted(t, turned, moving)
+        covariance = _SEEN @ spread @ _SEEN.T + placed.noise
+        return Innovation(placed.position - _SEEN @ mean, covariance, mean, spread)
+
+    def best(self, placed: Placed, t: float, turned: float) -> tuple[Innovation, bool] | None:
+        """Return the innovation at rest or, if that is unlikely or the object moves, in motion, and which; None outside the gate."""
+        if t > self._moving_until:
+            rest = self.innovation(placed, t, turned, moving=False)
+            if rest.distance <= self._settings.surprise:
+                return rest, False
+        moving = self.innovation(placed, t, turned, moving=True)
+        return (moving, True) if moving.distance <= self._settings.gate else None
+
+    def update(self, placed: Placed, t: float, found: Innovation, moved: bool) -> None:
+        """Take a place into the track, by its innovation from `best`."""
+        gain = np.linalg.solve(found.covariance, _SEEN @ found.spread).T
+        self._mean = found.mean + gain @ found.difference
+        keep = np.eye(9) - gain @ _SEEN
+        self._spread = keep @ found.spread @ keep.T + gain @ placed.noise @ gain.T
+        if moved and t > self._moving_until:
+            self._looks = 1  # it may have been turned
+        if moved and (t > self._moving_until or self._has_speed()):
+            self._moving_until = t + self._settings.moves_for
+        self.t = self.seen = t
+        self._bias = placed.bias
+        self._average(placed)
+        self.looks.append(True)
+
+    def miss(self, t: float, turned: float) -> None:
+        """Predict to a look at time t [s] that did not show the object."""
+        self._mean, self._spread = self._predicted(t, turned, self.is_moving)
+        self.t = t
+        self.looks.append(False)
+
+    def _predicted(self, t: float, turned: float, moving: bool) -> tuple[Array, Array]:
+        """Return the state (9,) and its covariance (9, 9) at time t [s]."""
+        settings = self._settings
+        dt, tau = max(0.0, t - self.t), settings.persistence
+        same = float(np.exp(-abs(turned) / settings.turn))
+        step, added = np.eye(9), np.zeros((9, 9))
+        step[B, B] *= same
+        added[B, B] = (1.0 - same**2) * self._bias
+        if moving:
+            stay = float(np.exp(-dt / tau))
+            step[P, V], step[V, V] = tau * (1.0 - stay) * np.eye(3), stay * np.eye(3)
+            square = settings.speed**2
+            added[P, P] = square * tau * (2.0 * dt - tau * (3.0 - 4.0 * stay + stay**2)) * np.eye(3)
+            added[P, V] = added[V, P] = square * tau * (1.0 - stay) ** 2 * np.eye(3)
+            added[V, V] = square * (1.0 - stay**2) * np.eye(3)
+        else:
+            step[V, V] = 0.0
+            added[P, P] = settings.wander**2 * dt * np.eye(3)
+            added[V, V] = settings.speed**2 * np.eye(3)  # if it begins to move
+        return step @ self._mean, step @ self._spread @ step.T + added
+
+    def _has_speed(self) -> bool:
+        velocity = self._mean[V]
+        return float(velocity @ np.linalg.solve(self._spread[V, V], velocity)) > self._settings.surprise
+
+    def _average(self, placed: Placed) -> None:
+        """Average size and yaw; a box turned by quarters, with its sides exchanged, is the same box."""
+        size, yaw = placed.size, _yaw_of(placed.rotation)
+        if self.thing.kind == "box":
+            turns = int(np.round((self._yaw - yaw) / (0.5 * np.pi)))
+            yaw += turns * 0.5 * np.pi
+            size = size[[1, 0, 2]] if turns % 2 else size
+        self._looks += 1
+        self._yaw += (yaw - self._yaw) / min(self._looks, LOOKS)
+        weight = placed.size_deviation**-2.0
+        self._information = np.minimum(self._information, (LOOKS - 1) * weight) + weight
+        self._size = self._size + weight / self._information * (size - self._size)
+
+
+def _yaw_of(rotation: Array) -> float:
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
