@@ -260,7 +260,7 @@ class Playback(Message, frozen=True, kw_only=True):
 
 
 class Targets(Message, frozen=True, kw_only=True):
-    """Positions at tick re_k of the targets of all reaches; a target that is not in the model's world has no position."""
+    """Positions at tick re_k of the targets of all reaches; a reach whose target is not in the model's world any more ends."""
 
     stream: ClassVar[Stream] = Stream(
         "model/targets", "CONTROL", writers=("model",), readers=("controller",), when="every tick during a reach"
@@ -268,6 +268,7 @@ class Targets(Message, frozen=True, kw_only=True):
 
     re_k: Count
     positions: dict[Name, Vector3]  # m
+    gone: list[Name] = []  # targets that are not in the model's world
 
 
 class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
@@ -338,7 +339,7 @@ class Geometry(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class WorldObject(Message, frozen=True, kw_only=True):
-    """An object as perceived by vision."""
+    """An object as perceived by vision; while it is hidden, t_capture stays and the covariance grows."""
 
     stream: ClassVar[Stream] = Stream("world/{object}", "DATA", writers=("vision",), readers=("model", "behaviour", "monitor"))
 
@@ -348,8 +349,8 @@ class WorldObject(Message, frozen=True, kw_only=True):
     quaternion: Quaternion
     covariance: Matrix3  # m^2, of the position
     role: Role
-    t_capture: Count  # ns, time of the picture
-    valid_until: Count  # ns, time after which the model removes the object
+    t_capture: Count  # ns, time of the newest picture that shows it
+    valid_until: Count  # ns, time after which the model removes the object; 0: at once
 
 
 class Image(Message, frozen=True, kw_only=True):

@@ -183,12 +183,15 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
     quaternion: Quaternion
     role: Role
     link: str  # link that the object is attached to; empty: none
+    margin: Annotated[float, Meta(ge=0)] = 0.0  # m by which the shape is larger than the object on each side: it may be elsewhere
+    t_capture: Count | None = None  # ns, time of the newest picture that shows a perceived object
 
 
 class World(Reply, frozen=True, kw_only=True):
     """All objects of the model's world."""
 
     objects: list[ObjectState]
+    stale: dict[Name, float] = {}  # perceived objects that were removed since they are not seen any more: s since the last picture of each
 
 
 class JacobianReply(Reply, frozen=True, kw_only=True):

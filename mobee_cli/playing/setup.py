@@ -16,6 +16,7 @@ from mobee.errors import InvalidValue
 from mobee.robot.cameras import cameras_of, key_of
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
+from mobee.vision.objects.thing import things_in
 from mobee_cli.robot_options import urdf_options
 from services.agents.config import Config as AgentConfig
 from services.common.cameras import STEREO
@@ -83,9 +84,9 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
 
 
 def _eyes(cameras: Sized, world: str, robot: str) -> tuple[str, ...]:
-    """Return the services of cameras: the renderer, and the locator if there are two and a ball to locate; raises MobeeError."""
-    balls = [one for one in world_around(world, robot).objects.values() if one.role == "target" and one.kind == "sphere"]
-    return ("renderer",) * bool(cameras) + ("vision",) * (len(cameras) >= STEREO and bool(balls))
+    """Return the services of cameras: the renderer, and the locator if there are two and something to locate; raises MobeeError."""
+    things = things_in(world_around(world, robot))
+    return ("renderer",) * bool(cameras) + ("vision",) * (len(cameras) >= STEREO and bool(things))
 
 
 _PUBLISHED_LINES = (

@@ -53,7 +53,7 @@ class ReachClient:
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
         """Use an object of the model's world as target, also while it moves; return the target at its current position.
 
-        Raises UnknownName; InvalidValue if its role is not target, because it then repels hands.
+        Raises UnknownName; InvalidValue if it is stale, or if its role is not target, because it then repels hands.
         """
         found = self._known(name)
         if found.role != "target":
@@ -62,7 +62,8 @@ class ReachClient:
                 f"by {keys.world_rpc('role')}, or reach for a free position."
             )
         self.present(None)
-        self._target, self._object = ReachTarget(np.array(found.position), _inner_radius(found.geometry), aim, normal, faces), name
+        radius = _inner_radius(found.geometry) - found.margin
+        self._target, self._object = ReachTarget(np.array(found.position), radius, aim, normal, faces), name
         return self._target
 
     def asked(self) -> dict[str, object]:
@@ -116,9 +117,15 @@ class ReachClient:
 
     def _known(self, name: str) -> ObjectState:
         try:
-            objects = {one.name: one for one in self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES).objects}
+            world = self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES)
         except CallFailed as error:
             raise ActionInterrupted(f"the model does not list its objects: {error}") from None
+        objects = {one.name: one for one in world.objects}
+        if name in world.stale:
+            raise InvalidValue(
+                f"{name!r} is stale: the newest picture that shows it is {world.stale[name]:.1f} s old, and it may be elsewhere. "
+                "`mobee status` shows what vision sees; reach for it when it is seen again, or for a place with --target."
+            )
         if name not in objects:
             raise UnknownName("object of the model's world", name, objects)
         return objects[name]

@@ -62,8 +62,14 @@ class Reaches:
         self._publish(part)
 
     def follow_targets(self, targets: Targets) -> None:
-        """Set the targets to their new positions; a target without a valid position keeps the last one."""
+        """Set the targets to their new positions, and end the reaches for targets that are gone; an invalid position changes nothing."""
         for part, reach in self._last.items():
+            if reach.phase == "reaching" and reach.object in targets.gone:
+                self._bus.event(
+                    "warning", "target_gone", f"{part}: the reach ends, since {reach.object} is not in the model's world any more"
+                )
+                self.interrupt(part)
+                continue
             position = targets.positions.get(reach.object)
             if reach.phase == "reaching" and position is not None and position != reach.target.position.tolist():
                 try:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from msgspec import Meta
 
 from services.common.config import WorldConfig
 
@@ -17,6 +19,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Motors on which a contact acts: all between the body's root and the contact, or those of the touched part only."""
     contact_forces: bool = True
     """False: contacts are published but exert no force, for experiments without that force."""
+    sigmas: Annotated[float, Meta(ge=0, le=10)] = 2.0
+    """Standard deviations of a perceived object's position by which its shape is enlarged."""
     calibration: str = ""
     """File of `mobee calibrate`, whose offsets of the head's encoders are added to what they report; empty: none."""
     terms: list[str] = []

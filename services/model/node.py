@@ -45,7 +45,7 @@ class ModelNode:
         self._publishes_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
         self._offsets = _encoder_offsets(config, robot)
-        self._world = WorldServer(service, self._model)
+        self._world = WorldServer(service, self._model, config.sigmas)
         bus = service.bus
         self._forces = bus.publisher(Forces, "model")
         self._participant = Participant(service)
@@ -102,7 +102,9 @@ class ModelNode:
         forces = constraint_forces(pose, self._gains, self._config.propagate, self._config.contact_forces)
         self._note_contacts(pose)
         if self._reaches:
-            self._targets.put(re_k=tick.k, positions=self._world.positions({reach.object for reach in self._reaches.values()}))
+            names = {reach.object for reach in self._reaches.values()}
+            positions = self._world.positions(names)
+            self._targets.put(re_k=tick.k, positions=positions, gone=sorted(names - positions.keys()))
         self._forces.put(
             re_k=tick.k,
             terms={name: forces[name].tolist() for name in published_terms()},
@@ -157,6 +159,7 @@ class ModelNode:
     def _mark(self) -> None:
         self._ticks = self._skipped = self._table_ticks = self._field_ticks = self._solid_ticks = 0
         self._time.clear()
+        self._world.latency.clear()
 
     def _describe(self) -> tuple[str, dict[str, float]]:
         numbers = {
@@ -166,6 +169,8 @@ class ModelNode:
             "field_ticks": self._field_ticks,
             "solid_ticks": self._solid_ticks,
             "objects": len(self._model.world.objects),
+            "perceived_ms_p50": self._world.latency.at(50),
+            "perceived_ms_p95": self._world.latency.at(95),
             "evaluate_ms_p50": self._time.at(50),
             "evaluate_ms_p99": self._time.at(99),
         }

@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 import numpy as np
+from msgspec.structs import replace
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Geometry, WorldObject
-from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, OneName, SetRole
+from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, ObjectState, OneName, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee import Model, World
 from mobee.arrays import Array
@@ -20,20 +21,27 @@ from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.world import placed
 from mobee.model.world_object import valid_position, valid_shape
 from mobee.reach import TARGET
+from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
 from services.common.worlds import object_state
 
 DONE = Done(v=VERSION)
+MARGIN_STEP = 0.002  # m between two margins
+MOST_MARGIN = 0.06  # m: an object whose place is less certain is no use as a target, and would push the robot away as an obstacle
 
 
 class WorldServer:
     """Answers calls that edit the world of a model, and adds objects that vision perceives."""
 
-    def __init__(self, service: Service, model: Model) -> None:
-        self._service, self._model = service, model
+    def __init__(self, service: Service, model: Model, sigmas: float) -> None:
+        """`sigmas`: standard deviations of a perceived object's position by which its shape is enlarged."""
+        self._service, self._model, self._sigmas = service, model, sigmas
+        self.latency = Percentiles()  # ms from the picture that shows an object to its place in the world
         self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
         self._perceived: set[str] = set()  # objects that vision added: it changes no other
         self._expiry: dict[str, int] = {}  # of those that vanish when they are not seen again, ns of the bus clock
+        self._margins: dict[str, float] = {}  # m, of perceived objects
+        self._captured: dict[str, int] = {}  # ns, time of the newest picture of each perceived object, stale ones too
         self._presenter = ""  # service that presents the target
         service.on_alive(self._note_alive)
         service.on_each(WorldObject, self._perceive)
@@ -48,8 +56,7 @@ class WorldServer:
     def expire(self, t: int) -> None:
         """Remove perceived objects that were not seen again in time; t in ns of the bus clock."""
         for name in [name for name, until in self._expiry.items() if until < t]:
-            self._remove(self._model.world, name)
-            self._service.bus.event("info", "expired", f"{name} was removed: it was not seen again in time")
+            self._expire(name, "it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
         """Return the positions [m], root frame, of the named objects; names that are not in the world are left out."""
@@ -60,6 +67,7 @@ class WorldServer:
         """Remove the perceived objects of the last run, at the start of a new one."""
         for name in list(self._expiry):
             self._remove(self._model.world, name)
+        self._captured.clear()
 
     def _perceive(self, seen: WorldObject) -> None:
         world = self._model.world
@@ -69,14 +77,34 @@ class WorldServer:
                 "authority", f"{seen.src} sees {seen.name!r}, which the scenario or a client placed: it stays as it is"
             )
             return
+        margin = self._margin(seen)
+        if seen.valid_until < self._service.bus.t or margin > MOST_MARGIN:
+            self._captured[seen.name] = seen.t_capture
+            if seen.name in self._expiry:
+                self._expire(seen.name, "vision withdrew it" if margin <= MOST_MARGIN else "its place has become too uncertain")
+            return
         try:
-            self._put(world, seen)
+            self._put(world, seen, margin)
         except MobeeError as error:
             self._service.bus.reject("world", str(error))
             return
         self._perceived.add(seen.name)
+        if seen.t_capture > self._captured.get(seen.name, -1):
+            self.latency.add(1e-6 * (self._service.bus.t - seen.t_capture))
+        self._margins[seen.name], self._captured[seen.name] = margin, seen.t_capture
         if is_new or seen.name in self._expiry:
             self._expiry[seen.name] = seen.valid_until
+
+    def _margin(self, seen: WorldObject) -> float:
+        """Return by how much a perceived shape is enlarged [m]; it stays while it is about right, so that shapes need not change."""
+        largest = float(np.linalg.eigvalsh(np.array(seen.covariance).reshape(3, 3))[-1])
+        wanted = self._sigmas * np.sqrt(max(largest, 0.0))
+        present = self._margins.get(seen.name, 0.0)
+        return present if wanted <= present <= wanted + 2.0 * MARGIN_STEP else float(np.ceil(wanted / MARGIN_STEP) * MARGIN_STEP)
+
+    def _expire(self, name: str, why: str) -> None:
+        self._remove(self._model.world, name)
+        self._service.bus.event("info", "expired", f"{name} was removed: {why}")
 
     def _edit(self, change: Callable[[World], object]) -> Done:
         try:
@@ -121,16 +149,17 @@ class WorldServer:
         world.remove(name)
         self._perceived.discard(name)
         self._expiry.pop(name, None)
+        self._margins.pop(name, None)
 
-    def _put(self, world: World, seen: WorldObject | AddObject) -> None:
+    def _put(self, world: World, seen: WorldObject | AddObject, margin: float = 0.0) -> None:
         known = world.objects.get(seen.name)
         rotation = _rotation(seen.quaternion)
-        if known is not None and known.kind == seen.geometry.kind and list(known.size) == seen.geometry.size:
+        shape = _shape(seen.geometry, margin)
+        if known is not None and known.kind == shape.kind and known.size == shape.size:
             world.move(seen.name, position=seen.position, rotation=rotation)
             if known.role != seen.role:
                 world.set_role(seen.name, seen.role)
             return
-        shape = _shape(seen.geometry)
         valid_shape(seen.name, shape)
         valid_position(seen.name, seen.position)
         if known is not None:  # after the checks: an invalid object replaces nothing
@@ -142,8 +171,18 @@ class WorldServer:
         world.move(request.name, position=request.position, rotation=rotation)
 
     def _list(self) -> WorldReply:
-        things = self._model.world.objects.values()
-        return WorldReply(v=VERSION, objects=[object_state(self._in_root_frame(thing), thing.link or "") for thing in things])
+        things = self._model.world.objects
+        return WorldReply(
+            v=VERSION,
+            objects=[self._state(thing) for thing in things.values()],
+            stale={name: 1e-9 * (self._service.bus.t - t) for name, t in self._captured.items() if name not in things},
+        )
+
+    def _state(self, thing: Thing) -> ObjectState:
+        found = object_state(self._in_root_frame(thing), thing.link or "")
+        if thing.name not in self._perceived:
+            return found
+        return replace(found, margin=self._margins.get(thing.name, 0.0), t_capture=self._captured.get(thing.name))
 
     def _in_root_frame(self, thing: Thing) -> Thing:
         if thing.link is None:
@@ -151,12 +190,13 @@ class WorldServer:
         return placed(thing, self.pose.transforms[self._model.robot.links.index(thing.link)])
 
 
-def _shape(given: Geometry) -> geometry.Geometry:
-    """Return a shape of the bus as the library's Geometry; raises InvalidValue for a wrong number of sizes."""
+def _shape(given: Geometry, margin: float) -> geometry.Geometry:
+    """Return a shape of the bus, larger by a margin [m] on each side, as a Geometry; raises InvalidValue for a wrong number of sizes."""
     expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[given.kind]
     if len(given.size) != expected:
         raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
-    return geometry.Geometry(given.kind, tuple(given.size))
+    wider = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[given.kind]
+    return geometry.Geometry(given.kind, tuple(size + factor * margin for size, factor in zip(given.size, wider, strict=True)))
 
 
 def _rotation(quaternion: list[float]) -> Array:

@@ -259,7 +259,8 @@ class MonitorNode:
     # Events that are shown at once
 
     def _show_object(self, seen: WorldObject) -> None:
-        self._scene.log_object(seen)
+        if seen.valid_until >= self._service.bus.t:  # else it was withdrawn, and the model's list ends it
+            self._scene.log_object(seen)
 
     def _show_transition(self, seen: Transition) -> None:
         part = seen.agent

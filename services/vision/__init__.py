@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The target locator: finds the red ball in the pictures of two cameras and publishes its position in the root frame.
+"""The locator: finds known things in the pictures of two cameras, follows them, and publishes where they are in the root frame.
 
-Reads: clock (for the id of the run), vision/image/{camera}, vision/camera/{camera}.
-Writes: world/ball.
+Reads: clock, vision/image/{camera}, vision/camera/{camera}.
+Writes: world/{object}.
 """

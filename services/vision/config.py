@@ -7,26 +7,56 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from mobee.errors import InvalidValue
+from mobee.model.world import World
 from mobee.robot.robot import Robot
+from mobee.settings import require_name
 from mobee.vision.calibration.calibration import load_calibration
+from mobee.vision.objects.detectors import DETECTORS
+from mobee.vision.objects.thing import KINDS, Thing, things_in
 from services.common.cameras import STEREO, CameraConfig, require_cameras
+from services.common.worlds import world_around
 
 
 class Config(CameraConfig, frozen=True, kw_only=True):
-    """The target locator's settings; it uses the first two cameras."""
+    """The locator's settings; it uses the first two cameras, and looks for what the targets of the world look like, wherever they are."""
 
-    radius: Annotated[float, Meta(gt=0, le=0.5)] = 0.03
-    """The ball's radius, in m."""
+    world: str = ""
+    """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
+    detector: str = "color"
+    """What finds things in a picture: color, or module:name of a function that returns a detector."""
+    most: Annotated[int, Meta(ge=1, le=100)] = 1
+    """Objects of each thing that get a name: NAME, NAME_2, ..."""
     calibration: str = ""
     """File of `mobee calibrate`; empty: cameras and encoders are as the model has them."""
     encoder_noise: Annotated[float, Meta(ge=0, le=0.1)] = 0.0025
-    """Standard deviation of one reading of an encoder, in rad; with a calibration the covariance of a position depends on it."""
+    """Standard deviation of one reading of an encoder, in rad, on which the covariance of a position depends."""
     valid_for: Annotated[float, Meta(gt=0, le=60)] = 5.0
     """Time for which a position may be used after the picture was taken, in s of simulated time."""
+    max_age: Annotated[float, Meta(gt=0, le=10)] = 0.3
+    """Largest age of a picture at its arrival, in s of simulated time; older ones are not used."""
+    blind_after: Annotated[float, Meta(gt=0, le=60)] = 1.0
+    """Time without usable pictures after which all positions are withdrawn, in s of simulated time."""
+
+    def load_world(self) -> World:
+        """Return a new world in its initial state; raises MobeeError for a name or file that cannot be read."""
+        return world_around(self.world, self.robot)
+
+    def things(self) -> list[Thing]:
+        """Return what is looked for; raises InvalidValue if there is nothing, and the errors of the world's file."""
+        found = things_in(self.load_world())
+        if not found:
+            raise InvalidValue(
+                f"vision has nothing to look for: the world has no target with a colour that is a {', '.join(KINDS[:-1])} or {KINDS[-1]}. "
+                'Add one to its file, as <sphere name="ball" radius="0.03" role="target" color="0.9 0.05 0.05"/>, or leave the service out'
+            )
+        return found
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has two cameras; raises MobeeError."""
+        """Check also that the robot has two cameras, and that there is something to look for; raises MobeeError."""
         super().check_robot(robot)
         require_cameras(robot, self.cameras_on(robot), STEREO)
+        require_name("detector", self.detector, DETECTORS)
+        self.things()
         if self.calibration:
             load_calibration(self.calibration).rig(robot, self.cameras_on(robot))

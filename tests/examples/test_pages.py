@@ -85,7 +85,7 @@ RUN_ELSEWHERE = {
     r"mobee launch kinematic --camera .*": "tests/services/launcher/test_scenario.py",
     r"mobee launch lockstep --ticks 3000": "tests/system/test_recorder.py",
     r"mobee launch lockstep --page --runs runs": "tests/services/launcher/test_run.py",
-    r"mobee launch eyes": "tests/system/test_calibrate.py",
+    r"mobee launch eyes( --set .*)?": "tests/system/test_calibrate.py",
     r"mobee launch gaze.*": "tests/system/test_gaze.py",
     r"mobee calibrate .*": "tests/mobee_cli/test_calibrate.py",
     r"mobee keys new": "tests/mobee_cli/test_keys.py",

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from mobee.errors import InvalidValue
 from mobee.model.world import World
 from mobee.rendering.solid import Color
 
@@ -31,19 +30,10 @@ class Thing:
 
 
 def things_in(world: World) -> list[Thing]:
-    """Return the things that the targets of a world look like: those with a colour that are spheres, cylinders or boxes.
-
-    Their places in the world are not used.  Raises InvalidValue if there are none.
-    """
+    """Return the things that the targets of a world look like: spheres, cylinders and boxes with a colour, wherever they are."""
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
-    found = [
+    return [
         Thing(item.name, kinds[item.kind], item.size, item.color[:3])
         for item in world.objects.values()
         if item.role == "target" and item.kind in kinds and item.color is not None
     ]
-    if not found:
-        raise InvalidValue(
-            f"nothing to find: the world has no target that is a {', '.join(KINDS[:-1])} or {KINDS[-1]} and has a colour. "
-            'Add one to its file, as <sphere name="ball" radius="0.03" role="target" color="0.9 0.05 0.05"/>'
-        )
-    return found

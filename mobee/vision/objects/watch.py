@@ -49,8 +49,6 @@ class PictureWatch:
             return "old"
         if now - stamp > self._latest:
             return "late"
-        if (has_noise and self._same >= SAME) or moved > TURN:
-            return "frozen"
         if float(np.quantile(picture[::4, ::4].max(axis=2), 0.99)) < DARK:
             return "dark"
-        return None
+        return "frozen" if (has_noise and self._same >= SAME) or moved > TURN else None

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from bus_schema import VERSION
 from bus_schema.messages import Geometry
@@ -27,6 +28,7 @@ class FakeService:
         self.calls: list[tuple[str, dict[str, Any]]] = []
         self.failure: CallFailed | None = None
         self.objects: list[ObjectState] = []
+        self.stale: dict[str, float] = {}
         self.alive = lambda who, instance, up: None
 
     def on_newest(self, *_: Any, **__: Any) -> None:
@@ -39,7 +41,7 @@ class FakeService:
         self.calls.append((key.rpartition("/")[2], fields))
         if self.failure is not None:
             raise self.failure
-        return World(v=VERSION, objects=self.objects) if reply is World else Done(v=VERSION)
+        return World(v=VERSION, objects=self.objects, stale=self.stale) if reply is World else Done(v=VERSION)
 
 
 @pytest.fixture
@@ -96,6 +98,15 @@ def test_an_object_is_reached_for_as_the_sphere_in_its_middle(
     assert (target.position.tolist(), target.radius, target.aim) == (AT, pytest.approx(radius), "surface")
     assert client.asked()["object"] == "cup"
     assert [verb for verb, _ in service.calls] == ["list"]
+
+
+def test_a_stale_object_is_refused_and_a_margin_of_its_shape_does_not_count(service: FakeService, client: ReachClient) -> None:
+    service.stale = {"ball": 7.26}
+    with pytest.raises(InvalidValue, match="'ball' is stale: the newest picture that shows it is 7.3 s old, and it may be elsewhere"):
+        client.present_object("ball")
+    service.objects = [replace(thing("ball", "sphere", [0.038]), margin=0.008, t_capture=5)]
+    service.stale = {}
+    assert client.present_object("ball").radius == pytest.approx(0.03)
 
 
 def test_an_object_that_is_no_target_is_refused_with_the_valid_names(service: FakeService, client: ReachClient) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.messages import Reach, Targets
+from bus_schema.messages import Event, Reach, Targets
 from bus_schema.rpc import ReachFor, Started
 from mobee import Model
 from mobee.arrays import Array
@@ -93,6 +93,23 @@ def test_it_follows_its_target_where_the_model_has_it(run: Stage, reports: list[
     run.play(lambda: reports[-1].target == there.tolist(), "the move", ticks=10)
     run.play(lambda: phase(reports) == "returning", "the force's end")
     assert np.linalg.norm(np.array(reports[-1].position) - there) < 0.8 * np.linalg.norm(at - there)
+
+
+def test_a_reach_ends_when_its_target_is_gone(run: Stage, reports: list[Reach]) -> None:
+    events = run.rig.record(Event, "controller")
+    _, epoch = run.own("right_arm")
+    targets = run.rig.bus.publisher(Targets)
+    at = palm(run.sim.q)
+    reach(run, epoch, at + [-0.1, 0.1, 0.3])
+    run.play(lambda: reports and np.abs(run.motion("right_arm").dq).max() > 0.05, "its motion", ticks=200)
+    targets.put(re_k=run.rig.bus.k, positions={}, gone=["another"])
+    run.ticks(3)
+    assert phase(reports) == "reaching"
+    targets.put(re_k=run.rig.bus.k, positions={}, gone=["thing"])
+    run.play(lambda: phase(reports) == "interrupted", "the end", ticks=10)
+    wait_for(lambda: [e for e in events if e.code == "target_gone"], "the event")
+    run.play(lambda: run.motion("right_arm").status == "settled", "the return")
+    np.testing.assert_allclose(palm(run.sim.q), at, atol=0.02)
 
 
 def test_a_reach_ends_without_outcome_in_hold_by_another_goal_and_with_its_owner(run: Stage, reports: list[Reach]) -> None:

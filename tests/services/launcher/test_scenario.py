@@ -251,9 +251,14 @@ def test_a_robot_with_eyes_is_served_by_every_service(tmp_path: Path) -> None:
     path = tmp_path / "seer.toml"
     names = ("model", "controller", "renderer", "vision", "monitor", "port_filter")
     tables = "".join(f"[services.{name}]\n" for name in names)
-    path.write_text(f'[shared]\nrobot = "{tmp_path}/seer.xml"\n[services.robot_sim]\nbackend = "kinematic"\n{tables}')
+    text = f'[shared]\nrobot = "{tmp_path}/seer.xml"\nworld = "table"\n[services.robot_sim]\nbackend = "kinematic"\n{tables}'
+    path.write_text(text)
     scenario = read_scenario(str(path))
     check_services(scenario, check_robots(scenario))
+    path.write_text(text.replace('world = "table"', 'world = "none"'))
+    scenario = read_scenario(str(path))
+    with pytest.raises(ConfigError, match="vision has nothing to look for: .* or leave the service out"):
+        check_services(scenario, check_robots(scenario))
 
 
 def test_the_command_ends_with_two_and_one_line_when_a_service_cannot_serve_the_robot(tmp_path: Path) -> None:

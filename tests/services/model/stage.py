@@ -57,7 +57,10 @@ class Stage:
         self.rig.call(keys.world_rpc(verb), request, Done, **fields)
 
     def world(self) -> dict[str, ObjectState]:
-        return {o.name: o for o in self.rig.call(keys.world_rpc("list"), Empty, World).objects}
+        return {o.name: o for o in self.listed().objects}
+
+    def listed(self) -> World:
+        return self.rig.call(keys.world_rpc("list"), Empty, World)
 
     def numbers(self) -> dict[str, float]:
         return self.rig.stat("model").numbers
@@ -65,9 +68,9 @@ class Stage:
     def perceive(self, position: list[float], valid_for: int = 50, **fields: Any) -> None:
         """As vision does; `valid_for` ticks."""
         t = self.rig.bus.t
-        whole = {"name": "ball", "geometry": BALL, "quaternion": UPRIGHT, "role": "target", **fields}
+        same = {"name": "ball", "geometry": BALL, "quaternion": UPRIGHT, "role": "target", "covariance": [0.0] * 9, "t_capture": t}
         publisher = self.rig.bus.publisher(WorldObject, "ball")
-        publisher.put(position=position, covariance=[0.0] * 9, t_capture=t, valid_until=t + valid_for * TICK, **whole)
+        publisher.put(position=position, valid_until=t + valid_for * TICK, **{**same, **fields})
 
 
 def staged(made: Rig, *arguments: str) -> Stage:

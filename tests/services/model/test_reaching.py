@@ -92,11 +92,11 @@ def test_the_position_of_the_target_is_published_in_every_tick_of_a_reach(reache
     reacher.stage.edit("move", MoveObject, name=TARGET, position=there)
     k = reacher.stage.tick().re_k
     reacher.hears_at(k)
-    assert reacher.targets[-1].positions == {TARGET: there}
+    assert (reacher.targets[-1].positions, reacher.targets[-1].gone) == ({TARGET: there}, [])
     reacher.stage.edit("remove", OneName, name=TARGET)
     k = reacher.stage.tick().re_k
     reacher.hears_at(k)
-    assert reacher.targets[-1].positions == {}
+    assert (reacher.targets[-1].positions, reacher.targets[-1].gone) == ({}, [TARGET])
     reacher.tell("over")
 
 

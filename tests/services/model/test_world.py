@@ -190,3 +190,38 @@ def test_a_wrong_edit_is_refused_with_what_is_valid(run: Stage, verb: str, reque
         run.edit(verb, request_type, **fields)
     assert caught.value.code == "world"
     assert run.world() == before
+
+
+def test_a_perceived_shape_is_enlarged_by_its_uncertainty_in_steps(run: Stage) -> None:
+    """By two standard deviations; a little more or less of them changes no shape."""
+    largest = 0.004**2
+    run.perceive([-0.3, 0.1, 0.0], covariance=np.diag([1e-6, largest, 1e-6]).ravel().tolist())
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    ball = run.world()["ball"]
+    assert ball.geometry.size == [pytest.approx(0.03 + 0.008)] and ball.margin == pytest.approx(0.008) and ball.t_capture == run.rig.bus.t
+    run.perceive([-0.3, 0.2, 0.0], covariance=(0.8 * largest * np.eye(3)).ravel().tolist())
+    wait_for(lambda: run.world()["ball"].position == [-0.3, 0.2, 0.0], "its move")
+    assert run.world()["ball"].margin == ball.margin
+    cup = Geometry(kind="cylinder", size=[0.035, 0.09])
+    run.perceive([-0.3, 0.2, 0.0], geometry=cup, covariance=(largest * np.eye(3)).ravel().tolist())
+    wait_for(lambda: run.world()["ball"].geometry.kind == "cylinder", "its new shape")
+    assert run.world()["ball"].geometry.size == [pytest.approx(0.043), pytest.approx(0.106)]
+
+
+@pytest.mark.parametrize(
+    "change", [{"valid_for": -1}, {"covariance": (0.05**2 * np.eye(3)).ravel().tolist()}], ids=["withdrawn", "uncertain"]
+)
+def test_an_object_that_vision_withdraws_or_hardly_knows_is_stale_at_once(run: Stage, change: dict[str, Any]) -> None:
+    events = run.rig.record(Event, "model")
+    seen_at = run.rig.bus.t
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    assert run.listed().stale == {}
+    run.tick()
+    run.perceive([-0.3, 0.1, 0.0], t_capture=seen_at, **change)
+    wait_for(lambda: "ball" not in run.world(), "its removal")
+    assert run.listed().stale == {"ball": pytest.approx(1e-9 * (run.rig.bus.t - seen_at))}
+    wait_for(lambda: [e for e in events if e.code == "expired"], "the event")
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: "ball" in run.world(), "the ball again")
+    assert run.listed().stale == {}

@@ -269,12 +269,19 @@ def pair_putter(stage: Stage, q: np.ndarray, at: np.ndarray) -> Callable[..., No
         origin, rotation = frame_at_capture(ROBOT, EYES[eye], q)
         pictures[eye] = sphere_picture(rotation.T @ (at - origin), RADIUS).tobytes()
 
-    def put(k: int, late: int | None = None, size: int | None = None, posture: list[float] | None = None) -> None:
+    def put(
+        k: int,
+        late: int | None = None,
+        size: int | None = None,
+        posture: list[float] | None = None,
+        exposure: float = 0.0,
+        change: Callable[[bytes], bytes] = bytes,
+    ) -> None:
         for eye in EYES:
             k_capture = late if late is not None and eye == "right" else k
             stamp = {"k": k, "t": k * TICK, "camera": eye, "k_capture": k_capture}
             encoders = {"q": q.tolist() if posture is None else posture, "dq": [0.0] * len(q), "readings": 1}
-            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), distortion=[], exposure=0.0, **encoders)
-            images[eye].put(**stamp, width=320, height=240, encoding="rgb8", data=pictures[eye][:size])
+            cameras[eye].put(**stamp, intrinsics=K.ravel().tolist(), distortion=[], exposure=exposure, **encoders)
+            images[eye].put(**stamp, width=320, height=240, encoding="rgb8", data=change(pictures[eye][:size]))
 
     return put
