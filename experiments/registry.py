@@ -34,6 +34,7 @@ EXPERIMENTS = {
     "neighbour-count": "experiments.claims.ch7_learning.neighbour_count",
     "nes": "experiments.claims.ch3_roadmaps.nes",
     "ngik": "experiments.claims.ch3_roadmaps.ngik",
+    "object-localisation": "experiments.claims.ch4_vision.object_localisation",
     "originals": "experiments.claims.robot_files.originals",
     "own-robots": "experiments.claims.robot_files.own_robots",
     "planner-reach-ablation": "experiments.claims.ch8_reaching.planner_reach_ablation",

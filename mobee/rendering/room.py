@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,8 +20,8 @@ RED: Color = (0.78, 0.10, 0.10)
 EDGE = 0.03  # m, at the edge of a table that stays free
 
 
-def room(seed: int) -> list[Solid]:
-    """Return walls with pictures on them, and things before the walls out of the robot's reach; some of each are red."""
+def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
+    """Return walls with pictures on them, and things before the walls out of the robot's reach; a quarter of each have one of `colors`."""
     rng = np.random.default_rng([seed, _STREAM])
     low, high = FLOOR, CEILING
     solids = [
@@ -34,17 +34,17 @@ def room(seed: int) -> list[Solid]:
         wide, tall = rng.uniform(0.15, 0.6, 2)
         z = rng.uniform(FLOOR + 0.4, CEILING - 0.4)
         ahead, aside = rng.uniform(-HALF + 0.4, HALF - 0.4), rng.uniform(-FAR + 0.4, 0.5)
-        solids.append(_wall((-FAR + BEFORE, ahead, z), (0.0, wide, 0.0), (0.0, 0.0, tall), _color(rng)))
+        solids.append(_wall((-FAR + BEFORE, ahead, z), (0.0, wide, 0.0), (0.0, 0.0, tall), _color(rng, colors)))
         side = float(rng.choice((-1.0, 1.0))) * (HALF - BEFORE)
-        solids.append(_wall((aside, side, z), (wide, 0.0, 0.0), (0.0, 0.0, tall), _color(rng)))
+        solids.append(_wall((aside, side, z), (wide, 0.0, 0.0), (0.0, 0.0, tall), _color(rng, colors)))
     for _ in range(THINGS):
         at = np.array([rng.uniform(-FAR + 0.3, -1.2), rng.uniform(-1.6, 1.6), rng.uniform(FLOOR + 0.3, 0.6)])
-        solids.append(_thing(rng, at, rng.uniform(0.03, 0.15)))
+        solids.append(_thing(rng, at, rng.uniform(0.03, 0.15), colors))
     return solids
 
 
-def clutter(objects: Iterable[WorldObject], seed: int) -> list[Solid]:
-    """Return sheets and discs of paper that lie flat on the boxes of a world, so that no hand meets them; some are red."""
+def clutter(objects: Iterable[WorldObject], seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
+    """Return sheets and discs of paper that lie flat on the boxes of a world, where no hand meets them; a quarter have one of `colors`."""
     rng = np.random.default_rng([seed, _STREAM, 1])
     solids = []
     for item in objects:
@@ -56,13 +56,13 @@ def clutter(objects: Iterable[WorldObject], seed: int) -> list[Solid]:
             aside = rng.uniform(-1.0, 1.0, 2) * np.maximum(half[:2] - 0.5 * np.hypot(wide, long) - EDGE, 0.0)
             at = item.position + item.rotation @ np.array([*aside, half[2] + (number + 1) * 0.1 * SHEET])
             if rng.uniform() < 0.4:
-                solids.append(Solid("cylinder", (0.5 * wide, SHEET), at, item.rotation, _color(rng)))
+                solids.append(Solid("cylinder", (0.5 * wide, SHEET), at, item.rotation, _color(rng, colors)))
             else:
-                solids.append(_block(at, (wide, long, SHEET), _color(rng), item.rotation @ _turned(rng)))
+                solids.append(_block(at, (wide, long, SHEET), _color(rng, colors), item.rotation @ _turned(rng)))
     return solids
 
 
-def _thing(rng: np.random.Generator, at: Array, size: float) -> Solid:
+def _thing(rng: np.random.Generator, at: Array, size: float, colors: Sequence[Color]) -> Solid:
     kinds: tuple[tuple[SolidKind, tuple[float, ...]], ...] = (
         ("sphere", (0.5 * size,)),
         ("cylinder", (0.4 * size, size)),
@@ -70,8 +70,8 @@ def _thing(rng: np.random.Generator, at: Array, size: float) -> Solid:
         ("capsule", (0.3 * size, size)),
     )
     kind, numbers = kinds[int(rng.integers(len(kinds)))]
-    color = _color(rng)
-    if kind == "sphere" and color == RED:  # a red sphere is a ball, wherever it is
+    color = _color(rng, colors)
+    if kind == "sphere" and color in colors:  # a red sphere is a ball, wherever it is
         color = (0.15, 0.35, 0.62)
     return Solid(kind, numbers, at, _turned(rng), color)
 
@@ -87,9 +87,9 @@ def _block(at: Array | tuple[float, float, float], size: tuple[float, float, flo
     return Solid("box", size, np.array(at), np.eye(3) if turned is None else turned, color)
 
 
-def _color(rng: np.random.Generator) -> Color:
+def _color(rng: np.random.Generator, colors: Sequence[Color]) -> Color:
     if rng.uniform() < 0.25:
-        return RED
+        return colors[0] if len(colors) == 1 else colors[int(rng.integers(len(colors)))]
     red, green, blue = (float(one) for one in rng.uniform(0.1, 0.9, 3))
     return red, green, blue
 

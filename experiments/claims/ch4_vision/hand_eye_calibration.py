@@ -110,7 +110,7 @@ def _shown_balls(
     pixels: list[Array] = []
     shown = sighted = 0
     while len(rows) < places and shown < 3 * places:
-        q, ball = _gaze(rng)
+        q, ball = random_gaze(rng)
         scene.place("ball", ball, np.array([1.0, 0.0, 0.0, 0.0]))
         shown += 1
         pictures = {name: cameras.expose(name, [q] * settings.samples) for name in rig().cameras}
@@ -143,7 +143,7 @@ def _shown_balls(
     }
 
 
-def _gaze(rng: np.random.Generator) -> tuple[Array, Array]:
+def random_gaze(rng: np.random.Generator) -> tuple[Array, Array]:
     """Draw a posture (n,) rad of the head and a place (3,) m of the ball that the model's own cameras would have in both pictures."""
     robot = rig().robot
     low, high = robot.limits[list(rig().head)].T
