@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds a red ball in an image (colour, then the cone of rays tangent to a sphere), and triangulates it from two eyes."""
+"""Finds red balls in a picture: colour, then the cone of rays that touch a sphere."""
 
 from __future__ import annotations
 
@@ -126,47 +126,3 @@ def _arc(rays: Array, direction: Array) -> float:
     up = np.cross(direction, side)
     around = np.arctan2(rays @ up, rays @ side)
     return len(np.unique(np.floor(SECTORS * (around + np.pi) / (2.0 * np.pi)).astype(int) % SECTORS)) / SECTORS
-
-
-Frame = tuple[Array, Array]  # optical centre (3,) m; rotation (3, 3), columns right, down, forward; root frame
-
-MAX_GAP = 0.015  # m between the two rays; larger gaps are of two different objects
-MAX_SIZE_ERROR = 0.2  # relative difference of the distances by size and by parallax
-DISTANCES = (0.08, 1.5)  # m, from an eye
-RAY_ERROR = 0.003  # rad, standard deviation: a third of a pixel, and the encoders' noise along neck and torso
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Fix:
-    """A ball in the root frame."""
-
-    position: Array  # (3,) m
-    covariance: Array  # (3, 3) m^2
-    gap: float  # m, between the two rays
-
-
-def locate(left: Sequence[Sighting], right: Sequence[Sighting], frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """Return the position from the two sightings that agree best on a ball of this radius [m]; None if no pair agrees."""
-    fixes = [fix for a in left for b in right if (fix := triangulate(a, b, frames, radius)) is not None]
-    return min(fixes, key=lambda fix: fix.gap, default=None)
-
-
-def triangulate(left: Sighting, right: Sighting, frames: tuple[Frame, Frame], radius: float) -> Fix | None:
-    """Return the ball's position from two sightings; None if their rays do not meet, or the size contradicts the distance."""
-    origins = np.array([frame[0] for frame in frames])
-    rays = np.array([frame[1] @ seen.direction for frame, seen in zip(frames, (left, right), strict=True)])
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]  # (2, 3, 3): projections perpendicular to each ray
-    normal = across.sum(axis=0)
-    if np.linalg.cond(normal) > 1e6:
-        return None  # parallel: infinitely far
-    position = np.linalg.solve(normal, np.einsum("eij,ej->i", across, origins))
-    offsets = position - origins
-    distances = np.linalg.norm(offsets, axis=1)
-    misses = np.linalg.norm(np.einsum("eij,ej->ei", across, offsets), axis=1)
-    by_size = np.array([left.distance(radius), right.distance(radius)])
-    ahead = np.einsum("ei,ei->e", rays, offsets) > 0.0
-    near_enough = (distances > DISTANCES[0]) & (distances < DISTANCES[1])
-    if not (ahead & near_enough).all() or misses.sum() > MAX_GAP or (np.abs(by_size / distances - 1.0) > MAX_SIZE_ERROR).any():
-        return None
-    information = np.einsum("eij,e->ij", across, 1.0 / (RAY_ERROR * distances) ** 2)
-    return Fix(position, np.linalg.inv(information), float(misses.sum()))

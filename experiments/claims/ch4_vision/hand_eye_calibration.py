@@ -9,7 +9,7 @@ honest: the normalised error is within its 95 % band for 90 to 98 % of the place
 
 A trial draws the errors of one robot, calibrates it by 40 postures of its hand, and then shows it balls.  All pictures are rendered with
 distortion, noise and motion blur, in a cluttered room.  "Before" is the same sightings with the model's own cameras.  Of sightings that
-both have, the position is the point nearest to both rays before, and the weighted least squares after.
+both have, the position is the point nearest to both rays before, and that of the outlines (`mobee.vision.objects`) after.
 Run time: one minute a robot on one core.
 """
 
@@ -38,7 +38,6 @@ from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.ball import find_balls
-from mobee.vision.calibrated_ball import BALL_NOISE, locate_calibrated
 from mobee.vision.calibration.calibration import Calibration
 from mobee.vision.calibration.offline import Watcher, watch_hand
 from mobee.vision.calibration.postures import choose_postures
@@ -47,6 +46,10 @@ from mobee.vision.encoders import Moment
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
 from mobee.vision.mount import camera_frames, into
+from mobee.vision.objects.detectors import detector_of
+from mobee.vision.objects.eyes import eyes_at
+from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import Rig, see_points
 from mobee.vision.stereo import Sighted, rays_meet
 from mobee.vision.tag import Tag
@@ -55,7 +58,6 @@ POSTURES, PLACES = 40, 100  # of the hand; of the ball, for each of 5 robots
 QUICK_POSTURES, QUICK_PLACES = 12, 10
 MEDIAN, MOST = 5.0, 15.0  # mm
 HONEST = (0.90, 0.98)  # share of places within the 95 % band
-RADIUS = 0.03  # m
 LOW, HIGH = np.array([-0.50, -0.25, -0.07]), np.array([-0.22, 0.25, 0.20])  # m: where balls are
 DISTANCES = (0.22, 0.60)  # m from a camera
 BORDER = 40.0  # px of the pictures in which the model's cameras do not have the ball
@@ -106,6 +108,8 @@ def _shown_balls(
     robot, rng = rig().robot, np.random.default_rng([seed, 0x62616C6C])
     scene = Scene(robot, load_world("table"), rig().cameras, around=[*room(seed), *clutter(model.world.objects.values(), seed)])
     cameras = Cameras(scene, settings, errors, seed)
+    solids, things = [item for item in model.world.objects.values() if item.role == "obstacle"], things_in(model.world)
+    detect = detector_of("color", things)
     rows: list[tuple[float, float, float]] = []
     pixels: list[Array] = []
     shown = sighted = 0
@@ -120,11 +124,13 @@ def _shown_balls(
         sighted += 1
         noise = ENCODER / np.sqrt(READINGS)
         moment = Moment(q + noise * rng.standard_normal(len(q)), np.zeros(len(q)), np.full(len(q), noise**2))
-        place = locate_calibrated(rig(), found, moment, (balls["left"], balls["right"]), RADIUS)
-        first = {name: Sighted(rig().lens.project(some[0].direction), BALL_NOISE) for name, some in balls.items()}
+        eyes = eyes_at(rig(), found.x, moment, found.covariance, settings.jitter)
+        seen = locate_all(things, {name: detect(picture) for name, picture in pictures.items()}, eyes, solids)
+        first = {name: Sighted(rig().lens.project(some[0].direction), 1.0) for name, some in balls.items()}
         before = rays_meet(rig(), np.zeros(len(found.x)), moment, first)
-        if place is None or before is None:
+        if not seen or before is None:
             continue
+        place = seen[0]
         error = place.position - ball
         normalised = float(error @ np.linalg.solve(place.covariance, error))
         rows.append((float(np.linalg.norm(before - ball)), float(np.linalg.norm(error)), normalised))

@@ -7,17 +7,18 @@ import cv2
 import numpy as np
 import pytest
 
-from mobee import InvalidValue, UnknownName, World, sphere
-from mobee.model.kinematics import link_transforms
+from mobee import InvalidValue, UnknownName, World, load_world, sphere
 from mobee.rendering.room import clutter, room
 from mobee.rendering.scene import Scene
 from mobee.vision.alignment import aligned
-from mobee.vision.ball import find_balls, locate
-from mobee.vision.encoders import Readings, moment_at
+from mobee.vision.encoders import Moment, Readings, moment_at
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
 from mobee.vision.lens import DRAGONFLY
-from mobee.vision.mount import camera_frames
+from mobee.vision.objects.detectors import detector_of
+from mobee.vision.objects.eyes import eyes_at
+from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import see_tag
 from mobee.vision.tag import CELLS, FAMILY, NUMBER, Tag, find_tag, tag_solids
 from tests.mobee.vision.calibration.synthetic import MODEL, RIG, ROBOT, postures
@@ -52,12 +53,11 @@ def test_among_red_things_the_ball_is_the_one_on_which_both_cameras_agree() -> N
     world.add("ball", sphere(0.03), position=ball, color=(1, 0, 0))
     eyes = cameras(SETTINGS, ERRORS, world)
     pictures = [eyes.expose(name, [q] * SETTINGS.samples) for name in RIG.cameras]
-    seen = [find_balls(picture, DRAGONFLY.matrix, DRAGONFLY.distortion) for picture in pictures]
     red = [(picture[..., 0] > 120) & (picture[..., 1:].max(axis=-1) < 60) for picture in pictures]
-    transforms = link_transforms(ROBOT, q + ERRORS.encoders)
-    first, second = (camera_frames(camera, transforms, ERRORS.mounts[name]) for name, camera in RIG.cameras.items())
-    fix = locate(seen[0], seen[1], (first, second), 0.03)
-    assert fix is not None
+    things = things_in(load_world("table"))
+    detect = detector_of("color", things)
+    seen = {name: detect(picture) for name, picture in zip(RIG.cameras, pictures, strict=True)}
+    (fix,) = locate_all(things, seen, eyes_at(RIG, TRUE, Moment(q, np.zeros(len(q)), np.full(len(q), 1e-6))))
     np.testing.assert_allclose(fix.position, ball, atol=0.006)
     assert min(mask.sum() for mask in red) > 1.2 * np.pi * (DRAGONFLY.fx * 0.03 / 0.4) ** 2  # there is more red than the ball's
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import cv2
 import numpy as np
@@ -31,7 +31,17 @@ from mobee import World, load_world, sphere
 from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
-from mobee.vision.ball import Fix, Sighting, find_balls, locate, triangulate
+from mobee.robot.robot import Robot
+from mobee.robot.visual import Camera as Camera3D
+from mobee.vision.ball import find_balls
+from mobee.vision.encoders import Moment
+from mobee.vision.lens import Lens
+from mobee.vision.objects.detectors import detector_of
+from mobee.vision.objects.eyes import eyes_at
+from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.placing import Placed
+from mobee.vision.objects.thing import things_in
+from mobee.vision.rig import Rig
 from services.common.cameras import frame_at_capture
 from tests.services.stage import LOOKING_DOWN, TICK, Stage, matched, posture
 
@@ -40,6 +50,8 @@ EYES = cameras_of(ROBOT)
 K = np.array([[257.34, 0.0, 160.0], [0.0, 257.34, 119.0], [0.0, 0.0, 1.0]])
 RED, GREY = (215, 20, 20), (150, 150, 150)
 RADIUS = 0.03
+THINGS = things_in(load_world("table"))
+DETECT = detector_of("color", THINGS)
 
 
 def blank() -> np.ndarray:
@@ -98,46 +110,12 @@ def test_a_ball_cut_by_the_picture_s_edge_is_not_taken_for_a_smaller_one() -> No
     assert all(seen.distance(RADIUS) == pytest.approx(np.linalg.norm(at), rel=0.1) for seen in find_balls(sphere_picture(at, RADIUS), K))
 
 
-FRAMES = ((np.array([0.0, -0.034, 0.0]), np.eye(3)), (np.array([0.0, 0.034, 0.0]), np.eye(3)))
-
-
-def sighting(target: np.ndarray, eye: int, radius: float = RADIUS) -> Sighting:
-    offset = target - FRAMES[eye][0]
-    distance = np.linalg.norm(offset)
-    return Sighting(offset / distance, float(np.arcsin(radius / distance)), 1.0)
-
-
-def test_two_exact_sightings_meet_at_the_ball() -> None:
-    at = np.array([0.02, 0.05, 0.4])
-    fix = triangulate(sighting(at, 0), sighting(at, 1), FRAMES, RADIUS)
-    assert isinstance(fix, Fix)
-    np.testing.assert_allclose(fix.position, at, atol=1e-9)
-    assert fix.gap < 1e-9
-    deviations = np.sqrt(np.linalg.eigvalsh(fix.covariance))
-    assert 0.0005 < deviations[0] < deviations[2] < 0.03
-
-
-def test_sightings_of_different_things_are_refused() -> None:
-    here, beside = np.array([0.0, 0.0, 0.4]), np.array([0.08, 0.0, 0.4])
-    assert triangulate(sighting(here, 0), sighting(beside, 1), FRAMES, RADIUS) is None
-
-
-def test_a_size_that_contradicts_the_parallax_is_refused() -> None:
-    at = np.array([0.0, 0.0, 0.4])
-    assert triangulate(sighting(at, 0, 0.05), sighting(at, 1, 0.05), FRAMES, RADIUS) is None
-
-
-def test_rays_that_part_are_refused() -> None:
-    left, right = sighting(np.array([0.0, -0.2, 0.4]), 0), sighting(np.array([0.0, 0.2, 0.4]), 1)
-    assert triangulate(left, right, FRAMES, RADIUS) is None
-
-
-def test_the_matching_pair_is_chosen_among_several() -> None:
-    at, other = np.array([0.0, 0.0, 0.4]), np.array([0.07, 0.02, 0.45])
-    fix = locate([sighting(other, 0), sighting(at, 0)], [sighting(at, 1)], FRAMES, RADIUS)
-    assert fix is not None
-    np.testing.assert_allclose(fix.position, at, atol=1e-9)
-    assert locate([], [sighting(at, 1)], FRAMES, RADIUS) is None
+def located(scene: Scene, robot: Robot, cameras: Mapping[str, Camera3D], q: np.ndarray) -> list[Placed]:
+    """What the two cameras of a robot see at a posture, without errors of encoders."""
+    scene.pose(q)
+    rig = Rig(robot, cameras, Lens.of_matrix(scene.intrinsics(next(iter(cameras))), np.zeros(0)))
+    eyes = eyes_at(rig, np.zeros(len(rig.names)), Moment(q, np.zeros(len(q)), np.full(len(q), 1e-6)))
+    return locate_all(THINGS, {name: DETECT(scene.draw(name)) for name in cameras}, eyes)
 
 
 @pytest.fixture(scope="module")
@@ -154,13 +132,12 @@ def test_the_drawn_ball_is_located_within_a_centimetre(scene: Scene, rng: np.ran
         for _ in range(4):
             moved = {"torso_pitch": rng.uniform(2, 25), "torso_yaw": rng.uniform(-12, 12), "torso_roll": rng.uniform(-6, 6)}
             q = posture(ROBOT, {**LOOKING_DOWN, **moved})
-            scene.pose(q)
+            found = located(scene, ROBOT, EYES, q)
             frames = tuple(frame_at_capture(ROBOT, EYES[eye], q) for eye in EYES)
             pictures = [scene.draw(eye) for eye in EYES]
             if min(share_seen(picture, frame, at, scene.intrinsics("left")) for picture, frame in zip(pictures, frames, strict=True)) < 0.9:
                 continue
-            fix = locate(*(find_balls(picture, scene.intrinsics("left")) for picture in pictures), frames, RADIUS)
-            errors.append(np.inf if fix is None else np.linalg.norm(fix.position - at))
+            errors.append(np.linalg.norm(found[0].position - at) if found else np.inf)
     assert len(errors) >= 20
     assert np.median(errors) < 0.01
     assert np.quantile(errors, 0.95) < 0.02
@@ -171,11 +148,8 @@ def test_two_cameras_put_on_any_robot_locate_the_ball() -> None:
     base = robot.links[0]
     cameras = cameras_of(robot, [f"{base}=1,-0.1,0.4,-1,0,0", f"{base}=1,0.1,0.4,-1,0,-0.1"])
     world.add("ball", sphere(RADIUS), position=at, color=(1, 0, 0))
-    scene = Scene(robot, world, cameras)
-    frames = [frame_at_capture(robot, camera, robot.home) for camera in cameras.values()]
-    fix = locate(*(find_balls(scene.draw(name), scene.intrinsics(name)) for name in cameras), (frames[0], frames[1]), RADIUS)
-    assert fix is not None
-    np.testing.assert_allclose(fix.position, at, atol=0.005)
+    (found,) = located(Scene(robot, world, cameras), robot, cameras, robot.home)
+    np.testing.assert_allclose(found.position, at, atol=0.005)
 
 
 def share_seen(picture: np.ndarray, frame: tuple[np.ndarray, np.ndarray], at: np.ndarray, intrinsics: np.ndarray) -> float:
