@@ -78,13 +78,14 @@ def _regions(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
             if (parts[where] == part).sum() < AREA:
                 continue
             region = without_holes(parts == part)
-            outline = _outline(region, share) + corner
+            outline = _outline(region, share)
+            filled = _filled(region, outline)
+            outline += corner
             within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
-            area, filled = float(region.sum()), _filled(region)
             if within.sum() < FEWEST or filled < SOLID:
                 continue
             every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
-            found.append(Detection(name, outline[within][every], area, filled * float(within.mean())))
+            found.append(Detection(name, outline[within][every], float(region.sum()), filled * float(within.mean())))
     return found
 
 
@@ -107,11 +108,9 @@ def _outline(region: NDArray[np.bool_], share: Array) -> Array:
     return around
 
 
-def _filled(region: NDArray[np.bool_]) -> float:
-    """Return the share of its convex hull that a region fills."""
-    rows, columns = np.nonzero(region)
-    corners = np.concatenate([np.stack([rows + dy, columns + dx], axis=1) for dy in (-0.5, 0.5) for dx in (-0.5, 0.5)])
+def _filled(region: NDArray[np.bool_], outline: Array) -> float:
+    """Return the share of the convex hull of its outline that a region fills."""
     try:
-        return float(region.sum() / ConvexHull(corners).volume)
+        return min(1.0, float(region.sum() / ConvexHull(outline).volume))
     except QhullError:
         return 0.0
