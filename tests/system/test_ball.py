@@ -87,7 +87,7 @@ def test_the_ball_is_located_at_ten_places_and_put_into_the_model_s_world(tmp_pa
         time.sleep(3.0)  # head and torso reach their posture
         for _ in range(10):
             at = np.array([rng.uniform(-0.44, -0.3), rng.uniform(-0.1, 0.1), -0.07])
-            rpc.call(watcher.session, "test", keys.sim("place"), Place, Done, name="ball", position=at.tolist())
+            rpc.call(watcher.session, "test", keys.sim("place"), Place, Done, timeout=5.0, name="ball", position=at.tolist())
             time.sleep(SETTLED)
             since = watcher.clock.t
             time.sleep(LOOK)
