@@ -37,7 +37,7 @@ from mobee.rendering.room import clutter, room
 from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
-from mobee.vision.ball import find_balls
+from mobee.vision.ball import Sighting, find_balls
 from mobee.vision.calibration.calibration import Calibration
 from mobee.vision.calibration.offline import Watcher, watch_hand
 from mobee.vision.calibration.postures import choose_postures
@@ -126,11 +126,13 @@ def _shown_balls(
         moment = Moment(q + noise * rng.standard_normal(len(q)), np.zeros(len(q)), np.full(len(q), noise**2))
         eyes = eyes_at(rig(), found.x, moment, found.covariance, settings.jitter)
         seen = locate_all(things, {name: detect(picture) for name, picture in pictures.items()}, eyes, solids)
-        first = {name: Sighted(rig().lens.project(some[0].direction), 1.0) for name, some in balls.items()}
-        before = rays_meet(rig(), np.zeros(len(found.x)), moment, first)
-        if not seen or before is None:
+        if not seen:
             continue
         place = seen[0]
+        first = {name: Sighted(_middle(name, some, found, moment, place.position), 1.0) for name, some in balls.items()}
+        before = rays_meet(rig(), np.zeros(len(found.x)), moment, first)
+        if before is None:
+            continue
         error = place.position - ball
         normalised = float(error @ np.linalg.solve(place.covariance, error))
         rows.append((float(np.linalg.norm(before - ball)), float(np.linalg.norm(error)), normalised))
@@ -147,6 +149,12 @@ def _shown_balls(
         "shown": shown,
         "sighted": sighted,
     }
+
+
+def _middle(name: str, balls: Sequence[Sighting], found: Calibration, moment: Moment, place: Array) -> Array:
+    """Return the middle (2,) px of the round red thing that is nearest to a place (3,) m in a picture."""
+    expected = see_points(rig(), name, found.x, moment.q[None], moment.dq[None], place[None, None]).pixels[0, 0]
+    return min((rig().lens.project(one.direction) for one in balls), key=lambda pixel: float(np.linalg.norm(pixel - expected)))
 
 
 def random_gaze(rng: np.random.Generator) -> tuple[Array, Array]:
