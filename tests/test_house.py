@@ -276,12 +276,12 @@ RETIRED = (
     r"|still_nears|ToldContacts|way_to_reach|state_of_part|edges_told|made_alike|\bdear to\b|\bdearer\b"
     r"|go on with --resume|take another seed|goaldesk|worlddesk|drivedesk"
     r"|\bways?[ _]out\b|_way_out|\bfeels?\b|\bmakes for\b|the lack of|\bsways?\b|\beas(?:e|es|ed)\b|\bgoes without\b|as it were\b"
-    r"|\bgo(?:es)? on\b|\bgo_on\b|\bwent on\b|\btold\b|\bfelt\b"
+    r"|\bgo(?:es)? on\b|\bgo_on\b|\bwent on\b|\bfelt\b"
 )
 """Words that stood for: is redundant, start-up status, is degraded, inject a delay, indefinitely, search schedule, world from JSON,
 published terms, is approaching, published contacts, plan a reach, state of a part's pose, expensive, continue the run, use another
 seed; and since 25 November 2026 for: least separation, has a contact, builds, is missing, drift, mobility, has no, so to speak;
-since 26 November 2026 for: continue or resume, known or published, detected."""
+since 26 November 2026 for: continue or resume, detected."""
 
 TEXTS = {".py", ".md", ".hpp", ".cpp", ".toml", ".js", ".html"}
 HISTORY = {"CHANGELOG.md", "docs/decisions.md"}  # these say what was, in the words of their time
