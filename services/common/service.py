@@ -43,6 +43,7 @@ _R = TypeVar("_R", bound=Reply)
 _C = TypeVar("_C", bound=ServiceConfig)
 
 ORPHANED = 10.0  # s without a router after which a service ends
+BUSY = 3.0  # s between two checks for the router in which a service has computed instead of handling messages, such as the router's token
 ONLY_ONE = ("robot_sim", "model", "controller", "port_filter")  # two would both be obeyed
 FRESH_STATS, STATS_PERIOD = 10, 0.2  # of so many answers to `stat` within so many s each is computed; others repeat the last one
 
@@ -121,7 +122,8 @@ class Service(Listener):
         self._on_alive: list[Callable[[str, str, bool], None]] = []
         self._is_ready = False
         inbox.at(time.monotonic() + WINDOW, self._check_health)
-        self._router, self._router_seen = self._launcher, time.monotonic()  # a launcher is the router of those it has started
+        self._router_checked = time.monotonic()
+        self._router, self._router_seen = self._launcher, self._router_checked  # a launcher is the router of those it has started
         self._strays: set[str] = set()  # tokens of routers that no process has
         self._watch_liveliness()
         self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
@@ -226,10 +228,11 @@ class Service(Listener):
         if self._signalled:
             raise SystemExit(OK)
         end_unreceived(self.config.endpoint, self._lease)  # also of a connection that has taken the place of another one
-        missing = self._missing()
-        if not missing:
-            self._router_seen = time.monotonic()
-        elif time.monotonic() - self._router_seen > ORPHANED:
+        missing, now = self._missing(), time.monotonic()
+        unhandled, self._router_checked = now - self._router_checked > BUSY, now
+        if not missing or unhandled:
+            self._router_seen = now
+        elif now - self._router_seen > ORPHANED:
             self.log.error(
                 "no %s at %s for %g s: this service ends; start the system again with `mobee launch`",
                 missing,

@@ -46,6 +46,13 @@ def world_around(given: str | None, robot: str | Path) -> World:
     return World() if name == NO_WORLD else load_world(name)
 
 
+def require_sizes(shape: Geometry) -> None:
+    """Raise InvalidValue for a shape of the bus with a wrong number of sizes."""
+    expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[shape.kind]
+    if len(shape.size) != expected:
+        raise InvalidValue(f"{shape.kind} of size {shape.size}: must be {expected} lengths in metres")
+
+
 def object_state(thing: WorldObject, link: str = "") -> ObjectState:
     """Return an object as the model lists it on the bus; `link`: to which it is attached.  Raises InvalidValue for a convex volume."""
     if thing.kind == "convex":  # of links only: World.add takes none

@@ -23,7 +23,7 @@ from mobee.model.world_object import valid_position, valid_shape
 from mobee.reach import TARGET
 from services.common.rate import Percentiles
 from services.common.service import CallRefused, Service
-from services.common.worlds import object_state
+from services.common.worlds import object_state, require_sizes
 
 DONE = Done(v=VERSION)
 MARGIN_STEP = 0.002  # m between two margins
@@ -192,9 +192,7 @@ class WorldServer:
 
 def _shape(given: Geometry, margin: float) -> geometry.Geometry:
     """Return a shape of the bus, larger by a margin [m] on each side, as a Geometry; raises InvalidValue for a wrong number of sizes."""
-    expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[given.kind]
-    if len(given.size) != expected:
-        raise InvalidValue(f"{given.kind} of size {given.size}: must be {expected} lengths in metres")
+    require_sizes(given)
     wider = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[given.kind]
     return geometry.Geometry(given.kind, tuple(size + factor * margin for size, factor in zip(given.size, wider, strict=True)))
 

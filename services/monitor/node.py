@@ -29,6 +29,7 @@ from bus_schema.messages import (
     WorldObject,
 )
 from bus_schema.rpc import World
+from mobee.errors import InvalidValue
 from mobee.rendering.palette import colors_of_all
 from mobee.robot.motor_units import slides
 from mobee.robot.robot import Robot
@@ -36,7 +37,7 @@ from services.common.body import Body
 from services.common.rate import Percentiles, Rate
 from services.common.rpc import CallFailed
 from services.common.service import Service, return_free_memory
-from services.common.worlds import AT_TABLE
+from services.common.worlds import AT_TABLE, require_sizes
 from services.monitor.config import Config
 from services.monitor.controls import Known, PageControls
 from services.monitor.status import STALE, Seen, banner
@@ -259,6 +260,11 @@ class MonitorNode:
     # Events that are shown at once
 
     def _show_object(self, seen: WorldObject) -> None:
+        try:
+            require_sizes(seen.geometry)
+        except InvalidValue as error:
+            self._service.bus.reject("world", f"{seen.name}: {error}")
+            return
         if seen.valid_until >= self._service.bus.t:  # else it was withdrawn, and the model's list ends it
             self._scene.log_object(seen)
 

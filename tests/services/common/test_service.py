@@ -23,6 +23,7 @@ from bus_schema.messages import Clock, Decision, Event, Forces, Geometry, WorldO
 from bus_schema.rpc import Config, Done, Empty, Failure, Stat, Take, Taken
 from experiments.kit.live.launch import free_endpoint
 from services.common import rpc
+from services.common import service as service_module
 from services.common.bus import NO_RUN, Bus
 from services.common.config import ServiceConfig
 from services.common.rpc import CallFailed
@@ -244,6 +245,17 @@ def test_a_new_run_is_announced_once_and_its_messages_are_heard(bus: Rig, clock:
     ball(bus.bus.publisher(WorldObject, "ball"))
     wait_for(lambda: numbers(bus)["objects"] == before["objects"] + 1, "the object of the new run")
     assert "r1" in wait_for(lambda: [e.text for e in events if e.code == "new_run"], "the event")[0]
+
+
+def test_a_service_that_was_busy_has_not_lost_its_router(bus: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It computes for longer than a service may be without a router, and only then handles the router's token."""
+    monkeypatch.setattr(service_module, "ORPHANED", 0.2)
+    monkeypatch.setattr(service_module, "BUSY", 0.1)
+    with Service("busy", ServiceConfig(endpoint=bus.endpoint), bus.robot) as service:
+        time.sleep(0.5)
+        service.check_router()
+        service.spin(time.monotonic() + 0.05)
+        service.check_router()
 
 
 def test_past_messages_that_come_before_the_first_tick_are_heard_after_it(bus: Rig) -> None:
