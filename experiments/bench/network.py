@@ -278,7 +278,7 @@ class _Hosts:
 
     def _require_running(self, host: str) -> None:
         if (self._first if host == "first" else self._second).poll() is not None:
-            raise LaunchFailed(f"the launcher of the {host} host has ended: {(self._says(host).splitlines() or ['no message'])[-1]}")
+            raise LaunchFailed(f"the launcher of the {host} host has ended: {' | '.join(self._says(host).splitlines()[-3:])}")
 
     def _is_ready(self) -> bool:
         self._require_running("first")
