@@ -9,9 +9,9 @@ better than stereo by the uncalibrated cameras.
 A trial draws the errors of one iCub's cameras and head encoders, as in hand-eye-calibration.  The Katana carries a red ball, which stands
 for the children's block, to random places 20 to 65 cm from the eyes; for each, the iCub looks from random postures of torso, head and
 eyes.  Both move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a
-room without clutter on the table.  The Katana tells the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser
-learns from any picture of them.  Beside the localisers: stereo by the model's own cameras, and by cameras that were calibrated by 20
-postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.
+room without clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no
+localiser learns from any picture of them.  Beside the localisers: stereo by the model's own cameras, and by cameras that were calibrated
+by 20 postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.
 Run time: about three minutes a robot on one core.
 """
 
@@ -92,7 +92,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
         "held_out": len(held_out),
         "poses": len(np.unique(lessons.poses)),
         "looks": settings["poses"] * settings["looks"],
-        "told": float(np.median(np.linalg.norm(lessons.told - lessons.true, axis=1))),
+        "reported": float(np.median(np.linalg.norm(lessons.reported - lessons.true, axis=1))),
         "robot_seconds": time,
     }
 
@@ -123,7 +123,7 @@ def _calibrated(postures: int, seed: int) -> Array:
 def _learned(name: str, lessons: Lessons, test: Lessons, seed: int) -> Array:
     """Return the errors (N,) m of a localiser on the test, after it has learned from lessons."""
     one = localiser(name, rig(), seed)
-    one.fit(lessons.inputs, lessons.told)
+    one.fit(lessons.inputs, lessons.reported)
     return _off(one.predict(test.inputs), test)
 
 
@@ -143,7 +143,7 @@ def _medians(groups: Groups, name: str) -> list[float]:
 
 @claim(
     OUR_AIM,
-    "a localiser that corrects the stereo of its kinematic model by what the Katana tells is at least 3 times better on held-out poses "
+    "a localiser that corrects the stereo of its kinematic model by what the Katana reports is at least 3 times better on held-out poses "
     "than uncalibrated stereo",
     f"at least {BETTER:g} x",
 )
@@ -221,7 +221,7 @@ def findings(found: Cells) -> dict[str, Any]:
                 (cell.values["counts"][-1] + cell.values["held_out"]) / cell.values["looks"], 2
             ),
             "robot time, minutes": round(cell.values["robot_seconds"] / 60.0),
-            "error of the told places, mm": round(1e3 * cell.values["told"], 2),
+            "error of the reported places, mm": round(1e3 * cell.values["reported"], 2),
         }
         for name, cell in found.items()
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot that learns to see has seen, with the places that its teacher has told it."""
+"""What a robot that learns to see has seen, with the places that its teacher has reported."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ PARTS = ("torso", "head")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lesson:
-    """The ball in both pictures of one moment: pixels (2, 2), the encoders, where the teacher says it is, and where it is, (3,) m.
+    """The ball in both pictures of one moment: pixels (2, 2), the encoders, where the teacher reports it, and where it is, (3,) m.
 
     `pose`: the number of the teacher's pose.
     """
 
     pixels: Array
     moment: Moment
-    told: Array
+    reported: Array
     true: Array
     pose: int
 
@@ -33,12 +33,12 @@ class Lesson:
 class Lessons:
     """The lessons as arrays.
 
-    `inputs` (N, d): columns and rows of the ball in the left and right picture [px], then encoders [rad]; `told` (N, 3) and `true` (N, 3)
-    m, root frame; `poses` (N,): of the teacher.
+    `inputs` (N, d): columns and rows of the ball in the left and right picture [px], then encoders [rad]; `reported` (N, 3) and `true`
+    (N, 3) m, root frame; `poses` (N,): of the teacher.
     """
 
     inputs: Array
-    told: Array
+    reported: Array
     true: Array
     poses: Ints
 
@@ -47,14 +47,14 @@ class Lessons:
         """Stack lessons; the encoders are those of PARTS."""
         seeing = seeing_motors(robot)
         rows = [np.concatenate([one.pixels.ravel(), one.moment.q[seeing]]) for one in lessons]
-        told, true = (np.array([getattr(one, name) for one in lessons]) for name in ("told", "true"))
-        return cls(np.array(rows), told, true, np.array([one.pose for one in lessons], dtype=np.intp))
+        reported, true = (np.array([getattr(one, name) for one in lessons]) for name in ("reported", "true"))
+        return cls(np.array(rows), reported, true, np.array([one.pose for one in lessons], dtype=np.intp))
 
     def __len__(self) -> int:
         return len(self.inputs)
 
     def __getitem__(self, rows: Ints | slice) -> Lessons:
-        return Lessons(self.inputs[rows], self.told[rows], self.true[rows], self.poses[rows])
+        return Lessons(self.inputs[rows], self.reported[rows], self.true[rows], self.poses[rows])
 
 
 def seeing_motors(robot: Robot) -> Ints:

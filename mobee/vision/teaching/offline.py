@@ -32,7 +32,7 @@ def watch_teacher(
 ) -> list[Lesson]:
     """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures, and return what both cameras saw.
 
-    All motions pass the controller, which keeps the robots apart.  The teacher tells where the ball is by its own encoders.  Of each
+    All motions pass the controller, which keeps the robots apart.  The teacher reports where the ball is by its own encoders.  Of each
     picture the largest ball counts; where there is none, or the sizes in both pictures differ, there is no lesson.
 
     Args:

@@ -19,7 +19,7 @@ def cells(off: dict[str, float]) -> dict[str, Any]:
         rng = np.random.default_rng(seed)
         errors = {f"errors, {name}": 1e-2 * cm * (1.0 + 0.01 * rng.standard_normal(101)) for name, cm in off.items()}
         curves = {name: [2e-2 * off[name], 1e-2 * off[name]] for name in LEARNED}
-        own = {"counts": [50, 90], "held_out": 20, "poses": 30, "looks": 200, "told": 5e-4, "robot_seconds": 600.0}
+        own = {"counts": [50, 90], "held_out": 20, "poses": 30, "looks": 200, "reported": 5e-4, "robot_seconds": 600.0}
         return {**errors, "curves": curves, **own}
 
     every = EXPERIMENT.method.cells(options_of(EXPERIMENT))

@@ -54,10 +54,10 @@ def test_stereo_is_exact_with_the_true_cameras_and_wrong_with_those_of_the_model
 
 def test_corrected_stereo_learns_the_cameras_and_a_wrong_lesson_does_not_spoil_it():
     inputs, places = seen(60, 1)
-    told = places.copy()
-    told[7] += (0.3, 0.0, 0.0)
+    reported = places.copy()
+    reported[7] += (0.3, 0.0, 0.0)
     learner = localiser(CORRECTED, RIG, 0)
-    learner.fit(inputs, told)
+    learner.fit(inputs, reported)
     held_out, there = seen(40, 2)
     uncalibrated = median(stereo_places(RIG, np.zeros(len(TRUE)), held_out), there)
     assert median(learner.predict(held_out), there) < 0.1 * uncalibrated

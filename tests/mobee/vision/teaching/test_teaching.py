@@ -56,7 +56,7 @@ def test_lessons_hold_what_a_robot_with_perfect_cameras_triangulates(model):
     postures = teacher_postures(RIG, model, BALL, watching(), (LOW, HIGH), 3, seed=0)
     lessons = Lessons.of(two_robots(), watch_teacher(watcher, BALL, KATANA, postures, 3, 0.3, seed=0))
     assert len(lessons) >= 4 and lessons.inputs.shape == (len(lessons), 13)
-    assert np.linalg.norm(lessons.told - lessons.true, axis=1).max() < 0.005  # noise of the Katana's encoders
+    assert np.linalg.norm(lessons.reported - lessons.true, axis=1).max() < 0.005  # noise of the Katana's encoders
     found = stereo_places(RIG, np.zeros(len(RIG.names)), lessons.inputs)
     assert np.median(np.linalg.norm(found - lessons.true, axis=1)) < 0.01
 
