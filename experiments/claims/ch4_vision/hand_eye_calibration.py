@@ -60,6 +60,7 @@ MEDIAN, MOST = 5.0, 15.0  # mm
 HONEST = (0.90, 0.98)  # share of places within the 95 % band
 LOW, HIGH = np.array([-0.50, -0.25, -0.07]), np.array([-0.22, 0.25, 0.20])  # m: where balls are
 DISTANCES = (0.22, 0.60)  # m from a camera
+SAME = 5.0  # px between a round red thing and the expected place of the ball
 BORDER = 40.0  # px of the pictures in which the model's cameras do not have the ball
 READINGS, ENCODER = 7, float(np.deg2rad(0.1 * np.sqrt(2.0)))  # of each encoder around a stamp; rad, deviation of one
 
@@ -129,7 +130,10 @@ def _shown_balls(
         if not seen:
             continue
         place = seen[0]
-        first = {name: Sighted(_middle(name, some, found, moment, place.position), 1.0) for name, some in balls.items()}
+        middles = {name: _middle(name, some, found, moment, place.position) for name, some in balls.items()}
+        first = {name: Sighted(middle, 1.0) for name, middle in middles.items() if middle is not None}
+        if len(first) < len(middles):
+            continue
         before = rays_meet(rig(), np.zeros(len(found.x)), moment, first)
         if before is None:
             continue
@@ -151,10 +155,11 @@ def _shown_balls(
     }
 
 
-def _middle(name: str, balls: Sequence[Sighting], found: Calibration, moment: Moment, place: Array) -> Array:
-    """Return the middle (2,) px of the round red thing that is nearest to a place (3,) m in a picture."""
+def _middle(name: str, balls: Sequence[Sighting], found: Calibration, moment: Moment, place: Array) -> Array | None:
+    """Return the middle (2,) px of the round red thing at a place (3,) m in a picture; None if it is not among those found there."""
     expected = see_points(rig(), name, found.x, moment.q[None], moment.dq[None], place[None, None]).pixels[0, 0]
-    return min((rig().lens.project(one.direction) for one in balls), key=lambda pixel: float(np.linalg.norm(pixel - expected)))
+    middle = min((rig().lens.project(one.direction) for one in balls), key=lambda pixel: float(np.linalg.norm(pixel - expected)))
+    return middle if np.linalg.norm(middle - expected) < SAME else None
 
 
 def random_gaze(rng: np.random.Generator) -> tuple[Array, Array]:
