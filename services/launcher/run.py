@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import json
 import os
 import signal
@@ -56,6 +57,7 @@ from services.launcher.supervisor import Supervisor
 
 _REDRAW = 0.5  # s
 _NO_LIMIT = 1e6  # s
+_LONGEST_END = 30.0  # s from the end of the services to that of the launcher
 _PATIENCE_BEYOND_A_NETWORK = 10.0  # s without an answer after which a service of a joined host, whose router is elsewhere, can be frozen
 _JOIN_AGAIN = -1  # in place of an exit code
 _START_NOTICE = 5.0  # s after all are ready: a run in lockstep that is still at tick 0 is reported
@@ -92,6 +94,7 @@ def launch(options: Options) -> int:
     while True:
         with contextlib.ExitStack() as open_meanwhile:
             code = _launch(options, open_meanwhile)
+        faulthandler.cancel_dump_traceback_later()
         if code != _JOIN_AGAIN:
             return code
 
@@ -243,6 +246,8 @@ class _Run:
         self._service.describe = self._describe
         self._service.ready()
         ready, duration = self._live(started)
+        if sys.__stderr__ is not None:  # nobody supervises the launcher: if its sessions do not close, it ends and shows where it waits
+            faulthandler.dump_traceback_later(_LONGEST_END, exit=True, file=sys.__stderr__)
         with contextlib.suppress(OSError):  # one that is left does no harm
             if self._record is not None:
                 self._record.remove()
