@@ -16,7 +16,7 @@ from typing import Any
 import msgspec  # for msgpack alone: the package msgpack does as well
 import zenoh
 
-VERSION = 7  # of the contract: it stands in every message, request and encoding string
+VERSION = 8  # of the contract: it stands in every message, request and encoding string
 NAMESPACE = "icub"  # prefix of all keys
 SECONDS = 1.0
 

@@ -102,7 +102,7 @@ def test_the_visuals_and_cameras_of_the_file_are_used_live(tmp_path: Path, capsy
     arm.write_text(ARM.replace('<link name="lower">', f'<link name="lower">{drawn}'))
     write_stl(tmp_path / "lower.stl", tetrahedron())
     (tmp_path / "desk.xml").write_text(
-        '<World version="2.0" name="desk"><sphere name="ball" radius="0.03" px="0.5" role="target"/></World>'
+        '<World version="2.0" name="desk"><sphere name="ball" radius="0.03" px="0.5" role="target" color="0.9 0.05 0.05"/></World>'
     )
     options = ["--offline-only", "--transitions", "4", "--save", str(folder), "--world", str(tmp_path / "desk.xml")]
     cameras = ["upper", "upper=0,0.1,0.2,1,0,0"]

@@ -11,7 +11,15 @@ HEALTH = {"rate": 99.8, "age_ms": 4.2, "gap_ms": 1131.0, "refused_rate": 0.0, "m
 
 
 def service(**changes: object) -> dict[str, object]:
-    plain: dict[str, object] = {"state": "ready", "pid": 4242, "uptime_s": 12.3, "restarts": 0, "rejected": {}, "text": "100 ticks"}
+    plain: dict[str, object] = {
+        "state": "ready",
+        "pid": 4242,
+        "uptime_s": 12.3,
+        "restarts": 0,
+        "rejected": {},
+        "text": "100 ticks",
+        "host": None,
+    }
     return plain | {"health": HEALTH, "warnings": []} | changes
 
 
