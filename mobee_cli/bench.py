@@ -131,6 +131,14 @@ BENCHES = {
             "--seed": _number("of what is drawn (default: 1)", int),
         },
     ),
+    "soak": Bench(
+        "a system that runs for hours: memory, open files and threads of its processes, and whether it becomes slower",
+        quick="12 minutes of the robot",
+        options={
+            "--hours": _number("of the robot (default: 8)", positive_number, "H"),
+            "--scenario": {"metavar": "NAME", "help": "without monitor (default: lockstep)"},
+        },
+    ),
     "plant": Bench(
         "the offline plant beside MuJoCo's stepper: one arm, reaching, three agents at the table, and the same hash twice",
         quick="one short round",
