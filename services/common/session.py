@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 
 import zenoh
 
-from services.common.identity import LONGEST_SOCKET, Identity, secured
+from services.common.identity import LONGEST_SOCKET, Identity, is_local, secured
 
 Session = zenoh.Session  # for modules that do not import zenoh
 
@@ -71,10 +71,10 @@ def end_unreceived(endpoint: str, lease: float) -> None:
 
     Zenoh ends a silent connection after the lease, but with TLS not before the data that waits in its socket is sent: after a cut of the
     network that is as long again as the cut.  A listener gives the limit to the connections that it accepts; a client that has connected
-    again must set it again.
+    again must set it again.  On one host nothing is cut, and a process may be without a processor for longer than the lease.
     """
     port = endpoint.rpartition(":")[2]
-    if not hasattr(socket, "TCP_USER_TIMEOUT") or not port.isdecimal():
+    if is_local(endpoint) or not hasattr(socket, "TCP_USER_TIMEOUT") or not port.isdecimal():
         return
     for name in os.listdir("/proc/self/fd"):
         try:
