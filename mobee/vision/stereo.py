@@ -35,20 +35,27 @@ class Place:
     misfit: float
 
 
+def nearest_to_rays(origins: Array, rays: Array) -> Array:
+    """Return the points (..., 3) m that are nearest to E rays each, from origins (..., E, 3) m along unit vectors (..., E, 3).
+
+    NaN where the rays are parallel, or do not exist.
+    """
+    across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
+    normal, against = across.sum(axis=-3), np.einsum("...eij,...ej->...i", across, origins)
+    fits = np.isfinite(normal).all(axis=(-2, -1))
+    fits &= np.linalg.cond(np.where(fits[..., None, None], normal, 0.0)) < PARALLEL
+    solved = np.linalg.solve(np.where(fits[..., None, None], normal, np.eye(3)), against[..., None])[..., 0]
+    found: Array = np.where(fits[..., None], solved, np.nan)
+    return found
+
+
 def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
     """Return the place (3,) m that is nearest to the rays through the pixels; None if they are parallel, or do not exist."""
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
-    normals, targets = [], []
-    for camera, one in sighted.items():
-        position, rotation = camera_frames(rig.cameras[camera], transforms, x[rig.where(camera)])
-        ray = rotation @ rig.lens.unproject(one.pixel)
-        normals.append(np.eye(3) - ray[:, None] * ray)
-        targets.append(normals[-1] @ position)
-    normal, against = np.sum(normals, axis=0), np.sum(targets, axis=0)
-    if not np.isfinite(normal).all() or np.linalg.cond(normal) > PARALLEL:
-        return None
-    found: Array = np.linalg.solve(normal, against)
-    return found
+    frames = {name: camera_frames(rig.cameras[name], transforms, x[rig.where(name)]) for name in sighted}
+    rays = [rotation @ rig.lens.unproject(sighted[name].pixel) for name, (_, rotation) in frames.items()]
+    found = nearest_to_rays(np.array([position for position, _ in frames.values()]), np.array(rays))
+    return None if np.isnan(found).any() else found
 
 
 def locate(

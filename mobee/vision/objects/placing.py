@@ -13,6 +13,7 @@ from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.eyes import Eye, Eyes
 from mobee.vision.objects.silhouette import SCALED, touching, upright
 from mobee.vision.objects.thing import Thing
+from mobee.vision.stereo import nearest_to_rays
 
 EDGE = 0.3  # px, standard deviation of a point on an outline; this and the next three were measured in rendered pictures
 SHIFT = 0.08  # px, of the whole outline in one picture, along column and row
@@ -85,23 +86,13 @@ def place(thing: Thing, outlines: Mapping[str, Detection], eyes: Eyes) -> Placed
     """Return the place of a thing from its outlines by camera; None if they do not fit it, or the thing is too near or too far."""
     seen = [_Outline.of(eye, outlines[name].outline) for name, eye in zip(eyes.names, eyes.eyes, strict=True)]
     rays = [eye.rotation @ eye.lens.unproject(outlines[name].centre) for name, eye in zip(eyes.names, eyes.eyes, strict=True)]
-    start = _nearest(np.array([eye.position for eye in eyes.eyes]), np.array(rays))
-    if start is None or any(one is None for one in seen) or not _in_range(eyes, start):
+    start = nearest_to_rays(np.array([eye.position for eye in eyes.eyes]), np.array(rays))
+    if np.isnan(start).any() or any(one is None for one in seen) or not _in_range(eyes, start):
         return None
     every = [one for one in seen if one is not None]
     fits = [_fit(thing, every, eyes, start, yaw) for yaw in (YAWS if thing.kind == "box" else YAWS[:1])]
     good = [fit for fit in fits if fit is not None]
     return min(good, key=lambda fit: fit[0], default=(0.0, None))[1]
-
-
-def _nearest(origins: Array, rays: Array) -> Array | None:
-    """Return the point (3,) m that is nearest to rays (E, 3) from origins (E, 3) m; None if they are parallel or do not exist."""
-    across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-    normal = across.sum(axis=0)
-    if not np.isfinite(normal).all() or np.linalg.cond(normal) > 1e6:
-        return None
-    found: Array = np.linalg.solve(normal, np.einsum("eij,ej->i", across, origins))
-    return found
 
 
 def _in_range(eyes: Eyes, position: Array) -> bool:

@@ -21,6 +21,7 @@ from mobee.vision.imperfections import CameraSettings
 from mobee.vision.lens import Lens
 from mobee.vision.mount import camera_frames
 from mobee.vision.rig import Rig
+from mobee.vision.stereo import nearest_to_rays
 from mobee.vision.teaching.cartesian_programs import CartesianPrograms
 from mobee.vision.teaching.lessons import seeing_motors
 
@@ -139,19 +140,19 @@ class CorrectedStereo:
 
 
 def stereo_places(rig: Rig, x: Array, inputs: Array) -> Array:
-    """Return the places (N, 3) m nearest to both rays, by the kinematic model with parameters x (P,) of cameras and encoders."""
+    """Return the places (N, 3) m nearest to both rays, by the kinematic model with parameters x (P,) of cameras and encoders.
+
+    NaN where the rays are parallel.
+    """
     q = np.repeat(rig.robot.home[None], len(inputs), axis=0)
     q[:, seeing_motors(rig.robot)] = inputs[:, 4:]
     transforms = link_transforms(rig.robot, rig.posture(x, q, np.zeros_like(q)))
-    normal, target = np.zeros((len(q), 3, 3)), np.zeros((len(q), 3))
+    origins, rays = [], []
     for number, (name, camera) in enumerate(rig.cameras.items()):
         position, rotation = camera_frames(camera, transforms, x[rig.where(name)])
-        rays = np.einsum("nij,nj->ni", rotation, rig.lens.unproject(inputs[:, 2 * number : 2 * number + 2]))
-        across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
-        normal += across
-        target += np.einsum("nij,nj->ni", across, position)
-    found: Array = np.asarray(np.linalg.solve(normal, target[..., None])[..., 0], dtype=np.float64)
-    return found
+        origins.append(position)
+        rays.append(np.einsum("nij,nj->ni", rotation, rig.lens.unproject(inputs[:, 2 * number : 2 * number + 2])))
+    return nearest_to_rays(np.stack(origins, axis=1), np.stack(rays, axis=1))
 
 
 def _polynomial(seed: int) -> Any:
