@@ -156,7 +156,8 @@ def plot(found: Cells) -> Any:
         right.plot([number] * len(runs), [1e3 * run["deepest"] for run in runs], "o", color="C0", markersize=4)
     right.axhline(1e3 * DEEP, color="C3", linestyle="--", linewidth=1.0, label="aim")
     right.set_xticks(range(len(names)), names)
-    finish(right, legend=8.0, ylabel="deepest contact of solids of a run, mm", yscale="symlog", ylim=(-0.2, None))
+    top = 2e3 * max(run["deepest"] for runs in groups.values() for run in runs)
+    finish(right, legend=8.0, ylabel="deepest contact of a run, mm", yscale="symlog", ylim=(-0.2, max(top, 10.0)))
     for axes in (left, right):
         axes.tick_params(axis="x", labelsize=7, rotation=15)
     return drawing

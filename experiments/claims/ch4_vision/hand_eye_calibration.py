@@ -25,7 +25,7 @@ from scipy.stats import chi2
 
 from experiments.kit.command_line import positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, claim, judged
-from experiments.kit.plots import finish, new_figure
+from experiments.kit.plots import finish, finish_normalised, new_figure
 from experiments.kit.rules import all_hold, decides
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -73,7 +73,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the one condition."""
+    """Return the only condition of the sweep."""
     numbers = (QUICK_POSTURES, QUICK_PLACES) if arguments.quick else (POSTURES, arguments.places)
     return [Condition("hand", {"calibration": "hand", "postures": numbers[0], "places": numbers[1]})]
 
@@ -249,12 +249,9 @@ def plot(found: Cells) -> Any:
         left.plot([value], [level], "x", color="C3", label="aim" if level == 0.5 else None)
     finish(left, xlabel="error of the ball's position, mm", ylabel="share of the places", xscale="log", xlim=(0.3, 1000.0))
     left.legend(fontsize=7, loc="lower right")
-    grid = np.linspace(0.0, 12.0, 300)
     for number, run in enumerate(runs):
         right.plot(np.quantile(run["normalised"], shares), shares, color="C0", linewidth=1.0, label="measured" if number == 0 else None)
-    right.plot(grid, chi2.cdf(grid, 3), color="black", linestyle="--", linewidth=1.0, label="chi-squared, 3 degrees of freedom")
-    finish(right, xlabel="normalised squared error", ylabel="share of the places", xlim=(0.0, 12.0))
-    right.legend(fontsize=7, loc="lower right")
+    finish_normalised(right)
     return drawing
 
 

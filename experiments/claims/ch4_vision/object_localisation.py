@@ -36,7 +36,7 @@ from experiments.claims.ch4_vision.hand_eye_calibration import (
 )
 from experiments.kit.command_line import positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, claim, judged
-from experiments.kit.plots import finish, new_figure
+from experiments.kit.plots import finish, finish_normalised, new_figure
 from experiments.kit.rules import all_hold, decides
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -77,7 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the one condition."""
+    """Return the only condition of the sweep."""
     numbers = (QUICK_POSTURES, QUICK_GAZES, QUICK_LOOKS) if arguments.quick else (POSTURES, arguments.gazes, arguments.looks)
     return [Condition("things", {"world": "things", "postures": numbers[0], "gazes": numbers[1], "looks": numbers[2]})]
 
@@ -257,7 +257,7 @@ def plot(found: Cells) -> Any:
     runs = grouped(found, "world", ("things",))["things"]
     drawing = new_figure(9.0, 3.6)
     left, right = drawing.subplots(1, 2)
-    shares, grid = np.linspace(0.0, 1.0, 400), np.linspace(0.0, 12.0, 300)
+    shares = np.linspace(0.0, 1.0, 400)
     for color, name in zip(("C3", "C0", "C2"), KINDS, strict=True):
         errors, normalised = (np.concatenate([run[f"{name}_{field}"] for run in runs]) for field in ("error", "normalised"))
         left.plot(1e3 * np.quantile(errors, shares), shares, color=color, label=name)
@@ -266,9 +266,7 @@ def plot(found: Cells) -> Any:
         left.plot([value], [level], "x", color="black", label="aim" if level == 0.5 else None)
     finish(left, xlabel="error of the position, mm", ylabel="share of the places", xscale="log", xlim=(0.3, 50.0))
     left.legend(fontsize=7, loc="lower right")
-    right.plot(grid, chi2.cdf(grid, 3), color="black", linestyle="--", linewidth=1.0, label="chi-squared, 3 degrees of freedom")
-    finish(right, xlabel="normalised squared error", ylabel="share of the places", xlim=(0.0, 12.0))
-    right.legend(fontsize=7, loc="lower right")
+    finish_normalised(right)
     return drawing
 
 

@@ -62,7 +62,7 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the one condition."""
+    """Return the only condition of the sweep."""
     poses, looks, postures = QUICK if arguments.quick else (POSES, LOOKS, POSTURES)
     return [Condition("katana", {"teacher": "katana", "poses": poses, "looks": looks, "postures": postures})]
 
