@@ -26,7 +26,7 @@ class ReachTarget:
 
     `position`: (3,) m, root frame, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker is to come to its "centre" (thesis 8.2) or
     to its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.  `faces`: the desired direction is
-    that from the marker to the target's centre, as of a palm that looks at what it reaches for.
+    that from the marker to the target's centre, as for a palm that is turned towards its target.
     """
 
     position: Array

@@ -90,7 +90,7 @@ def lines(result: Result) -> list[str]:
         f"at {_place(outcome.marker)}, after {outcome.duration:.1f} s{'' if outcome.settled else ', still moving'}.",
     ]
     if result.angle is not None:
-        text.append(f"Its normal points {np.rad2deg(result.angle):.0f} deg beside the target.")
+        text.append(f"Its normal is turned {np.rad2deg(result.angle):.0f} deg away from the target.")
     if not result.reached:
         text.append(_why(result))
     if result.path:

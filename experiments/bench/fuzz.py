@@ -91,8 +91,8 @@ def _send(system: System, seed: int, count: int) -> Counter[str]:
         subprocess.Popen([*argv, str(seed + n), str(count // _SENDERS), parts], stdout=subprocess.PIPE, text=True) for n in range(_SENDERS)
     ]
     outputs = [sender.communicate()[0] for sender in senders]
-    if any(sender.returncode for sender in senders):
-        raise LaunchFailed(f"a process that sends has ended with code {[s.returncode for s in senders]}")
+    if codes := [sender.returncode for sender in senders if sender.returncode]:
+        raise LaunchFailed(f"a process that sends has ended with code {codes[0]}")
     return sum((Counter(json.loads(output)) for output in outputs), Counter[str]())
 
 

@@ -274,18 +274,18 @@ class _Hosts:
 
     def _is_waiting(self) -> bool:
         self._require_running("first")
-        return "waits for another host" in self._says("first")
+        return "waits for another host" in self._output("first")
 
     def _require_running(self, host: str) -> None:
         if (self._first if host == "first" else self._second).poll() is not None:
-            raise LaunchFailed(f"the launcher of the {host} host has ended: {' | '.join(self._says(host).splitlines()[-3:])}")
+            raise LaunchFailed(f"the launcher of the {host} host has ended: {' | '.join(self._output(host).splitlines()[-3:])}")
 
     def _is_ready(self) -> bool:
         self._require_running("first")
         self._require_running("second")
-        return "all ready" in self._says("first") and "all ready" in self._says("second")
+        return "all ready" in self._output("first") and "all ready" in self._output("second")
 
-    def _says(self, host: str) -> str:
+    def _output(self, host: str) -> str:
         return (self._folder / host / "launcher.err").read_text()
 
     def _new_keys(self) -> Path:

@@ -25,7 +25,7 @@ _ONE_THREAD = {
 
 
 class Watched(Protocol):
-    """What a launcher shows of a service, which it has started or another host."""
+    """What a launcher reports of a service that runs on this host or on another one."""
 
     @property
     def who(self) -> str:

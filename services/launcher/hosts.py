@@ -70,7 +70,7 @@ def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
 
 
 def agreement(scenario: Scenario, instance: str = "", elsewhere: Sequence[str] = ()) -> Agreement:
-    """Return what this host's launcher says about its scenario."""
+    """Return the version and the settings of this host's scenario, which another host compares with its own."""
     services = {part.who: _settings(part) for part in scenario.parts}
     return Agreement(version=mobee.__version__, instance=instance, elsewhere=tuple(elsewhere), services=services)
 

@@ -23,7 +23,7 @@ class EmergencyStops:
     """
 
     def __init__(self, service: Service, record: StopRecord | None, announce: Callable[[str], None]) -> None:
-        """`record`: None if it is on another host, that of robot_sim; `announce` is called with each line that a user should see."""
+        """`record`: of the stop, None if robot_sim runs on another host; `announce`: called with each line that a user should see."""
         self._service, self._record, self._announce = service, record, announce
         self._publisher = service.bus.publisher(EStop)
         self._waiting: Stop | None = None  # for robot_sim's confirmation

@@ -49,7 +49,7 @@ def test_a_palm_that_is_to_face_the_target_says_how_well_it_does(capsys: pytest.
     code, result = reach(*words, capsys=capsys)
     assert code == 0 and result["angle"] < np.deg2rad(5.0)
     assert main(["reach", "--offline", *words]) == 0
-    assert "deg beside the target." in capsys.readouterr().out
+    assert "deg away from the target." in capsys.readouterr().out
 
 
 def test_a_target_out_of_reach_is_reported_with_the_nearest_place(capsys: pytest.CaptureFixture[str]) -> None:
