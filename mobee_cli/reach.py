@@ -54,7 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--marker", metavar="NAME", help=text)
     parser.add_argument("--part", help="part that reaches (default: the part with the most motors that move the marker)")
     parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="radius of the target [m] (default: %(default)g)")
-    where = "bring the marker to the centre or to the surface of the target (default: centre for --target, surface for --object)"
+    where = (
+        "bring the marker to the centre or to the surface of the target (default: centre for --target, surface for --object and --facing)"
+    )
     parser.add_argument("--aim", choices=AIMS, help=where)
     parser.add_argument("--facing", action="store_true", help="turn the marker's normal, such as that of a palm, towards the target")
     parser.add_argument("--run", type=Path, metavar="RUN", help=f"folder of a run that has learned to reach, or its file {STORE}")
@@ -69,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Reach, and print the result."""
     if arguments.aim is None:
-        arguments.aim = "centre" if arguments.object is None else "surface"
+        arguments.aim = "surface" if arguments.object is not None or arguments.facing else "centre"
     try:
         with _setup(arguments) as setup:
             result = _reach(arguments, setup)

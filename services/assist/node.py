@@ -16,19 +16,19 @@ from services.common.behaviour import Behaviour, Scene
 from services.common.rate import NOT_MEASURED
 from services.common.service import Service
 
-PERIOD = 1.0  # s between two choices of a posture
+AT_REST, RESTED = 0.05, 1.0  # m/s below which the target is at rest; s for which it must be, before the torso moves
 MOVED = 0.03  # m by which the target must have moved for another choice
 
 
 class AssistNode:
-    """Moves the part slowly to the posture from which the arm reaches the target best; chooses again when the target has moved."""
+    """Moves the part slowly to where the arm reaches the target best; chooses again when the target rests in another place."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config, self._robot, self._assist = config, robot, config.assist(robot)
         self._span = robot.part(config.part).slice
         self._reference: Reference | None = None
         self._goal: Array | None = None  # (n_part,) rad
-        self._chosen_for, self._since = np.full(3, np.inf), 0.0  # m, the target's place; s since the choice
+        self._chosen_for, self._rested = np.full(3, np.inf), 0.0  # m, place of the target; s for which it has been at rest
         self._worth = NOT_MEASURED
         self._behaviour = Behaviour(service, config, robot, self._step, self._reset)
         service.mark, service.describe = self._behaviour.mark, self._describe
@@ -41,10 +41,12 @@ class AssistNode:
         near = scene.q[self._span] + LAG * scene.velocity[self._span]
         if self._reference is None:
             self._reference = Reference(self._robot, self._span, near, low, high, self._config.speed)
-        self._since += scene.dt
-        if self._goal is None or (self._since >= PERIOD and np.linalg.norm(scene.place - self._chosen_for) > MOVED):
+        if self._goal is None:
+            self._goal = near
+        self._rested = self._rested + scene.dt if np.linalg.norm(scene.place_velocity) < AT_REST else 0.0
+        if self._rested > RESTED and np.linalg.norm(scene.place - self._chosen_for) > MOVED:
             chosen = self._assist.posture(scene.q, scene.place)
-            self._goal, self._worth, self._chosen_for, self._since = chosen.q, chosen.worth, scene.place, 0.0
+            self._goal, self._worth, self._chosen_for = chosen.q, chosen.worth, scene.place
         self._reference.catch_up(self._goal, np.zeros(len(near)), near, scene.dt)
         return self._reference.q - LAG * self._reference.velocity, self._reference.velocity
 

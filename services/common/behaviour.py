@@ -61,7 +61,10 @@ class Scene:
 
 
 class Behaviour:
-    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the motion so far."""
+    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the motion so far.
+
+    While the target is stale, the part holds, or with `watches_last_place` continues as if the target were at rest in its last place.
+    """
 
     def __init__(
         self,
@@ -70,6 +73,7 @@ class Behaviour:
         robot: Robot,
         step: Callable[[Scene], tuple[Array, Array]],
         reset: Callable[[], None],
+        watches_last_place: bool = False,
     ) -> None:
         self._service, self._config, self._robot, self._step, self._reset = service, config, robot, step, reset
         self._track, self._part = TargetTrack(config.patience), FollowedPart(service, robot, config.part)
@@ -77,6 +81,8 @@ class Behaviour:
         self._last = -np.inf  # s, bus clock, of the last step
         self._seen = -np.inf  # s, bus clock, of the last step with a target
         self._hold: Array | None = None  # (n_part,) rad, where the part holds
+        self._watches_last_place = watches_last_place
+        self._last_place = np.zeros(3)  # m, of the target
         self._pause = f"no place of {config.target} yet"  # why it pauses; empty: it follows
         self._times = Percentiles()
         self.mark()
@@ -118,9 +124,9 @@ class Behaviour:
         known = self._track.at(now)
         if known is None:
             self._report(f"no place of {self._config.target} for {self._config.patience:g} s")
-            self._wait(q, now)
+            self._wait(q, now, dt)
             return
-        self._seen, self._hold = now, None
+        self._seen, self._hold, self._last_place = now, None, known[0]
         why = self._part.why_not()
         self._report(why)
         if why:
@@ -131,16 +137,19 @@ class Behaviour:
         self._steps += 1
         self._times.add(1e3 * (time.perf_counter() - begin))
 
-    def _wait(self, q: Array, now: float) -> None:
-        """Hold the part where it is, and release it when there was no target for long."""
-        self._reset()
+    def _wait(self, q: Array, now: float, dt: float) -> None:
+        """Hold the part, or keep it directed at the last place of the target; release it when there was no target for long."""
         if not self._part.is_owned:
+            self._reset()
             self._hold = None
-            return
-        if self._hold is None:
-            self._hold = q[self._robot.part(self._config.part).slice]
-        self._part.move(self._hold, np.zeros(len(self._hold)))
-        if now - self._seen > self._config.release_after:
+        elif self._watches_last_place and not self._part.why_not():
+            self._part.move(*self._step(Scene(q, self._part.velocities(), self._last_place, np.zeros(3), dt)))
+        else:
+            self._reset()
+            if self._hold is None:
+                self._hold = q[self._robot.part(self._config.part).slice]
+            self._part.move(self._hold, np.zeros(len(self._hold)))
+        if self._part.is_owned and now - self._seen > self._config.release_after:
             self._part.release()
 
     def _report(self, why: str) -> None:

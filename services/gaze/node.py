@@ -20,7 +20,7 @@ class GazeNode:
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._gaze, self._errors = config.gaze(robot), Percentiles()
-        self._behaviour = Behaviour(service, config, robot, self._step, self._gaze.reset)
+        self._behaviour = Behaviour(service, config, robot, self._step, self._gaze.reset, watches_last_place=True)
         service.mark, service.describe = self._mark, self._describe
 
     def _step(self, scene: Scene) -> tuple[Array, Array]:

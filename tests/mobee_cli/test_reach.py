@@ -45,7 +45,7 @@ def test_what_it_says_fits_together(side: str, capsys: pytest.CaptureFixture[str
 
 
 def test_a_palm_that_is_to_face_the_target_says_how_well_it_does(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--target", "-0.3", "0.2", "0.1", "--world", "none", "--aim", "surface", "--facing"]
+    words = ["--target", "-0.3", "0.2", "0.1", "--world", "none", "--facing"]
     code, result = reach(*words, capsys=capsys)
     assert code == 0 and result["angle"] < np.deg2rad(5.0)
     assert main(["reach", "--offline", *words]) == 0

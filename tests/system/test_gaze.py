@@ -19,7 +19,7 @@ from tests.system.live import PARTS, Watcher, running, until
 ROBOT = load_robot("icub")
 GAZE = Gaze(ROBOT, cameras_of(ROBOT), "head")
 FOCAL = 120.0 / np.tan(np.deg2rad(25.0))  # px
-THERE, OUT_OF_SIGHT = np.array([-0.48, 0.03, 0.1]), np.array([0.5, 0.0, 1.0])  # no hand is in front of the first
+ON_TABLE, THERE, OUT_OF_SIGHT = np.array([-0.35, 0.0, -0.07]), np.array([-0.48, 0.03, 0.1]), np.array([0.5, 0.0, 1.0])
 
 pytestmark = pytest.mark.system
 pytest.importorskip("pybullet")
@@ -35,21 +35,30 @@ def pixels(watcher: Watcher, at: np.ndarray) -> float:
     return float((FOCAL * np.hypot(seen[:, 0], seen[:, 1]) / np.maximum(seen[:, 2], 1e-6)).max())
 
 
+def leant(watcher: Watcher) -> float:
+    """The largest angle of a motor of the torso, which is upright at 0."""
+    return float(np.abs(watcher.states["torso"][-1].q).max()) if watcher.states["torso"] else 0.0
+
+
 def said(watcher: Watcher) -> list[str]:
     return [event.code for event in list(watcher.events) if event.src == "gaze"]
 
 
 def test_head_and_torso_follow_the_ball_that_vision_sees_and_pause_when_it_is_gone(tmp_path: Path) -> None:
     with running(tmp_path, "gaze") as (_, watcher):
-        upright = until(lambda: watcher.states["torso"], 10.0, "the torso reports its posture")[0].q
         until(lambda: "gaze_follows" in said(watcher), 30.0, "the ball on the table is seen")
+        until(lambda: leant(watcher) > 0.1, 30.0, "the torso leans towards the ball")
+        until(lambda: watcher.speed("torso") < 0.02, 20.0, "the torso has leant")
+        until(
+            lambda: said(watcher)[-1] == "gaze_follows" and pixels(watcher, ON_TABLE) < 15.0,
+            20.0,
+            "the ball is in the middle of both pictures",
+        )
         place(watcher, THERE)
-        assert pixels(watcher, THERE) > 40.0
-        until(lambda: pixels(watcher, THERE) < 15.0, 20.0, "the ball is in the middle of both pictures")
-        until(lambda: np.abs(np.subtract(watcher.states["torso"][-1].q, upright)).max() > 0.1, 20.0, "the torso leans towards the ball")
+        until(lambda: pixels(watcher, THERE) < 15.0, 20.0, "the ball is in the middle of both pictures at its new place")
         place(watcher, OUT_OF_SIGHT)
         until(lambda: said(watcher)[-1] == "gaze_pauses", 20.0, "the gaze pauses")
-        until(lambda: watcher.speed("head") < 0.02, 5.0, "the head holds")
+        until(lambda: watcher.speed("head") < 0.02, 5.0, "the head rests")
         assert "no place of ball" in watcher.stat("gaze").text and "no place of ball" in watcher.stat("assist").text
         place(watcher, THERE)
         until(lambda: said(watcher)[-1] == "gaze_follows", 20.0, "the ball is seen again")
