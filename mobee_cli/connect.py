@@ -10,8 +10,7 @@ from typing import Any
 
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT
-from services.common.identity import IDENTITY, KEYS, OPERATOR, BadKeys
-from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
+from services.common.identity import DEFAULT_ENDPOINT, IDENTITY, KEYS, OPERATOR, BadKeys
 
 PATIENCE = 0.3  # s: a system that runs answers at once
 
@@ -35,6 +34,8 @@ def endpoint(text: str) -> str:
 @contextmanager
 def connected(endpoint: str, patience: float = PATIENCE) -> Iterator[Any]:
     """Open a session with the running system; raises UserError if there is none within `patience` s."""
+    from services.common.session import BusUnreachable, open_client  # it needs zenoh, and `mobee doctor` works without
+
     try:
         session = open_client(endpoint, patience=patience)
     except (BusUnreachable, BadKeys) as error:

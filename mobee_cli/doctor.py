@@ -141,7 +141,7 @@ def _core() -> Finding:
 def _extra(extra: str) -> Finding:
     packages = EXTRAS[extra]
     missing = [name for package, name in packages.items() if importlib.util.find_spec(package) is None]
-    found = ", ".join(f"{name} {_version(name)}" for name in packages.values() if name not in missing)
+    found = ", ".join(_installed(package, name) for package, name in packages.items() if name not in missing)
     if not missing:
         return Finding(f"extra {extra}", "ok", found)
     text = f"{', '.join(missing)} not installed" + (f"; {found}" if found else "")
@@ -187,6 +187,13 @@ def _is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def _installed(package: str, distribution: str) -> str:
+    """Return name and version of what provides a package: the distribution, or another that is used in its place, as pybullet-arm64."""
+    if not _version(distribution):
+        distribution = next(iter(metadata.packages_distributions().get(package, ())), distribution)
+    return f"{distribution} {_version(distribution)}".strip()
 
 
 def _version(distribution: str) -> str:

@@ -15,10 +15,10 @@ from services.common.access import access_list
 from services.common.config import ServiceConfig
 from services.common.emergency_stop import StopRecord
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
-from services.common.identity import ROUTER, BadKeys, Identity, assume, default_folder, is_local, secured
+from services.common.identity import DEFAULT_ENDPOINT, ROUTER, BadKeys, Identity, assume, default_folder, is_local, secured
 from services.common.refusals import RefusalLog
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT, NAMESPACE, BusUnreachable, open_client, open_router
+from services.common.session import NAMESPACE, BusUnreachable, open_client, open_router
 from services.launcher.security import Refusals
 
 

@@ -18,10 +18,10 @@ from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, robot_given
 from services.common.config import ServiceConfig, nearest
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, OK
+from services.common.identity import DEFAULT_ENDPOINT
 from services.common.observe import alive
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.common.session import DEFAULT_ENDPOINT
 
 _JOIN = 2.0  # s until tokens and streams arrive
 _NOTES = """Run `mobee router` and your robot_sim, without a controller. The verb moves the

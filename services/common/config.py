@@ -18,7 +18,8 @@ from mobee.errors import InvalidValue
 from mobee.model.world import World
 from mobee.robot.robot import Robot
 from services.common.exit_codes import BAD_INPUT
-from services.common.session import DEFAULT_ENDPOINT, NAMESPACE
+from services.common.identity import DEFAULT_ENDPOINT
+from services.common.session import NAMESPACE
 from services.common.worlds import world_around
 
 _C = TypeVar("_C", bound=Struct)

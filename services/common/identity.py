@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The identity of a process on a secured bus: a key and a certificate in a folder of keys, named by two environment variables."""
+"""The address of the bus, and the identity of a process on a secured one: a key and a certificate that environment variables name."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from mobee.errors import MobeeError
 KEYS, IDENTITY = "MOBEE_KEYS", "MOBEE_IDENTITY"
 """Environment variables: the folder of keys, and the name of the identity in it; without the first the connection is not secured."""
 
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"  # of the router
 OPERATOR = "operator"  # the identity of the commands at a terminal, unless another is named
 ROUTER = "router"  # the only identity that a process may listen with
 AUTHORITY = "ca"

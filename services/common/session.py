@@ -18,7 +18,6 @@ from services.common.identity import LONGEST_SOCKET, Identity, is_local, secured
 
 Session = zenoh.Session  # for modules that do not import zenoh
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 NAMESPACE = "icub"  # of the robot itself
 LEASE = 1.0  # s
 _MOST_CONNECTIONS = 10_000  # of a router

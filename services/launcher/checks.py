@@ -19,7 +19,8 @@ from mobee.errors import MobeeError, OlderVersion, Simplified, UnknownName
 from mobee.robot.robot import Robot
 from services.common import rpc
 from services.common.config import ConfigError, nearest
-from services.common.session import DEFAULT_ENDPOINT, BusUnreachable, open_client
+from services.common.identity import DEFAULT_ENDPOINT
+from services.common.session import BusUnreachable, open_client
 from services.common.worlds import NO_WORLD
 from services.launcher.scenario import Part, Scenario
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from services.common.config import ConfigError
-from services.common.identity import assume, is_local, secured
+from services.common.identity import DEFAULT_ENDPOINT, assume, is_local, secured
 from services.common.refusals import RefusalLog
 from services.common.session import (
-    DEFAULT_ENDPOINT,
     LEASE,
     BusUnreachable,
     Session,

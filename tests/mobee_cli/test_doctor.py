@@ -6,6 +6,7 @@ import json
 import shutil
 import socket
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,15 @@ def test_a_missing_package_is_wrong_if_launch_needs_it(
     assert found["extra sim"]["verdict"] == "note" and "MuJoCo moves the iCub too" in found["extra sim"]["remedy"]
     assert (found["extra viz"]["verdict"], found["extra viz"]["remedy"]) == ("wrong", 'pip install "mobee[viz]"')
     assert (found["extra planning"]["verdict"], found["extra planning"]["found"]) == ("note", "ompl not installed")
+
+
+def test_without_the_extra_live_doctor_names_the_command_that_installs_it() -> None:
+    absent = "sys.modules['zenoh'] = sys.modules['msgspec'] = None"
+    program = f"import sys; {absent}; from mobee_cli.__main__ import main; sys.exit(main(['doctor', '--json']))"
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    found = {one["subject"]: one for one in json.loads(ended.stdout)}
+    assert (ended.returncode, found["extra live"]["remedy"]) == (3, 'pip install "mobee[live]"')
+    assert found["systems"]["found"] == "not known without msgspec"
 
 
 def test_a_port_in_use_and_a_core_that_is_missing_are_wrong(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
