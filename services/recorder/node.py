@@ -26,7 +26,7 @@ from services.recorder.views import Views
 PERIOD = 0.25  # s between two checks for new messages; the time of the check is stored as the time of receipt
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
-CAPACITY = 20_000  # messages of each stream that wait while this process gets no processor; the oldest of more are lost
+CAPACITY, LOCKED_CAPACITY = 5000, 20_000  # messages of each stream that wait, live and in lockstep; of more the oldest are lost
 KNOWN = 5000  # keys and senders that are remembered; a sender may invent more
 TRIM_PERIOD = 10.0  # s between two returns of free memory: a flood of messages leaves 100 MB of it
 NICENESS = 10
@@ -77,7 +77,7 @@ class RecorderNode:
         self._failed_at = self._flushed = 0.0  # monotonic clock
         self._trouble = ""
         self._last: dict[tuple[str, str], int] = {}  # number of the last message of each key and sender
-        self._tap = Tap(service.bus.session, recorded_keys(config.everything), CAPACITY)
+        self._tap = Tap(service.bus.session, recorded_keys(config.everything), LOCKED_CAPACITY if service.locked else CAPACITY)
         service.describe, service.mark = self._describe, self._mark
         self._mark()
         service.on_alive(self._note_token)

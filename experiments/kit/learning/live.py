@@ -130,6 +130,17 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
             raise LaunchFailed(f"{folder}: {_MAX_IDLE} launches in a row made no transition; see their logs in {folder / 'launches'}")
 
 
+def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
+    """Return the first `number` transitions of each part that were learned live, as `learn_offline` returns them."""
+    values: dict[str, Any] = {}
+    for part in TASKS[task].parts:
+        with TransitionStore(folder / STORE, part, read_only=True) as store:
+            made = store.load()[:number]
+        values[f"seen_{part}"] = np.array([(one.s, one.a, one.s_next) for one in made], dtype=np.int32)
+        values[f"touched_{part}"] = np.array([bool(one.touched) for one in made])
+    return values
+
+
 def _made(folder: Path, task: str) -> dict[str, int]:
     """Return the number of transitions of each part in the store."""
     path = folder / STORE
