@@ -17,6 +17,7 @@ hand's path at the same speed.
 A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
 only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.
 The judge uses the simulator's joints, not the encoders: the position of the palm when the force ended, or when the planner had finished.
+The learner makes the same tries on the offline plant too.
 The time to the first motion is measured with ticks of 2 ms, from the tick of the request to the first tick with another command.
 """
 
@@ -31,6 +32,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.claims.ch8_reaching.live_reach.contestants import learned_offline
 from experiments.claims.ch8_reaching.live_reach.problems import (
     AIM,
     FRESH,
@@ -65,10 +67,11 @@ from mobee.store import STORE
 TRIES, LIVE_TRIES, FRESH_TARGETS, MOVING_OBJECTS = 800, 54, 50, 8
 TRIES_PER_LAUNCH = 27
 FAST_RATE, TIMED_REACHES = 500.0, 10  # Hz of the launch in which first motions are timed, and their number
-CONTESTANTS, MOVING = ("learner", "peer"), "moving"
-NAMES = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE"}
+CONTESTANTS, OFFLINE, MOVING = ("learner", "peer"), "offline", "moving"
+NAMES = {"learner": "learned reacher", "peer": "IK + RRT-Connect through MoBeE", OFFLINE: "learned reacher, offline plant"}
 MIN_SUCCESS = {GRID: 0.95, FRESH: 0.9}
 WORSE = 0.05  # of success, by which the learner may be below the planner
+SAME = 0.05  # of success, within which live and offline tries are equivalent
 MAX_FIRST_MOTION = 5e-3  # s
 MIN_TRIES = 20  # from which there is a verdict
 COLORS = {"learner": "tab:red", "peer": "tab:blue"}
@@ -144,7 +147,7 @@ def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, floa
     for first in range(0, sizes.live, TRIES_PER_LAUNCH):
         yield f"refine-{first:03}", Job("refine", seed, store, tries=sizes.tries + min(first + TRIES_PER_LAUNCH, sizes.live)), RATE
     pieces = [grid, *(fresh[i : i + TRIES_PER_LAUNCH] for i in range(0, len(fresh), TRIES_PER_LAUNCH))]
-    for contestant in ("learner", "peer"):
+    for contestant in ("learner", "offline", "peer"):
         for number, piece in enumerate(pieces):
             yield f"{contestant}-{number}", Job(contestant, seed, store, piece), RATE
     yield "moving", Job("moving", seed, store, moving_problems(seed, sizes.moving)), RATE
@@ -152,7 +155,12 @@ def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, floa
 
 
 def _do(folder: Path, job: Job, seed: int, rate: float, backend: str) -> None:
-    if not (folder / BLOCK).exists():
+    if (folder / BLOCK).exists():
+        return
+    if job.kind == "offline":
+        folder.mkdir(exist_ok=True)
+        write_block(folder, learned_offline(job))
+    else:
         repeatable = perform(folder, job, seed, rate, backend)
         write_block(folder, measure(folder, job, rate, repeatable))
         (folder / POSITIONS).unlink()
@@ -290,7 +298,21 @@ def no_worse(runs: Runs) -> Measured:
     return text, decides(interval(lead, lambda drawn: np.asarray(drawn.mean(axis=-1))), least=-WORSE)
 
 
-CLAIMS = (reaches_grid, reaches_new, harmless, quick, no_worse)
+@claim(
+    OUR_AIM,
+    f"{_LIVE} succeeds as often as on the offline plant, from the same poses: difference of the shares of tries within {SAME}",
+    "equivalent",
+)
+def as_offline(runs: Runs) -> Measured:
+    made = {name: runs.tries(name, GRID) + runs.tries(name, FRESH) for name in (CONTESTANTS[0], OFFLINE)}
+    live, offline = (np.array([tried.success for tried in tries], dtype=float) for tries in made.values())
+    text = "; ".join(f"{NAMES[name]} {share(tries)}" for name, tries in made.items())
+    if len(live) < MIN_TRIES or len(live) != len(offline):
+        return text, None
+    return text, decides(interval(live - offline, lambda drawn: np.asarray(drawn.mean(axis=-1))), -SAME, SAME)
+
+
+CLAIMS = (reaches_grid, reaches_new, harmless, quick, no_worse, as_offline)
 
 
 def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:
@@ -302,7 +324,7 @@ def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, 
     }
     sets |= {TARGET_MOVES: (TARGET_MOVES, None), OBSTACLE_MOVES: (OBSTACLE_MOVES, None)}
     rows = []
-    for contestant in (*CONTESTANTS, MOVING):
+    for contestant in (*CONTESTANTS, OFFLINE, MOVING):
         for name, (kind, numbers) in sets.items():
             tries = tries_of(blocks, contestant, kind, numbers)
             if tries:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A block of tries on the live robot: by the learner (which may continue to learn), by the planner, or by the reach alone.
 
+`learned_offline` makes the learner's tries on the offline plant, for comparison.
+
 The launched performer calls `perform` (experiments/kit/live/performer).  It reads {part}/motion, {part}/reach and commands, and calls
 {part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
 """
@@ -28,8 +30,9 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
     belief,
     grid_targets,
     learner,
+    offline_plant,
 )
-from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried
+from experiments.claims.ch8_reaching.live_reach.tries import Block, Job, Judged, Tried
 from experiments.kit.live.launch import append_done, read_job
 from experiments.kit.reaching.arm import MARKER, PART
 from experiments.kit.reaching.learning import Course
@@ -146,6 +149,45 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
         there = mover.at(ends[-1]).tolist() if problem.kind == TARGET_MOVES else None
         mover.stop()
     return Ended(ends, course.actions + len(ends), missing, course.thinking, there=there)
+
+
+def learned_offline(job: Job) -> Block:
+    """Make the tries of `learned` on the offline plant, with the learner that was refined live."""
+    plant, tries = offline_plant(job.seed), list[Judged]()
+    agent = load_reaches(job.store, plant, PART)
+    for problem in job.problems:
+        start, target = np.array(problem.start), problem.target
+        plant.present(None)
+        plant.act(PART, plant.robot.home[plant.robot.part(PART).slice])
+        off = float(np.abs(plant.act(PART, start).q - start)[:WRIST].max())
+        plant.present(target)
+        rng = np.random.default_rng([job.seed, problem.number])
+        course = Course(plant, agent, agent.predictor.mean, partial(np.array, problem.position), rng, MIN_STATE_DISTANCE)
+        begin, reaches, missing = plant.time, 0, np.inf
+        while reaches < REACHES and missing > SUCCESS_DISTANCE:
+            course.go()
+            missing = plant.reach(PART, MARKER).missing
+            reaches += 1
+            course.missed()
+        tries.append(
+            Judged(
+                kind=problem.kind,
+                number=problem.number,
+                position=problem.position,
+                off=missing,
+                success=missing <= SUCCESS_DISTANCE,
+                seconds=plant.time - begin,
+                actions=course.actions + reaches,
+                reaches=reaches,
+                thinking=course.thinking,
+                deep=[],
+                begun_off=off,
+                why="",
+                first=-1,
+                first_motion=-1,
+            )
+        )
+    return Block("offline", RATE, plant.time, True, tries, [])
 
 
 def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], Array]:

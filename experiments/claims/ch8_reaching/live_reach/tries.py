@@ -40,7 +40,7 @@ STILL = 20  # ticks before a request in which the motion of joints at rest is me
 MOVED = 1e-5  # rad beyond the motion at rest, from which a joint moves
 NAMED_CONTACTS = 2  # the deepest contacts, which a miss names
 
-Kind = Literal["refine", "learner", "peer", "moving", "first motion"]
+Kind = Literal["refine", "learner", "peer", "offline", "moving", "first motion"]
 
 
 class Job(Struct, frozen=True):
