@@ -15,6 +15,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.snapshot import EMPTY, Snapshot, changed, extended, shortened
 from mobee.model.world_object import (
+    FRICTION,
     Color,
     Geometry,
     Role,
@@ -22,6 +23,8 @@ from mobee.model.world_object import (
     placed,
     seen_from,
     valid_color,
+    valid_friction,
+    valid_mass,
     valid_name,
     valid_position,
     valid_role,
@@ -80,12 +83,21 @@ class World:
         rotation: ArrayLike | None = None,
         role: Role = "obstacle",
         color: Sequence[float] | None = None,
+        mass: float | None = None,
+        friction: float = FRICTION,
     ) -> None:
-        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken or empty."""
+        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken or empty.
+
+        `mass`: kg, of an object that MuJoCo moves when it is pushed, with this coefficient of `friction`; None: it does not move. The
+        model and the offline plant use neither: to them every object is where it was put.
+        """
         valid_name(name)
         volume, at = valid_shape(name, shape), valid_position(name, position)
         turn = np.eye(3) if rotation is None else valid_rotation(name, rotation)
-        new = WorldObject(name, volume.kind, volume.size, at, turn, valid_role(name, role), valid_color(name, color))
+        new = WorldObject(
+            name, volume.kind, volume.size, at, turn, valid_role(name, role), valid_color(name, color),
+            mass=valid_mass(name, mass), friction=valid_friction(name, friction),
+        )  # fmt: skip
         with self._lock:
             if name in self._snapshot.objects:
                 raise InvalidValue(f"world object {name!r} exists already; move or remove it, or choose another name.")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mobee.errors import InvalidValue
 from mobee.model.world import Role, World
-from mobee.model.world_object import Geometry
+from mobee.model.world_object import FRICTION, Geometry
 from mobee.robot.load import ROBOTS, find_file, shipped
 from mobee.robot.xml.node import Node, nearest, read_xml
 from mobee.robot.xml.versions import WORLD_TAGS, report, upgrade_world
@@ -42,7 +42,7 @@ def read_world(path: Path) -> World:
         if node.tag not in VOLUME_TAGS:
             _warn_unknown(node)
             continue
-        node.check_attributes(VOLUME_TAGS[node.tag] | {"name", "role", "color"})
+        node.check_attributes(VOLUME_TAGS[node.tag] | {"name", "role", "color", "mass", "friction"})
         _add(world, node)
         for child in node:
             if child.tag in VOLUME_TAGS:
@@ -61,10 +61,13 @@ def _add(world: World, node: Node) -> None:
         node.fail("name", f"a second object {name!r}", "Rename one of the two")
     role = ROLES[node.choice("role", node.attributes.get("role", "obstacle"), ROLES, "role")]
     geometry, color = Geometry(volume.kind, volume.size), _color(node)
+    mass, friction = node.positive("mass", unit="kg") if "mass" in node.attributes else None, node.number("friction", FRICTION)
+    if "friction" in node.attributes and mass is None:
+        node.warn("friction is ignored: it counts for an object that moves, which has a mass")
     try:
-        world.add(name, geometry, position=volume.centre, rotation=volume.rotation, role=role, color=color)
+        world.add(name, geometry, position=volume.centre, rotation=volume.rotation, role=role, color=color, mass=mass, friction=friction)
     except InvalidValue as error:
-        node.fail("size or place", str(error).rstrip("."), "Lengths are in metres")
+        node.fail("size or place", str(error).rstrip("."), "Lengths are in metres, masses in kg")
 
 
 def _color(node: Node) -> list[float] | None:

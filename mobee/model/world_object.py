@@ -65,6 +65,8 @@ def _lengths(kind: str, **given: float) -> tuple[float, ...]:
 Role = Literal["obstacle", "target", "ghost"]
 Color = tuple[float, float, float, float]
 
+FRICTION = 0.5  # of objects that do not state theirs
+HEAVIEST, ROUGHEST = 1e4, 10.0  # kg, and the largest coefficient of friction, that are taken for numbers that somebody meant
 LENGTHS: dict[ShapeKind, int] = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}
 _MAX_LENGTH_ERROR, _MAX_SKEW = 1.1e-5, 1e-6  # of a rotation: of the squares of its rows, which are 1, and of products of two rows
 
@@ -84,6 +86,13 @@ class WorldObject:
     role: Role = "obstacle"
     color: Color | None = None  # red, green, blue, opacity in 0..1
     link: str | None = None
+    mass: float | None = None  # kg, of an object that moves in a physics engine when it is pushed; None: it does not move
+    friction: float = FRICTION  # coefficient, of an object with a mass, at everything that it touches
+
+    @property
+    def movable(self) -> bool:
+        """Whether a physics engine moves it: it can be pushed, lifted and knocked over."""
+        return self.mass is not None
 
 
 def placed(thing: WorldObject, link_pose: Array) -> WorldObject:
@@ -160,6 +169,24 @@ def valid_role(name: str, role: Role) -> Role:
     if role not in get_args(Role):
         raise InvalidValue(f"world object {name!r}: role {role!r}; valid: {', '.join(get_args(Role))}.")
     return role
+
+
+def valid_mass(name: str, mass: float | None) -> float | None:
+    """Return the mass [kg], None for an object that does not move; raises InvalidValue unless it is above 0 and at most 10 t."""
+    if mass is not None and not (_is_number(mass) and 0.0 < mass <= HEAVIEST):
+        raise InvalidValue(f"world object {name!r}: mass {mass!r}; it must be above 0 and at most {HEAVIEST:g} kg.")
+    return None if mass is None else float(mass)
+
+
+def valid_friction(name: str, friction: float) -> float:
+    """Return the coefficient of friction; raises InvalidValue unless it is 0 to 10."""
+    if not (_is_number(friction) and 0.0 <= friction <= ROUGHEST):
+        raise InvalidValue(f"world object {name!r}: friction {friction!r}; it must be a coefficient of 0 to {ROUGHEST:g}.")
+    return float(friction)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def valid_color(name: str, given: Sequence[float] | None) -> Color | None:

@@ -14,7 +14,7 @@ from mobee.model.world import World
 from mobee.robot.robot import Robot
 
 _WITHOUT_EFFECT = ("where", "untested", "visuals", "cameras")  # fields of a robot that change nothing that it does
-_APPEARANCE = ("name", "color")  # fields of a world object; the name is its key
+_NO_MATTER = ("name", "color", "mass", "friction")  # fields of a world object; the name is its key, and no object moves on this plant
 _ADDED_LATER = ("zone_ends_at_home", "least_lever")  # fields of a motor or robot that are left out if 0, so that robots keep their digests
 DIGITS = 9  # decimals of lengths and angles: the same file read on another machine gives the same digest
 
@@ -25,7 +25,7 @@ def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
     content = {name: _plain(value) for name, value in held.items() if name not in _ADDED_LATER or value}
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
     objects = {
-        name: {entry.name: _plain(getattr(item, entry.name)) for entry in fields(item) if entry.name not in _APPEARANCE}
+        name: {entry.name: _plain(getattr(item, entry.name)) for entry in fields(item) if entry.name not in _NO_MATTER}
         for name, item in world.objects.items()
     }
     options = {key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value for key, value in more.items()}

@@ -14,7 +14,7 @@ from mobee.robot.robot import Robot
 from mobee.simulation.motors import MotorParameters, Motors
 from services.robot_sim.bullet_scene import BulletScene, load_solid_pairs
 from services.robot_sim.bullet_torque import Gears, Mask, Share
-from services.robot_sim.kinematic import GAP_LINKS, MAX_GAP, SolidContact
+from services.robot_sim.kinematic import GAP_LINKS, MAX_GAP, SolidContact, unmoved
 
 NO_CONTACT = SolidContact()
 
@@ -28,7 +28,6 @@ class BulletBackend:
     """
 
     name = "pybullet"
-    notes: Sequence[str] = ()
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """`dt`: the tick, s.  Raises BackendUnavailable or MobeeError."""
@@ -74,6 +73,7 @@ class BulletBackend:
 
     def _build(self, seed: int) -> None:
         self.world = self._load_world()
+        self.notes: Sequence[str] = unmoved(self.world)
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self._scene = scene = BulletScene(self._robot, self.world, self._substep)
         scene.set_posture(self._robot.home)

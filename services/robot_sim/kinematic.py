@@ -40,6 +40,12 @@ def require_simulated(robot: Robot) -> None:
         )
 
 
+def unmoved(world: World) -> tuple[str, ...]:
+    """Return the note of a back-end that moves no object about the movable ones of a world."""
+    names = ", ".join(name for name, thing in world.objects.items() if thing.movable)
+    return (f'objects with a mass do not move here when they are pushed ({names}): backend = "mujoco" moves them',) if names else ()
+
+
 class Backend(Protocol):
     """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
 
@@ -88,7 +94,6 @@ class KinematicBackend:
     """The motor model alone: joints follow their motors exactly."""
 
     name = "kinematic"
-    notes: Sequence[str] = ()
     pairs_watched = 0
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int) -> None:
@@ -99,6 +104,7 @@ class KinematicBackend:
         """Set the home posture, at rest, in hold, and the world in its initial state."""
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
+        self.notes: Sequence[str] = unmoved(self.world)
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s]."""

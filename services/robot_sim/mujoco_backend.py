@@ -44,12 +44,12 @@ class MujocoBackend:
 
     def reset(self, seed: int) -> None:
         """Set the home posture, at rest, in hold, and the world in its initial state."""
-        self.world = self._load_world()
+        self._world = self._load_world()
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
-        self._scene = MujocoScene(self._robot, self.world, self._substep)
+        self._scene = MujocoScene(self._robot, self._world, self._substep)
         self.pairs_watched = self._scene.pairs_watched
         self.notes: Sequence[str] = self._scene.notes
-        self._obstacles = [name for name, thing in self.world.objects.items() if thing.role == "obstacle"]
+        self._obstacles = [name for name, thing in self._world.objects.items() if thing.role == "obstacle"]
         self._untouchable = {*self._robot.links, *self._obstacles}  # the ball is there to be touched
         self._pull = (
             self._scene.data.efc_KBIP[self._scene.rows, 1] * self._scene.scale
@@ -57,6 +57,14 @@ class MujocoBackend:
         self._geared = np.zeros(len(self._robot.motors), dtype=np.bool_)
         self._some_geared = False
         self._deepest: dict[str, float] = {}  # m, by pair, in the last tick
+
+    @property
+    def world(self) -> World:
+        """The objects where they are now: those that are movable as the physics has moved them."""
+        for name in self._scene.movable:
+            position, rotation = self._scene.pose_of(name)
+            self._world.move(name, position=position, rotation=rotation)
+        return self._world
 
     def step(self, dt: float) -> None:
         """Advance by a tick of dt [s], the same as at the start."""
@@ -69,8 +77,8 @@ class MujocoBackend:
                     self._deepest[name] = max(depth, self._deepest.get(name, 0.0))
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (3,), m; raises MobeeError."""
-        self.world.move(name, position=position)
+        """Move a world object to a position (3,), m; a movable one is set down there, at rest, turned as in its file; raises MobeeError."""
+        self._world.move(name, position=position)
         self._scene.move(name, position)
 
     def contact(self) -> SolidContact:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import mujoco
@@ -12,8 +13,8 @@ import numpy as np
 from mobee import Model
 from mobee.arrays import Array, Ints
 from mobee.control.law import INERTIA
-from mobee.model.kinematics import quaternion_from_matrix
-from mobee.model.world import World
+from mobee.model.kinematics import matrix_from_quaternion, quaternion_from_matrix
+from mobee.model.world import World, WorldObject
 from mobee.robot.bodies import WATER_DENSITY, ball_of_water, can_be
 from mobee.robot.robot import Body, Motor, Robot
 from services.robot_sim.mujoco_spec import add_tree, add_volume, joint_name
@@ -22,7 +23,9 @@ GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
 NEGLIGIBLE = 1e-6  # kg, of a link without mass in a robot with masses: what carries the link includes its weight
 HARDEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of motors, couplings and stops: as hard as MuJoCo allows
 SOLID = (0.1, 0.99, 0.0005, 0.5, 2.0)  # solimp of contacts: harder with the depth, within 0.5 mm, so that a pressing hand comes to rest
-FRICTION = (0.5, 0.5, 0.0, 0.0, 0.0)  # of contacts, as PyBullet's
+FRICTION = 0.5  # of contacts that no movable object takes part in, as PyBullet's
+SPIN, ROLL = 0.003, 0.0003  # m, friction against turning about the normal and against rolling, of movable objects, for a coefficient of 1
+SLIP = 10.0  # MuJoCo's impratio where something is movable: friction is so much harder than the normal that what is gripped does not creep
 ARENA = 64 * 2**20  # bytes; holds some 100 000 contacts, so that none is left out
 
 GeomPair = tuple[str, str]
@@ -42,7 +45,7 @@ class MujocoScene:
         self._robot, self._substep = robot, substep
         self.left_out = touching_at_home(robot, world)
         """Pairs of names that touch at home, with the depth in m; they are not tested."""
-        spec = _options(substep)
+        spec = _options(substep, any(_moves(thing) for thing in world.objects.values()))
         bodies, origins = add_tree(spec, robot, self._weigh)
         for index, shape in enumerate(robot.shapes):
             if shape.role == "solid":
@@ -50,11 +53,13 @@ class MujocoScene:
                 geom.contype = geom.conaffinity = 0  # only the pairs below are tested
                 geom.density = WATER_DENSITY  # counts where `_weigh` gives the link no mass
         for name, thing in world.objects.items():
-            body = spec.worldbody.add_body(
-                name=_of_object(name), mocap=True, pos=thing.position, quat=quaternion_from_matrix(thing.rotation)
-            )
+            pose = {"pos": thing.position, "quat": quaternion_from_matrix(thing.rotation)}
+            body = spec.worldbody.add_body(name=_of_object(name), mocap=not _moves(thing), **pose)
             geom = add_volume(spec, body, _of_object(name), thing, np.zeros(3))
             geom.quat, geom.contype, geom.conaffinity = (1.0, 0.0, 0.0, 0.0), 0, 0
+            if _moves(thing):
+                geom.mass = thing.mass
+                body.add_freejoint()
         self.pairs_watched = self._add_pairs(spec, world)
         joints = [max(motor.joints, key=lambda one: abs(one[1])) for motor in robot.motor_table]
         self.scale, self.offset = np.array([scale for _, scale, _ in joints]), np.array([offset for _, _, offset in joints])
@@ -83,9 +88,25 @@ class MujocoScene:
         return q
 
     def move(self, name: str, position: Iterable[float]) -> None:
-        """Move a world object to a position (3,), m."""
-        self.data.mocap_pos[self._mocap[name]] = tuple(position)
+        """Move a world object to a position (3,), m; a movable one is at rest there, turned as in the world's file."""
+        if name in self._mocap:
+            self.data.mocap_pos[self._mocap[name]] = tuple(position)
+        else:
+            joint = self._free[name]
+            qpos, dof = joint.qposadr[0], joint.dofadr[0]
+            self.data.qpos[qpos : qpos + 7] = (*position, *self.model.qpos0[qpos + 3 : qpos + 7])
+            self.data.qvel[dof : dof + 6] = 0.0
         self.refresh()
+
+    @property
+    def movable(self) -> Iterable[str]:
+        """The objects that move when they are pushed."""
+        return self._free.keys()
+
+    def pose_of(self, name: str) -> tuple[Array, Array]:
+        """Return position (3,) m and rotation (3, 3) of a movable object."""
+        at = self._free[name].qposadr[0]
+        return self.data.qpos[at : at + 3].copy(), matrix_from_quaternion(self.data.qpos[at + 3 : at + 7])
 
     def set_gear(self, motor: Motor, inertia: float, friction: float) -> None:
         """Set the inertia [kg m^2] and the viscous friction [N m s/rad] of a motor behind its gear; `refresh` must follow."""
@@ -95,13 +116,16 @@ class MujocoScene:
             self.model.dof_damping[dof] = _share(friction, motor, scale)
 
     def contacts(self) -> Mapping[tuple[str, str], float]:
-        """Return the depth [m] of each pair that overlaps, at its deepest point, by the sorted names of its links or objects."""
+        """Return the depth [m] of each pair that overlaps, at its deepest point, by the sorted names of its links or objects.
+
+        Pairs of two objects are left out.
+        """
         data, found = self.data, dict[tuple[str, str], float]()
         if data.ncon == 0:
             return found
         contact = data.contact
         for (first, second), distance in zip(contact.geom.tolist(), contact.dist.tolist(), strict=True):
-            if distance < 0.0:
+            if distance < 0.0 and not (first in self._objects and second in self._objects):
                 one, other = self._names[first], self._names[second]
                 pair = (one, other) if one < other else (other, one)
                 found[pair] = max(-distance, found.get(pair, 0.0))
@@ -147,22 +171,30 @@ class MujocoScene:
 
     def _add_pairs(self, spec: Any, world: World) -> int:
         """Add the pairs of geoms that are tested for contact; returns how many pairs of links, or of link and object, they belong to."""
-        robot, watched = self._robot, set()
+        robot, watched, solid = self._robot, set(), [thing for thing in world.objects.values() if thing.role != "ghost"]
         for first, second in robot.solid_pairs.tolist():
             links = robot.links[robot.shapes[first].link], robot.links[robot.shapes[second].link]
-            self._add_pair(spec, (_of_shape(first), _of_shape(second)), (robot.shapes[first].name, robot.shapes[second].name))
+            self._add_pair(spec, (_of_shape(first), _of_shape(second)), (robot.shapes[first].name, robot.shapes[second].name), ())
             watched.add(frozenset(links))
         for index, shape in enumerate(robot.shapes):
             if shape.role == "solid" and index not in robot.base_shapes:
-                for name, thing in world.objects.items():
-                    if thing.role != "ghost":
-                        self._add_pair(spec, (_of_shape(index), _of_object(name)), (shape.name, name))
-                        watched.add(frozenset((robot.links[shape.link], name)))
+                for thing in solid:
+                    self._add_pair(spec, (_of_shape(index), _of_object(thing.name)), (shape.name, thing.name), (thing,))
+                    watched.add(frozenset((robot.links[shape.link], thing.name)))
+        for thing, other in combinations(solid, 2):
+            if _moves(thing) or _moves(other):
+                self._add_pair(spec, (_of_object(thing.name), _of_object(other.name)), (thing.name, other.name), (thing, other))
         return len(watched)
 
-    def _add_pair(self, spec: Any, geoms: GeomPair, names: GeomPair) -> None:
-        if frozenset(names) not in self.left_out:
-            spec.add_pair(geomname1=geoms[0], geomname2=geoms[1], condim=3, friction=FRICTION, solref=self._soonest, solimp=SOLID)
+    def _add_pair(self, spec: Any, geoms: GeomPair, names: GeomPair, things: Sequence[WorldObject]) -> None:
+        """`things`: the objects of the pair; of two that move, the rougher one determines the friction."""
+        if frozenset(names) in self.left_out:
+            return
+        rough = max((thing.friction for thing in things if _moves(thing)), default=None)
+        friction = (FRICTION, FRICTION, 0.0, 0.0, 0.0) if rough is None else (rough, rough, SPIN * rough, ROLL * rough, ROLL * rough)
+        spec.add_pair(
+            geomname1=geoms[0], geomname2=geoms[1], condim=3 if rough is None else 6, friction=friction, solref=self._soonest, solimp=SOLID
+        )
 
     @property
     def _soonest(self) -> tuple[float, float]:
@@ -192,8 +224,11 @@ class MujocoScene:
         self.dofs: Ints = self._all_dofs[joints]
         self.rows: Ints = np.empty(len(joints), dtype=np.intp)
         self.rows[np.argsort(self.dofs)] = model.neq + np.arange(len(joints))  # MuJoCo's order: equalities, then friction by dof
-        self._mocap = {name: int(model.body(_of_object(name)).mocapid[0]) for name in world.objects}
+        bodies = {name: model.body(_of_object(name)) for name in world.objects}
+        self._mocap = {name: int(body.mocapid[0]) for name, body in bodies.items() if body.mocapid[0] >= 0}
+        self._free = {name: model.jnt(int(body.jntadr[0])) for name, body in bodies.items() if body.mocapid[0] < 0}
         self._names: dict[int, str] = {model.geom(_of_object(name)).id: name for name in world.objects}
+        self._objects = frozenset(self._names)
         self._solids: dict[str, list[int]] = {}
         for index, shape in enumerate(robot.shapes):
             if shape.role == "solid":
@@ -218,13 +253,20 @@ def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
     return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 
 
-def _options(substep: float) -> Any:
+def _moves(thing: WorldObject) -> bool:
+    """Return whether an object moves when it is pushed; nothing touches a ghost, so it would fall."""
+    return thing.movable and thing.role != "ghost"
+
+
+def _options(substep: float, something_moves: bool) -> Any:
     spec = mujoco.MjSpec()
     spec.memory, spec.compiler.degree = ARENA, False
     spec.compiler.boundmass, spec.compiler.boundinertia = NEGLIGIBLE, ball_of_water(NEGLIGIBLE)[0, 0]  # of a link with tiny solids
     option, flag = spec.option, mujoco.mjtDisableBit
     option.timestep, option.gravity = substep, GRAVITY
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    if something_moves:
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, SLIP
     option.disableflags |= int(flag.mjDSBL_AUTORESET | flag.mjDSBL_ISLAND)  # the watch reports positions that are not finite
     return spec
 

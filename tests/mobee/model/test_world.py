@@ -76,9 +76,12 @@ def test_names_are_unique_and_errors_name_the_nearest(world):
         ({"rotation": np.diag([1.0, 1.0, -1.0])}, "rotation matrix"),
         ({"role": "enemy"}, "obstacle, target, ghost"),
         ({"color": (255, 0, 0)}, "each 0 to 1"),
+        ({"mass": 0.0}, "above 0 and at most 10000 kg"),
+        ({"mass": float("nan")}, "above 0 and at most 10000 kg"),
+        ({"mass": 1.0, "friction": -0.1}, "coefficient of 0 to 10"),
     ],
 )
-def test_an_invalid_pose_role_or_color_is_refused(world, given, complaint):
+def test_an_invalid_pose_role_color_or_mass_is_refused(world, given, complaint):
     with pytest.raises(mobee.InvalidValue, match=complaint):
         world.add("thing", mobee.sphere(0.1), **given)
     assert list(world.objects) == ["cup"]

@@ -35,6 +35,14 @@ def test_the_world_of_2014_keeps_its_numbers() -> None:
     assert objects["table"].size == (1, 1.5, 0.001)
 
 
+def test_an_object_with_a_mass_is_movable(tmp_path: Path) -> None:
+    path = written(tmp_path, '<sphere name="a" radius="1" mass="0.2" friction="0.8"/>', '<sphere name="b" radius="1" friction="0.8"/>')
+    with pytest.warns(UserWarning, match="friction is ignored"):
+        objects = read_world(path).objects
+    assert (objects["a"].movable, objects["a"].mass, objects["a"].friction) == (True, 0.2, 0.8)
+    assert not objects["b"].movable
+
+
 def test_two_worlds_do_not_share_their_objects() -> None:
     first, second = load_world("table"), load_world("table")
     first.remove("ball")
@@ -46,6 +54,8 @@ BAD = {
     "name": ('<sphere radius="1"/>', "<sphere> name: is required and missing"),
     "twice": ('<sphere name="a" radius="1"/><sphere name="a" radius="1"/>', "<sphere> name: a second object 'a'"),
     "colour": ('<sphere name="a" radius="1" color="1 0 2"/>', "<sphere> color: '1 0 2' is no colour"),
+    "mass": ('<sphere name="a" radius="1" mass="-1"/>', "<sphere> mass: -1 is not positive"),
+    "friction": ('<sphere name="a" radius="1" mass="1" friction="-1"/>', "<sphere> size or place: world object 'a': friction -1.0"),
     "size": ('<sphere name="a" radius="0"/>', "<sphere> radius: 0 is not positive"),
 }
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mobee import Model
+from mobee.model import World, cylinder
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
@@ -58,6 +59,20 @@ def test_every_motor_follows_a_velocity(engine: Engine) -> None:
     run(backend, 50)
     moved = backend.motors.q - before
     assert moved == pytest.approx(0.05 * np.sign(velocity), abs=0.002)
+
+
+def test_only_mujoco_moves_what_is_movable_and_the_other_says_so(engine: Engine) -> None:
+    def world() -> World:
+        world = World()
+        world.add("cup", cylinder(0.03, 0.1), position=(-0.4, 0.0, 0.5), mass=0.1)
+        return world
+
+    body = engine(ROBOT, world, MotorParameters(), 0, DT)
+    for _ in range(10):
+        body.step(DT)
+    falls = body.world.objects["cup"].position[2] < 0.49
+    assert falls == (body.name == "mujoco")
+    assert falls != any("do not move here when they are pushed (cup)" in note for note in body.notes)
 
 
 def test_a_limit_is_not_passed(engine: Engine) -> None:

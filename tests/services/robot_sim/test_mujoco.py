@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mobee import Model
-from mobee.model import World, sphere
+from mobee.model import World, box, cylinder, sphere
 from mobee.model.kinematics import link_transforms
 from mobee.model.masses import gravity_torque
 from mobee.model.world_file import load_world
@@ -153,3 +153,57 @@ def test_a_ghost_is_passed_through_and_a_ball_is_not(tmp_path: Path) -> None:
         ends.append(backend.motors.q[0])
     assert ends[0] > 0.25
     assert ends[1] == pytest.approx(0.3 - 0.1 - 0.03, abs=2e-3)  # the slide is 0.1 m long above its origin
+
+
+PUSHER = """\
+<robot name="pusher"><link name="base"><inertial><mass value="1"/></inertial></link>
+ <link name="finger"><inertial><mass value="0.2"/></inertial>
+  <collision><origin xyz="0 0 {height}"/><geometry><sphere radius="0.008"/></geometry></collision></link>
+ <joint name="slide" type="prismatic"><parent link="base"/><child link="finger"/><origin xyz="0 0 0"/><axis xyz="1 0 0"/>
+  <limit lower="0" upper="0.3" velocity="0.5" effort="50"/></joint>
+</robot>
+"""
+
+
+def table_with_cup() -> World:
+    world = World()
+    world.add("table", box(2.0, 2.0, 0.2), position=(0.0, 0.0, -0.1))
+    world.add("cup", cylinder(0.03, 0.11), position=(0.1, 0.0, 0.055), role="target", mass=0.15, friction=0.4)
+    world.add("crate", box(0.08, 0.08, 0.08), position=(0.28, 0.0, 0.04), mass=0.3)
+    return world
+
+
+@pytest.mark.parametrize(("height", "upright"), [(0.02, True), (0.1, False)])
+def test_a_movable_cup_is_pushed_when_touched_low_and_falls_when_touched_high(tmp_path: Path, height: float, upright: bool) -> None:
+    backend = MujocoBackend(written(tmp_path, PUSHER.format(height=height)), table_with_cup, MotorParameters.ideal(), seed=0, dt=DT)
+    for _ in range(50):
+        backend.step(DT)
+    cup = backend.world.objects["cup"]
+    np.testing.assert_allclose(cup.position, (0.1, 0.0, 0.055), atol=5e-4)  # it rests
+    backend.motors.command(slice(0, 1), "velocity", np.array([0.1]))
+    for _ in range(120):
+        backend.step(DT)
+    backend.motors.command(slice(0, 1), "velocity", np.array([0.0]))
+    for _ in range(50):
+        backend.step(DT)
+    cup = backend.world.objects["cup"]
+    assert (cup.rotation[2, 2] > 0.99) == upright
+    if upright:
+        assert cup.position[0] == pytest.approx(backend.motors.q[0] + 0.008 + 0.03, abs=2e-3)  # in front of the finger
+        assert "crate" not in backend.contact().pair  # only contacts of the robot count
+    backend.place("cup", (0.0, 0.5, 0.06))
+    for _ in range(50):
+        backend.step(DT)
+    cup = backend.world.objects["cup"]
+    np.testing.assert_allclose(cup.position, (0.0, 0.5, 0.055), atol=5e-4)
+    assert cup.rotation[2, 2] > 0.999
+
+
+def test_things_that_are_pushed_push_others(tmp_path: Path) -> None:
+    backend = MujocoBackend(written(tmp_path, PUSHER.format(height=0.02)), table_with_cup, MotorParameters.ideal(), seed=0, dt=DT)
+    backend.motors.command(slice(0, 1), "velocity", np.array([0.1]))
+    for _ in range(300):
+        backend.step(DT)
+    cup, crate = (backend.world.objects[name].position for name in ("cup", "crate"))
+    assert crate[0] > 0.3
+    assert crate[0] - cup[0] == pytest.approx(0.07, abs=5e-3)
