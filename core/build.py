@@ -50,7 +50,7 @@ NO_COMPILER = 3  # exit code
 
 
 class BuildFailed(Exception):
-    """One line for a person, under what the compiler said, if it came that far."""
+    """The build failed; the message is one line, printed below the messages of the compiler, if it was started."""
 
 
 class CompilerMissing(BuildFailed):

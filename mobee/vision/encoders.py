@@ -33,7 +33,7 @@ class Readings:
         self._rows: dict[str, deque[tuple[float, Array]]] = {part: deque(maxlen=KEPT) for part in parts}
 
     def note(self, part: str, t: float, q: Array) -> None:
-        """Add a reading (n_part,) rad of a part at time t [s]; one that is there already is ignored."""
+        """Add a reading (n_part,) rad of a part at time t [s]; one that is not newer than the last is ignored."""
         rows = self._rows[part]
         if not rows or t > rows[-1][0]:
             rows.append((t, q))
