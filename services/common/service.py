@@ -43,6 +43,7 @@ _R = TypeVar("_R", bound=Reply)
 _C = TypeVar("_C", bound=ServiceConfig)
 
 ORPHANED = 10.0  # s without a router after which a service ends
+WARNING_PERIOD = 10.0  # s between two events about second tokens of a router, of which a sender may invent any number
 BUSY = 3.0  # s between two checks for the router in which a service has computed instead of handling messages, such as the router's token
 ONLY_ONE = ("robot_sim", "model", "controller", "port_filter")  # two would both be obeyed
 FRESH_STATS, STATS_PERIOD = 10, 0.2  # of so many answers to `stat` within so many s each is computed; others repeat the last one
@@ -125,6 +126,7 @@ class Service(Listener):
         self._router_checked = time.monotonic()
         self._router, self._router_seen = self._launcher, self._router_checked  # a launcher is the router of those it has started
         self._strays: set[str] = set()  # tokens of routers that no process has
+        self._is_asking, self._next_warning = False, 0.0  # which router answers; monotonic clock
         self._watch_liveliness()
         self.on_request(keys.service_rpc(self.who, "stat"), Empty, self._stat)
         self._kept.append(session.declare_queryable(keys.service_rpc(self.who, "pulse"), self._answer_pulse))
@@ -274,26 +276,31 @@ class Service(Listener):
         if not self._router:
             self._router = router
         elif router != self._router:
-            self.bus.event("warning", "two_routers", f"a second token of a router, {router}, is on the bus beside {self._router}")
-            self._ask_router(router)
+            if (now := time.monotonic()) > self._next_warning:
+                self._next_warning = now + WARNING_PERIOD
+                self.bus.event("warning", "two_routers", f"a second token of a router, {router}, is on the bus beside {self._router}")
+            if not self._is_asking:
+                self._ask_router()
 
-    def _ask_router(self, router: str) -> None:
-        """Ask which router answers, once a second until one does: a new system may be starting."""
-        if router not in self.alive["router"] or router in self._strays:
+    def _ask_router(self) -> None:
+        """Ask which router answers, once a second until one does for every token: a new system may be starting."""
+        others = self.alive["router"] - self._strays - {self._router}
+        self._is_asking = bool(others)
+        if not others:
             return
         for who in ("launcher", "router"):
-            self.ask(keys.service_rpc(who, "stat"), Stat, partial(self._check_system, who, router))
-        self.inbox.at(time.monotonic() + 1.0, lambda: self._ask_router(router))
+            self.ask(keys.service_rpc(who, "stat"), Stat, partial(self._check_system, who, others))
+        self.inbox.at(time.monotonic() + 1.0, self._ask_router)
 
-    def _check_system(self, who: str, router: str, answer: Stat | rpc.CallFailed) -> None:
-        """End if a launcher or router answers that is not the one of this service's system."""
+    def _check_system(self, who: str, others: set[str], answer: Stat | rpc.CallFailed) -> None:
+        """End if a launcher or router answers that is not the one of this service's system; `others`: tokens that were there before."""
         if not isinstance(answer, Stat) or self.who == who:
             return
         if answer.instance != self._router:
             self.log.error("another %s answers at %s: the system of this process has ended", who, self.config.endpoint)
             self.on_new_system()
             return
-        self._strays.add(router)
+        self._strays |= others & self.alive["router"]
 
     def _check_health(self) -> None:
         refused, waiting = self.bus.rejected.total() + self.inbox.dropped, self.inbox.waiting()

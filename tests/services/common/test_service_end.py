@@ -192,14 +192,22 @@ def test_a_service_of_a_joined_host_ends_with_its_launcher_and_not_with_the_netw
             child.kill()
 
 
-def test_a_second_token_of_a_router_alone_ends_nothing(tmp_path: Path, bus: Rig) -> None:
+def test_other_tokens_of_a_router_end_nothing_and_cause_one_event_and_few_calls(tmp_path: Path, bus: Rig) -> None:
+    asked: list[str] = []
+
+    def answer(request: Empty, key: str) -> Stat:
+        asked.append(key)
+        return stat_of("launcher", "rig")
+
     with rig(tmp_path, bus.robot) as parent:
         program, events = another(parent), parent.record(Event, "probe")
-        parent.serve(keys.service_rpc("launcher", "stat"), Empty, lambda request, key: stat_of("launcher", "rig"))
-        parent.token("router", "stray")
-        wait_for(lambda: any(event.code == "two_routers" for event in events), "the event")
+        parent.serve(keys.service_rpc("launcher", "stat"), Empty, answer)
+        for number in range(100):
+            parent.token("router", f"stray{number}")
+        wait_for(lambda: asked, "the question which launcher answers")
         time.sleep(0.5)
         assert program.is_running
+        assert [event.code for event in events] == ["two_routers"] and len(asked) < 5
 
 
 def test_without_a_router_it_gives_up_in_one_line_that_names_the_endpoint_and_the_remedy(bus: Rig) -> None:
