@@ -37,7 +37,10 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     arguments = {name: value for name, value in settings.items() if name not in _OF_A_RECORD}
     if arguments.get("seed", 0) is None:  # samples that were given, not drawn
         del arguments["seed"]
-    space = kinds[kind](robot, **arguments)
+    try:
+        space = kinds[kind](robot, **arguments)
+    except TypeError as error:  # of a name, or a value of a type, that this program never writes
+        raise InvalidValue(f"the record of a {kind} is damaged: {' '.join(str(error).split())}") from error
     if space.settings["digest"] != settings["digest"]:
         raise MobeeError(
             f"the space made from the record ({kind} of {space.part}) has other samples or neighbours than the one recorded "

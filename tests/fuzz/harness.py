@@ -17,7 +17,10 @@ SECONDS = 5  # an input that takes longer is a finding
 
 
 def fuzz(feed: Callable[[bytes, Path], bool], seeds: list[bytes], names: list[str]) -> None:
-    """Feed what libFuzzer makes of the seeds to `feed` until it raises; options of libFuzzer are read from the command line."""
+    """Feed what libFuzzer makes of the seeds to `feed` until it raises; options of libFuzzer are read from the command line.
+
+    `names`: elements and attributes of XML that are written into the seeds; of seeds of other kinds only bytes are changed.
+    """
     with tempfile.TemporaryDirectory() as folder:
         corpus, work = Path(folder) / "corpus", Path(folder) / "work"
         corpus.mkdir()
@@ -27,7 +30,7 @@ def fuzz(feed: Callable[[bytes, Path], bool], seeds: list[bytes], names: list[st
 
         def mutate(data: bytes, max_size: int, seed: int) -> bytes:
             rng = random.Random(seed)
-            if rng.random() < 0.3:
+            if not names or rng.random() < 0.3:
                 return bytes(atheris.Mutate(data, max_size))
             return mutated(data.decode("utf-8", "surrogateescape"), rng, names).encode("utf-8", "surrogateescape")[:max_size]
 
@@ -35,5 +38,7 @@ def fuzz(feed: Callable[[bytes, Path], bool], seeds: list[bytes], names: list[st
             feed(data, work)
 
         program, *given = sys.argv
-        atheris.Setup([program, f"-timeout={SECONDS}", "-max_len=8192", *given, str(corpus)], one, custom_mutator=mutate)
+        longest = max(8192, 2 * max(map(len, seeds)))
+        options = [f"-timeout={SECONDS}", f"-max_len={longest}", *given, str(corpus)]
+        atheris.Setup([program, *options], one, custom_mutator=mutate)
         atheris.Fuzz()

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from mobee.errors import RobotFileError
+from mobee.errors import InvalidValue, RobotFileError
+from mobee.learning.record import load_learned
+from mobee.robot.load import load_robot
+from tests.fuzz import files
 from tests.fuzz.mutations import mutated
 from tests.fuzz.readers import SEEDS, SHIPPED, check_message, feed_urdf, feed_xml, urdf_seeds, words, xml_seeds
 
@@ -35,6 +38,30 @@ def test_a_changed_urdf_with_its_srdf_and_meshes_is_read_or_refused_in_plain_wor
     assert feed_urdf(seeds[0], tmp_path)
     answers = [feed_urdf(mutated(text, rng, names).encode("utf-8", "surrogateescape"), tmp_path) for _ in range(80)]
     assert 0 < sum(answers) < len(answers)
+
+
+def changed(content: bytes, rng: random.Random) -> bytes:
+    """The content with a byte of another value, or without its end."""
+    at = rng.randrange(len(content))
+    return content[:at] + (b"" if rng.random() < 0.2 else bytes([rng.randrange(256)]) + content[at + 1 :])
+
+
+@pytest.mark.parametrize("name", ["scenario", "roadmap", "store", "recording", "message"])
+def test_a_changed_file_or_message_is_read_or_refused(name: str, tmp_path: Path) -> None:
+    rng, seeds = random.Random(name), getattr(files, f"{name}_seeds")()
+    feed = getattr(files, f"feed_{name}")
+    assert any(feed(seed, tmp_path) for seed in seeds)
+    answers = [feed(changed(rng.choice(seeds), rng), tmp_path) for _ in range(100)]
+    assert sum(answers) > 0
+
+
+def test_a_record_with_a_setting_that_no_space_has_is_refused(tmp_path: Path) -> None:
+    content = files.store_seeds()[0]
+    assert b"neighbours" in content
+    with pytest.raises(InvalidValue, match="damaged"):
+        path = tmp_path / "given.sqlite"
+        path.write_bytes(content.replace(b"neighbours", b"neighbourx"))
+        load_learned(path, "arm", load_robot("katana"))
 
 
 def test_a_message_that_names_no_file_is_a_finding(tmp_path: Path) -> None:
