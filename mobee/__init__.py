@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from mobee.derivation import Derived, derive
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent, run
+    from mobee.learning.grid import Grid
     from mobee.learning.lattice import Lattice
     from mobee.learning.learner import CuriousSettings
+    from mobee.learning.object_space import ObjectSpace
     from mobee.learning.planner import Plan, Planner
     from mobee.learning.reaching.learner import ReachSettings
     from mobee.learning.reaching.reach_agent import ReachAgent
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from mobee.model.model import Model
     from mobee.model.pose import Pose
     from mobee.model.world_file import load_world
-    from mobee.plant import Outcome, Plant
+    from mobee.plant import Outcome, PerceivingPlant, Plant
     from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
     from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
     from mobee.roadmap.adaptive.edge_beliefs import roadmap_space
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
     from mobee.robot.join import join_robots
     from mobee.robot.load import load_robot
     from mobee.robot.robot import Robot
-    from mobee.simulation import MotorParameters, OfflinePlant, PlantSettings, advance_together, run_batch, run_together
+    from mobee.simulation import MotorParameters, OfflinePlant, PlantSettings, SlidingObject, advance_together, run_batch, run_together
 
 _MODULES = {
     "mobee.control": "Command Controller Forces Gains ReachPath Reacher Term constraint_forces reach_path",
@@ -49,7 +51,9 @@ _MODULES = {
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent run",
     "mobee.learning.lattice": "Lattice",
+    "mobee.learning.grid": "Grid",
     "mobee.learning.learner": "CuriousSettings",
+    "mobee.learning.object_space": "ObjectSpace",
     "mobee.learning.planner": "Plan Planner",
     "mobee.learning.reaching.learner": "ReachSettings",
     "mobee.learning.reaching.reach_agent": "ReachAgent",
@@ -60,7 +64,7 @@ _MODULES = {
     "mobee.model": "Contact Geometry World WorldObject box capsule cylinder sphere",
     "mobee.model.model": "Model",
     "mobee.model.pose": "Pose",
-    "mobee.plant": "Outcome Plant",
+    "mobee.plant": "Outcome PerceivingPlant Plant",
     "mobee.reach": "ReachOutcome ReachPlant ReachTarget",
     "mobee.roadmap.adaptive.adaptive": "AdaptiveRoadmap",
     "mobee.roadmap.adaptive.edge_beliefs": "roadmap_space",
@@ -78,7 +82,7 @@ _MODULES = {
     "mobee.robot.load": "load_robot",
     "mobee.model.world_file": "load_world",
     "mobee.robot.robot": "Robot",
-    "mobee.simulation": "MotorParameters OfflinePlant PlantSettings advance_together run_batch run_together",
+    "mobee.simulation": "MotorParameters OfflinePlant PlantSettings SlidingObject advance_together run_batch run_together",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -95,6 +99,7 @@ __all__ = [
     "Forces",
     "Gains",
     "Geometry",
+    "Grid",
     "IK",
     "InvalidValue",
     "Lattice",
@@ -103,8 +108,10 @@ __all__ = [
     "Model",
     "MotorParameters",
     "NES",
+    "ObjectSpace",
     "OfflinePlant",
     "Outcome",
+    "PerceivingPlant",
     "Plan",
     "Planner",
     "Plant",
@@ -123,6 +130,7 @@ __all__ = [
     "Robot",
     "RobotFileError",
     "SearchSettings",
+    "SlidingObject",
     "Space",
     "Term",
     "TransitionModel",

@@ -13,7 +13,7 @@ from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.explorers import Explorer
 from mobee.learning.learner import CuriousLearner, CuriousSettings
 from mobee.learning.space import Space
-from mobee.plant import Described, Outcome, Plant
+from mobee.plant import Described, Outcome, Plant, present_outcome
 from mobee.settings import accepts
 from mobee.store import Transition, TransitionStore
 
@@ -77,7 +77,8 @@ class CuriousAgent(CuriousLearner):
     def state(self) -> int:
         """The present state of the part: measured at first and after an interruption, else taken from the last outcome."""
         if self._state is None:
-            self._state = self.space.state_of(self.plant.measure(self.part))
+            before = None if self.last is None else self.last.s_next
+            self._state = self.space.state_after(present_outcome(self.plant, self.part), before)
         return self._state
 
     def decide(self, state: int) -> int:
@@ -111,7 +112,7 @@ class CuriousAgent(CuriousLearner):
         With a store the transition is on disk when this returns; if it cannot be written, nothing is learned.
         """
         state, action = self._decided()
-        following = self.space.state_of(outcome.q)
+        following = self.space.state_after(outcome, state)
         weigh = self.model.observe if self.store is None else self.model.gain
         transition = Transition(
             n=self.transitions + 1,

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from mobee.errors import InvalidValue, MobeeError, UnknownName
+from mobee.learning.grid import Grid
 from mobee.learning.lattice import Lattice
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.voronoi import Voronoi
@@ -26,7 +28,7 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     Raises InvalidValue if it is not the record of a space, or is of another robot; MobeeError if the space that is made differs from the
     recorded one, because the robot's limits or this program have changed.
     """
-    kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space}
+    kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space, "object": ObjectSpace}
     if not isinstance(settings, Mapping):
         raise InvalidValue(f"{settings!r} is not the record of a space: give Space.settings.")
     kind = settings.get("kind", "lattice")
@@ -34,12 +36,9 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
         raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is not of a space: give Space.settings.")
     if settings["robot"] != robot.name:
         raise InvalidValue(f"the space on record is of robot {settings['robot']!r}, given {robot.name!r}: load that robot.")
-    arguments = {name: value for name, value in settings.items() if name not in _OF_A_RECORD}
-    if arguments.get("seed", 0) is None:  # samples that were given, not drawn
-        del arguments["seed"]
     try:
-        space = kinds[kind](robot, **arguments)
-    except TypeError as error:  # of a name, or a value of a type, that this program never writes
+        space = _object_space(settings, robot) if kind == "object" else _posture_space(kinds[kind], settings, robot)
+    except (KeyError, TypeError) as error:  # of a name, or a value of a type, that this program never writes
         raise InvalidValue(f"the record of a {kind} is damaged: {' '.join(str(error).split())}") from error
     if space.settings["digest"] != settings["digest"]:
         raise MobeeError(
@@ -47,6 +46,17 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
             f"(digest {space.settings['digest']}, on record {settings['digest']}): use the robot file and version that recorded it."
         )
     return space
+
+
+def _posture_space(kind: type[Space], settings: Mapping[str, Any], robot: Robot) -> Space:
+    arguments = {name: value for name, value in settings.items() if name not in _OF_A_RECORD}
+    if arguments.get("seed", 0) is None:  # samples that were given, not drawn
+        del arguments["seed"]
+    return kind(robot, **arguments)
+
+
+def _object_space(settings: Mapping[str, Any], robot: Robot) -> Space:
+    return ObjectSpace(space_from(settings["postures"], robot), Grid(**settings["grid"]), settings["object"])
 
 
 def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:

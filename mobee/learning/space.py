@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION, nearest_finder
+from mobee.plant import Outcome
 from mobee.robot.robot import Part, Robot
 
 MAX_STATES = 100_000  # a larger space takes too long to explore on a robot (thesis 7.4)
@@ -110,6 +111,10 @@ class Space:
                 f"or all {self._targets.shape[1]} motors of {self.part}, in rad."
             )
         return self._state_of(given.tolist())
+
+    def state_after(self, outcome: Outcome, before: int | None = None) -> int:
+        """Return the state in which an action ended; `before`: the state in which it began, None if that is not known."""
+        return self.state_of(outcome.q)
 
     def target(self, state: int) -> Array:
         """Return the state's sample as a pose of the whole part, shape (n_part,), in [rad]; other motors stay at `rest`."""

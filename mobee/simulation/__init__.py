@@ -10,3 +10,4 @@ from mobee.simulation.plant import OfflinePlant as OfflinePlant
 from mobee.simulation.plant import PlantSettings as PlantSettings
 from mobee.simulation.plant_batch import PlantBatch as PlantBatch
 from mobee.simulation.runner import Trace as Trace
+from mobee.simulation.sliding import SlidingObject as SlidingObject

@@ -34,7 +34,7 @@ def numbers(pattern: str, text: str) -> list[float]:
 
 
 def test_each_example_has_its_own_number_and_fits_a_hundred_lines() -> None:
-    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 15)]
+    assert list(EXAMPLES) == [f"{n:02d}" for n in range(1, 16)]
     assert {path.name: len(path.read_text().splitlines()) for path in EXAMPLES.values() if len(path.read_text().splitlines()) > 100} == {}
 
 
@@ -165,3 +165,10 @@ def test_14_learns_to_bring_the_hand_to_a_state(tmp_path: Path) -> None:
     text = printed("14", tmp_path)
     shares = [float(share) for share in re.findall(r"steps: (\S+) of the last 40 episodes", text)]
     assert shares[0] < 0.7 and min(shares[-2:]) > 0.9
+
+
+def test_15_plans_push_the_cup_to_its_cell_more_often_than_random_actions(tmp_path: Path) -> None:
+    text = printed("15", tmp_path)
+    assert numbers(r"the cup was pushed (\S+) m and fell (\d+) times", text)[0] > 0.5
+    planned, drawn = numbers(r"of 8 tries: (\d+) by plans, (\d+) by random", text)
+    assert planned >= 6 and planned > drawn

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An upright cylinder, as a cup, that slides on a table out of the robot's solids: the quasi-static model of pushing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue, UnknownName
+from mobee.model.model import engine_of
+from mobee.model.snapshot import NO_HANDS
+from mobee.model.world import World
+from mobee.model.world_object import Geometry, WorldObject, cylinder
+from mobee.robot.robot import Robot, per_robot
+
+if TYPE_CHECKING:
+    from mobee.simulation.plant import OfflinePlant
+
+Area = tuple[tuple[float, float], tuple[float, float]]
+FRICTION = 0.4  # an assumption, about ceramics on wood
+PERIOD = 0.04  # s between two checks: a hand at 0.1 m/s, the fastest that was seen, moves by 4 mm
+TOLERANCE = 1e-4  # m, depth at which robot and object only touch
+ABSENCE = 1.0  # s after which a fallen object is put back
+CLEARANCE = 0.03  # m around its first place that must be free of the robot then
+MOST_PUSHES = 50  # contacts resolved one after another in a check; more are needed only where it is wedged
+FLATTEST = 0.5  # horizontal share of a contact's normal below which the robot presses on the object and does not push it
+UPRIGHT = 1e-6
+
+
+class SlidingObject:
+    """An upright cylinder that the robot pushes over a horizontal surface.
+
+    Quasi-static: friction with the surface stops it at once when nothing pushes, and its contacts with the robot have no friction.
+    Such a disc moves along the normal of a contact, by the depth, and does not turn.  It topples if it is pushed above the height
+    radius / friction, pressed from above, or wedged between solids, and falls if its centre leaves the area.  A fallen object is out of
+    the world for a second, and is then put back to its first place as soon as the robot is 3 cm away from there.  It exerts no
+    force on the robot, and other objects do not stop it.
+
+    Args:
+        plant: whose motion pushes it; its `every` is used for this.
+        name: of an upright cylinder in the plant's world, of role "ghost": the controller keeps no distance to what the robot may push.
+        support: name of the box on which it stands.
+        friction: coefficient between it and the support.
+        area: ((x low, x high), (y low, y high)) in m, within which its centre stays; None: the top of the support.
+
+    Raises:
+        UnknownName: the world has no such object.
+        InvalidValue: it is not an upright cylinder of role "ghost" on the top of an upright box and within the area.
+    """
+
+    def __init__(
+        self, plant: OfflinePlant, name: str, support: str = "table", friction: float = FRICTION, area: Area | None = None
+    ) -> None:
+        objects = plant.model.world.objects
+        for one in (name, support):
+            if one not in objects:
+                raise UnknownName("world object", one, objects)
+        if not friction > 0.0:
+            raise InvalidValue(f"friction={friction!r}: give a coefficient above 0.")
+        thing, under = objects[name], objects[support]
+        self._surface = _surface(thing, under)
+        self.name, self.friction = name, float(friction)
+        self.area: Area = _top(under) if area is None else area
+        if not self._is_inside(thing.position):
+            raise InvalidValue(
+                f"{name} stands at x, y = {thing.position[:2].tolist()} m, outside the area {self.area}: move it, or give a larger area."
+            )
+        self._plant, self._engine, self._first = plant, engine_of(_solids(plant.robot)), thing
+        self._alone, self._room = _world(thing, 0.0), _world(thing, CLEARANCE)
+        self._place: Array | None = thing.position.copy()
+        self._fell_at = 0.0
+        self.path = 0.0
+        """Length of the path over which the robot has pushed it, m."""
+        self.falls = 0
+        """How often it has toppled or left the area."""
+        plant.every(max(1, round(PERIOD / plant.dt)), self.check)
+
+    @property
+    def place(self) -> Array | None:
+        """The position of its centre, (3,) m; None between a fall and the moment when it is put back."""
+        return None if self._place is None else self._place.copy()
+
+    def perceive(self) -> dict[str, Array]:
+        """Return its place by its name, exactly, and nothing while it has fallen: for a `PerceivingPlant`."""
+        return {} if self._place is None else {self.name: self._place.copy()}
+
+    def put_back(self) -> bool:
+        """Put it to its first place, also if it has not fallen; returns False, and changes nothing, if the robot is within 3 cm of it."""
+        if self._deepest(self._plant.motors.q.tobytes(), self._room) is not None:
+            return False
+        first, world = self._first, self._plant.model.world
+        self._alone.move(self.name, position=first.position)
+        if self._place is None:
+            shape = Geometry(first.kind, first.size)
+            world.add(self.name, shape, position=first.position, rotation=first.rotation, role=first.role, color=first.color)
+        else:
+            world.move(self.name, position=first.position)
+        self._place = first.position.copy()
+        return True
+
+    def check(self, time: float) -> None:
+        """Push it out of the robot's solids, or put it back if it has fallen; the plant calls this, with its time [s]."""
+        q = self._plant.motors.q.tobytes()
+        if self._place is None:
+            if time - self._fell_at >= ABSENCE:
+                self.put_back()
+            return
+        found = self._deepest(q, self._alone)
+        if found is not None:
+            after = self._pushed(q, self._place.copy(), found)
+            if after is None:
+                self._fall(time)
+            else:
+                self.path += hypot(*(after - self._place)[:2].tolist())
+                self._place = after
+                self._plant.model.world.move(self.name, position=after)
+
+    def _pushed(self, q: bytes, place: Array, found: Array | None) -> Array | None:
+        """Return the place (3,) where no solid of the robot is deeper in it than the tolerance; None if it falls.
+
+        `place`: where it is, which is changed; `found`: the deepest contact there, see `_deepest`.
+        """
+        highest = self._first.size[0] / self.friction
+        for _ in range(MOST_PUSHES):
+            if found is None:
+                return place if self._is_inside(place) else None
+            depth, x, y, _, _, _, z = found.tolist()
+            flat = hypot(x, y)
+            if flat < FLATTEST or z - self._surface > highest:
+                return None
+            place[0] -= depth / flat * x / flat
+            place[1] -= depth / flat * y / flat
+            self._alone.move(self.name, position=place)
+            found = self._deepest(q, self._alone)
+        return None
+
+    def _deepest(self, q: bytes, world: World) -> Array | None:
+        """Return depth, normal and point of the robot's deepest contact with the object, (7,); None if none exceeds the tolerance."""
+        table = self._engine.contacts_of_one(q, world.snapshot, NO_HANDS)[0]
+        if not len(table):
+            return None
+        deepest: Array = table.reals[table.depth.argmax()]
+        return deepest if deepest[0] > TOLERANCE else None
+
+    def _is_inside(self, place: Array) -> bool:
+        return all(low <= at <= high for at, (low, high) in zip(place.tolist(), self.area, strict=False))
+
+    def _fall(self, time: float) -> None:
+        self.falls += 1
+        self._fell_at, self._place = time, None
+        self._plant.model.world.remove(self.name)
+
+
+def _surface(thing: WorldObject, under: WorldObject) -> float:
+    """Return the height [m] of the top of the support; raises InvalidValue unless the thing is an upright cylinder that stands on it."""
+    if thing.kind != "cylinder" or abs(thing.rotation[2, 2]) < 1.0 - UPRIGHT or thing.role != "ghost" or thing.link is not None:
+        raise InvalidValue(f"{thing.name} is a {thing.kind} of role {thing.role}: what slides is an upright cylinder of role ghost.")
+    if under.kind != "box" or under.rotation[2, 2] < 1.0 - UPRIGHT or under.link is not None:
+        raise InvalidValue(f"{under.name} is no upright box: give the box on which {thing.name} stands.")
+    top, bottom = under.position[2] + 0.5 * under.size[2], thing.position[2] - 0.5 * thing.size[1]
+    if abs(top - bottom) > 1e-3:
+        raise InvalidValue(
+            f"{thing.name} ends {bottom - top:.4g} m above {under.name}: put it on its top, at z = {top + 0.5 * thing.size[1]:.4g} m."
+        )
+    return float(top)
+
+
+def _top(under: WorldObject) -> Area:
+    """Return the bounds of the top of a box, which may be turned about the vertical; m."""
+    half = np.abs(under.rotation[:2, :2]) @ (0.5 * np.array(under.size[:2]))
+    (x, y), (dx, dy) = under.position[:2].tolist(), half.tolist()
+    return (x - dx, x + dx), (y - dy, y + dy)
+
+
+def _world(thing: WorldObject, wider: float) -> World:
+    """Return a world with the object alone, wider by a distance [m] on all sides."""
+    world = World()
+    world.add(thing.name, cylinder(thing.size[0] + wider, thing.size[1]), position=thing.position, rotation=thing.rotation)
+    return world
+
+
+@per_robot
+def _solids(robot: Robot) -> Robot:
+    """Return the robot with its solid shapes alone, and without contacts of its shapes with each other."""
+    kept = [number for number, shape in enumerate(robot.shapes) if shape.role == "solid"]
+    return replace(
+        robot,
+        shapes=tuple(robot.shapes[number] for number in kept),
+        solid_pairs=robot.solid_pairs[:0],
+        field_pairs=robot.field_pairs[:0],
+        base_shapes=frozenset(new for new, number in enumerate(kept) if number in robot.base_shapes),
+    )
