@@ -66,18 +66,31 @@ def test_plans_use_the_transitions_learned_on_the_page(tmp_path: Path) -> None:
 
 
 def test_an_explorer_of_the_reader_explores(tmp_path: Path) -> None:
-    (flow,) = blocks("docs/agents.md", tmp_path)
+    flow, _ = blocks("docs/agents.md", tmp_path)
     assert run(tmp_path, "-c", flow) == "my_explorers:stubborn 20\n"
 
 
+def test_an_agent_learns_where_a_cup_is(tmp_path: Path) -> None:
+    _, flow = blocks("docs/agents.md", tmp_path)
+    printed = run(tmp_path, "-c", flow)
+    assert printed.startswith("<ObjectSpace of left_arm and cup: 9 postures x 4 cells> ") and printed.endswith(
+        " [27 28 29 30 31 32 33 34 35]\n"
+    )
+
+
 def test_an_arm_acts_on_the_offline_plant(tmp_path: Path) -> None:
-    flow, _ = blocks("docs/plant.md", tmp_path)
+    flow, _, _ = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", flow).split() == ["True", "(100,", "41)", "True", "64"]
 
 
 def test_many_plants_continue_together(tmp_path: Path) -> None:
-    _, many = blocks("docs/plant.md", tmp_path)
+    _, many, _ = blocks("docs/plant.md", tmp_path)
     assert run(tmp_path, "-c", many).strip() == "[True, True, True] (100, 41)"
+
+
+def test_a_cup_that_nothing_touches_stays(tmp_path: Path) -> None:
+    _, _, flow = blocks("docs/plant.md", tmp_path)
+    assert run(tmp_path, "-c", flow).split() == ["[-0.3", "-0.15", "-0.055]", "0.0", "0"]
 
 
 def test_the_findings_of_a_robot_are_as_documented(tmp_path: Path) -> None:
