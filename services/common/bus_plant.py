@@ -115,11 +115,18 @@ class ReachClient:
         sphere = Geometry(kind="sphere", size=[target.radius])
         self._call("add", AddObject, name=TARGET, geometry=sphere, position=target.position.tolist(), quaternion=UPRIGHT, role="target")
 
-    def _known(self, name: str) -> ObjectState:
+    def places(self) -> dict[str, Array]:
+        """See `BusPlant.places`."""
+        return {one.name: np.array(one.position) for one in self._listed().objects if not one.link}
+
+    def _listed(self) -> World:
         try:
-            world = self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES)
+            return self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES)
         except CallFailed as error:
             raise ActionInterrupted(f"the model does not list its objects: {error}") from None
+
+    def _known(self, name: str) -> ObjectState:
+        world = self._listed()
         objects = {one.name: one for one in world.objects}
         if name in world.stale:
             raise InvalidValue(
@@ -224,6 +231,14 @@ class BusPlant:
         Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted while the model does not answer.
         """
         return self._reaches.present_object(name, aim, normal, faces)
+
+    def places(self) -> dict[str, Array]:
+        """Return the places (3,) m of the free objects in the model's world, by name: those of its file, and those that are perceived.
+
+        A perceived object that is stale is left out.  For an agent whose states hold where an object is:
+        `PerceivingPlant(plant, plant.places)`.  Raises ActionInterrupted while the model does not answer.
+        """
+        return self._reaches.places()
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """See mobee.reach.ReachPlant."""
