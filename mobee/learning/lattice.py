@@ -13,6 +13,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import equidistant_goals, lattice_digits, lattice_strides, nearest_goals
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.space import MAX_STATES, Space, checked_joints, checked_neighbours
 from mobee.robot.robot import Robot
 
@@ -130,10 +131,16 @@ def plane_layout(space: Space) -> Array:
     """Compute positions at which to draw the states, shape (S, 2).
 
     A lattice becomes a grid of grids, as in the paper's figure 7: within a block the first joint goes right and the second up, the
-    third and fourth choose the block, and so on.  Other spaces are projected to the two directions in which the samples differ most.
+    third and fourth choose the block, and so on.  The postures of an ObjectSpace are a block in each of its cells.  Other spaces are
+    projected to the two directions in which the samples differ most.
     """
     if isinstance(space, Lattice):
         return _nested([len(levels) for levels in space.levels])
+    if isinstance(space, ObjectSpace):
+        block, columns = plane_layout(space.postures), space.grid.shape[0]
+        places = np.stack([space.cells % columns, space.cells // columns], axis=1)
+        in_blocks: Array = np.tile(block, (len(space.grid), 1)) + places * (np.ptp(block, axis=0) + 1.0 + BLOCK_GAP)
+        return in_blocks
     centred = (space.samples - space.samples.mean(axis=0)) / np.maximum(np.ptp(space.samples, axis=0), 1e-12)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     drawn = centred @ axes[:2].T

@@ -11,7 +11,7 @@ from mobee import CuriousAgent, Grid, ObjectSpace, PerceivingPlant, Planner
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.explorers import EXPLORERS
-from mobee.learning.lattice import Lattice
+from mobee.learning.lattice import Lattice, plane_layout
 from mobee.learning.record import load_learned, space_from
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
@@ -116,6 +116,14 @@ def test_the_record_makes_the_space_again_and_the_agent_continues(tmp_path: Path
         assert agent(Pusher(), store=store).transitions == 60
     learned = load_learned(file, robot=made.robot)
     assert isinstance(learned.space, ObjectSpace) and learned.model.tries.sum() == 60
+
+
+def test_it_is_drawn_as_a_block_of_postures_in_each_cell() -> None:
+    made = space()
+    drawn = plane_layout(made)
+    assert len(np.unique(drawn.round(6), axis=0)) == len(made)
+    assert np.ptp(drawn[made.in_cell(0)], axis=0).tolist() == np.ptp(drawn[made.in_cell(3)], axis=0).tolist() == [2.0, 0.0]
+    assert (np.diff([drawn[made.in_cell(cell), 0].mean() for cell in range(4)]) > 2.0).all()
 
 
 def test_too_many_states_are_refused() -> None:
