@@ -96,6 +96,7 @@ RUN_ELSEWHERE = {
     r"mobee record --to FOLDER": "needs a system that was started without a launcher",
     r"mobee launch filtered": "tests/services/port_filter/test_process.py",
     r"mobee reach --target [-. 0-9]+": "tests/system/test_reach.py",
+    r"mobee reach --target [-. 0-9]+ --facing": "tests/mobee_cli/test_reach.py",
     r"mobee reach --object ball --stay": "never ends; test_reach.py of mobee_cli and test_reaches.py of the controller test --stay",
     r"mobee reach --target [-. 0-9]+ --run .*": "tests/mobee_cli/test_reach.py",
     r"mobee reach --offline --robot pointer.xml .*": "tests/mobee_cli/test_reach.py",
