@@ -16,6 +16,7 @@ from mobee.simulation.motors import MotorParameters
 from services.common.cameras import require_cameras
 from services.common.config import WorldConfig
 from services.robot_sim.choice import EXTRA, PACKAGES, choose
+from services.robot_sim.strength import with_torques
 
 NotNegative = Annotated[float, Meta(ge=0)]
 
@@ -39,6 +40,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Play between motor and joint, rad."""
     friction: NotNegative = 0.0
     """Coulomb's, as the velocity that it costs, rad/s."""
+    torques: Mapping[str, Annotated[float, Meta(gt=0)]] = {}
+    """Largest torques of motors by pattern of their names, N m, in place of those of the robot's file, as { "?_thumb_*" = 0.3 }."""
     encoder_noise: NotNegative = math.radians(0.1)
     """Standard deviation of the encoders at a tick of 20 ms, rad; scaled with the tick."""
     substep: Annotated[float, Meta(gt=0)] = 0.005
@@ -64,6 +67,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
         """Check also that the back-end can move the robot, and that identified motor parameters exist for it; raises MobeeError."""
         super().check_robot(robot)
         choose(self.backend, robot)
+        with_torques(robot, self.torques)
         if self.motors == "identified":
             MotorParameters.identified(robot.name)
 

@@ -11,6 +11,7 @@ from mobee.simulation.motors import MotorParameters
 from services.robot_sim.choice import EXTRA, choose
 from services.robot_sim.config import Config
 from services.robot_sim.kinematic import Backend, BackendUnavailable, KinematicBackend
+from services.robot_sim.strength import with_torques
 from services.robot_sim.watch import Recorded
 
 
@@ -35,7 +36,7 @@ def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
 
 
 def _make_backend(config: Config, robot: Robot) -> Backend:
-    parameters = motor_parameters(config, robot)
+    parameters, robot = motor_parameters(config, robot), with_torques(robot, config.torques)
     chosen, dt = choose(config.backend, robot).name, round(1e9 / config.rate) / 1e9
     if chosen == "kinematic":
         return KinematicBackend(robot, config.load_world, parameters, config.seed)

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Largest torques of motors that differ from those of the robot's file, such as the weak ones of fingers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fnmatch import fnmatchcase
+
+from mobee.errors import UnknownName
+from mobee.robot.robot import Robot
+
+
+def with_torques(robot: Robot, torques: Mapping[str, float]) -> Robot:
+    """Return the robot with other largest torques [N m], by pattern of motor names; the first pattern that matches counts.
+
+    Raises UnknownName for a pattern that matches no motor.
+    """
+    for pattern in torques:
+        if not any(fnmatchcase(name, pattern) for name in robot.motors):
+            raise UnknownName("motor for a torque", pattern, robot.motors)
+    table = [
+        replace(
+            motor, max_torque=next((torque for pattern, torque in torques.items() if fnmatchcase(motor.name, pattern)), motor.max_torque)
+        )
+        for motor in robot.motor_table
+    ]
+    return replace(robot, motor_table=tuple(table))
