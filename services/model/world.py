@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from bus_schema import VERSION, keys
-from bus_schema.messages import Geometry, WorldObject
+from bus_schema.messages import Geometry, Role, WorldObject
 from bus_schema.rpc import AddObject, Attach, Done, Empty, MoveObject, ObjectState, OneName, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee import Model, World
@@ -41,6 +41,7 @@ class WorldServer:
         self._perceived: set[str] = set()  # objects that vision added: it changes no other
         self._expiry: dict[str, int] = {}  # of those that vanish when they are not seen again, ns of the bus clock
         self._margins: dict[str, float] = {}  # m, of perceived objects
+        self._roles: dict[str, Role] = {}  # of perceived objects, that clients have set
         self._captured: dict[str, int] = {}  # ns, time of the newest picture of each perceived object, stale ones too
         self._presenter = ""  # service that presents the target
         service.on_alive(self._note_alive)
@@ -48,7 +49,7 @@ class WorldServer:
         service.on_request(keys.world_rpc("add"), AddObject, lambda r, _: self._edit(lambda w: self._add(w, r)))
         service.on_request(keys.world_rpc("move"), MoveObject, lambda r, _: self._edit(lambda w: self._move(w, r)))
         service.on_request(keys.world_rpc("remove"), OneName, lambda r, _: self._edit(lambda w: self._remove(w, r.name)))
-        service.on_request(keys.world_rpc("role"), SetRole, lambda r, _: self._edit(lambda w: w.set_role(r.name, r.role)))
+        service.on_request(keys.world_rpc("role"), SetRole, lambda r, _: self._edit(lambda w: self._set_role(w, r)))
         service.on_request(keys.world_rpc("attach"), Attach, lambda r, _: self._edit(lambda w: self._attach(w, r)))
         service.on_request(keys.world_rpc("detach"), OneName, lambda r, _: self._edit(lambda w: self._detach(w, r.name)))
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
@@ -145,8 +146,15 @@ class WorldServer:
         world.follow(self.pose)
         world.detach(name)
 
+    def _set_role(self, world: World, request: SetRole) -> None:
+        """Set a role; that of a perceived object stays also while vision moves it, until it is removed."""
+        world.set_role(request.name, request.role)
+        if request.name in self._perceived:
+            self._roles[request.name] = request.role
+
     def _remove(self, world: World, name: str) -> None:
         world.remove(name)
+        self._roles.pop(name, None)
         self._perceived.discard(name)
         self._expiry.pop(name, None)
         self._margins.pop(name, None)
@@ -154,17 +162,17 @@ class WorldServer:
     def _put(self, world: World, seen: WorldObject | AddObject, margin: float = 0.0) -> None:
         known = world.objects.get(seen.name)
         rotation = _rotation(seen.quaternion)
-        shape = _shape(seen.geometry, margin)
+        shape, role = _shape(seen.geometry, margin), self._roles.get(seen.name, seen.role)
         if known is not None and known.kind == shape.kind and known.size == shape.size:
             world.move(seen.name, position=seen.position, rotation=rotation)
-            if known.role != seen.role:
-                world.set_role(seen.name, seen.role)
+            if known.role != role:
+                world.set_role(seen.name, role)
             return
         valid_shape(seen.name, shape)
         valid_position(seen.name, seen.position)
         if known is not None:  # after the checks: an invalid object replaces nothing
             world.remove(seen.name)
-        world.add(seen.name, shape, position=seen.position, rotation=rotation, role=seen.role)
+        world.add(seen.name, shape, position=seen.position, rotation=rotation, role=role)
 
     def _move(self, world: World, request: MoveObject) -> None:
         rotation = None if request.quaternion is None else _rotation(request.quaternion)

@@ -51,6 +51,19 @@ def test_a_perceived_object_expires_when_it_is_not_seen_again(run: Stage) -> Non
     wait_for(lambda: [e for e in events if e.code == "expired"], "the event")
 
 
+def test_the_role_that_a_client_gives_a_perceived_object_stays_while_vision_moves_it(run: Stage) -> None:
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    run.rig.call(keys.world_rpc("role"), SetRole, Done, name="ball", role="ghost")
+    run.perceive([-0.3, 0.2, 0.0])
+    wait_for(lambda: run.world()["ball"].position == [-0.3, 0.2, 0.0], "its move")
+    assert run.world()["ball"].role == "ghost"
+    run.rig.call(keys.world_rpc("role"), SetRole, Done, name="ball", role="target")
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: run.world()["ball"].position == [-0.3, 0.1, 0.0], "its move")
+    assert run.world()["ball"].role == "target"
+
+
 def test_a_perceived_object_causes_contacts(run: Stage) -> None:
     palm = library().evaluate(run.rig.robot.home).position("left_palm")
     assert "ball" not in run.tick().touched.get("left_arm", [])
