@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A grasp from the side: where the palm is beside an upright thing, the postures there, and how the hand closes (thesis 4.3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mobee.arrays import Array, Ints
+from mobee.behaviours.hand import Hand
+from mobee.control.controller import Controller
+from mobee.control.gains import Gains
+from mobee.model.model import Model
+from mobee.roadmap.ik import costs
+from mobee.roadmap.ik.ngik import solve_ik
+from mobee.roadmap.ik.problem import chosen
+from mobee.robot.motor_units import limit_zones
+from mobee.robot.robot import Robot
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """Where a hand is when it closes around an upright thing, and how: numbers for a hand of the iCub, found in MuJoCo.
+
+    The axes of a palm are x along its fingers, -y to its thumb, z its normal.  `along`: m from the palm's marker to the thing's axis, along
+    the fingers.  `gap`: m between palm and thing when the hand closes, `before` at the pre-grasp.  `height`: m of the palm above the
+    ground on which the thing stands, at which the fields of hand and forearm do not reach the ground.  `oppose`, `spread`: rad, of the
+    thumb's opposition and the fingers' spread.  `fingers`, `thumb`: shares of closing.  `squeeze`: rad, how far beyond the place where they
+    were stopped the fingers press.
+    """
+
+    along: float = 0.047
+    gap: float = 0.009
+    before: float = 0.05
+    height: float = 0.105
+    oppose: float = float(np.deg2rad(85.0))
+    spread: float = float(np.deg2rad(10.0))
+    fingers: float = 0.5
+    thumb: float = 0.8
+    squeeze: float = 0.08
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Palm:
+    """A pose of a palm: position (3,) m and rotation (3, 3), root frame."""
+
+    position: Array
+    rotation: Array
+
+
+def palm_beside(place: ArrayLike, radius: float, azimuth: float, gap: float, ground: float, grip: Grip) -> Palm:
+    """Return the pose of the palm beside an upright thing of this radius [m], the thumb up.
+
+    `place`: (2,) m, of the thing's axis.  `azimuth`: rad; with 0 the palm faces the left (-y), and turns to the front (-x) with it.
+    `gap`: m, between palm and thing.  `ground`: m, height of what the thing stands on.
+    """
+    x, y = np.asarray(place, dtype=np.float64)
+    normal = np.array([-np.sin(azimuth), -np.cos(azimuth), 0.0])
+    fingers = np.cross(-UP, normal)
+    centre = np.array([x, y, ground + grip.height])
+    return Palm(centre - (radius + gap) * normal - grip.along * fingers, np.column_stack([fingers, -UP, normal]))
+
+
+class SideGrasp:
+    """Palm poses and postures for grasps from the side with one hand.
+
+    Args:
+        model: the robot in the world that it must not touch.
+        marker: of the palm.
+        motors: names of the parts and motors that move, without those of the fingers.
+        starts: (S, n) rad, postures from which inverse kinematics starts, and near which it stays.
+        grip: of the hand.
+        gains: of the law: a posture keeps away from the zones before the limits; None: the default ones.
+    """
+
+    def __init__(
+        self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, grip: Grip | None = None, gains: Gains | None = None
+    ) -> None:
+        self.model, self.marker, self.motors, self.grip = model, marker, tuple(motors), Grip() if grip is None else grip
+        self.hand = Hand(model.robot, marker)
+        law = Gains.default() if gains is None else gains
+        self._narrow = Model(_narrowed(model.robot, chosen(model.robot, motors), law), model.world)
+        self._controller = Controller(model, law)
+        names = [model.robot.motors[index] for index in self.hand.motors]
+        self._thumb, self._oppose, self._spread = (
+            self.hand.motors[[word in name for name in names]] for word in ("thumb", "thumb_oppose", "hand_finger")
+        )
+        self.starts = np.array([self.opened(start) for start in np.atleast_2d(np.asarray(starts, dtype=np.float64))])
+
+    def opened(self, q: Array) -> Array:
+        """Return q (n,) rad with the hand open and the thumb opposed, so that a thing fits between thumb and fingers."""
+        return self._closed(q, 0.0, 0.0)
+
+    def closed(self, q: Array) -> Array:
+        """Return q (n,) rad with fingers and thumb closed farther than the thing lets them."""
+        return self._closed(q, self.grip.fingers, self.grip.thumb)
+
+    def squeezed(self, q: Array) -> Array:
+        """Return where the fingers' motors hold what stopped them at q (n,) rad, (m,) rad: a little farther closed, so that they press on.
+
+        Farther goals would let strong fingers push a thing out of the hand in time.
+        """
+        fingers = q[self.hand.motors]
+        toward = np.clip(self.closed(q)[self.hand.motors] - fingers, -self.grip.squeeze, self.grip.squeeze)
+        held: Array = fingers + toward
+        return held
+
+    def posture(self, palm: Palm, starts: Array | None = None) -> Array | None:
+        """Return the posture (n,) rad with the palm there in which the law pushes least, without contacts of solids; None if there is none.
+
+        `starts`: (S, n) rad; None: those of the object.
+        """
+        found: list[tuple[float, Array]] = []
+        for start in self.starts if starts is None else starts:
+            within = np.clip(start, *self._narrow.robot.limits.T)
+            terms = [costs.position(self.marker, palm.position), costs.orientation(self.marker, palm.rotation)]
+            solution = solve_ik(
+                self._narrow,
+                costs=[*terms, costs.collision(), costs.home(within)],
+                start=within,
+                motors=self.motors,
+                method="least_squares",
+            )
+            if solution.reached:
+                found.append((self._push(solution.q), solution.q))
+        return min(found, key=lambda one: one[0])[1] if found else None
+
+    def _push(self, q: Array) -> float:
+        """Return the largest force of the law on a motor but those of the fingers, rad/s^2, while the hand may be near its target."""
+        forces = np.abs(self._controller.forces(self.model.evaluate(q, reaching=self.marker)).total)
+        forces[self.hand.motors] = 0.0
+        return float(forces.max())
+
+    def _closed(self, q: Array, fingers: float, thumb: float) -> Array:
+        found = self.hand.posture(q, fingers)
+        found[self._thumb] = self.hand.posture(q, thumb)[self._thumb]
+        found[self._oppose], found[self._spread] = self.grip.oppose, self.grip.spread
+        return found
+
+
+def _narrowed(robot: Robot, columns: Ints, gains: Gains) -> Robot:
+    """Return the robot with the ranges of some motors without the zones before their limits, in which the law pushes inward."""
+    zones = limit_zones(robot, gains.of_robot("limit_width", robot))
+    table = list(robot.motor_table)
+    for index in columns.tolist():
+        low, high = robot.limits[index] + zones[index] * np.array([1.0, -1.0])
+        table[index] = replace(table[index], limits=(low, high), home=float(np.clip(table[index].home, low, high)))
+    return replace(robot, motor_table=tuple(table))

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The way to a pre-grasp: a map of poses beside upright things, and new plans where the arm bumps into something (thesis 4.3.3)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mobee.arrays import Array
+from mobee.behaviours.bump import BumpWatch
+from mobee.behaviours.grasp import UP, Grip, SideGrasp
+from mobee.behaviours.pick import FAST, Body, Picker, Upright, is_free, pre_grasps
+from mobee.errors import MobeeError
+from mobee.model.model import Model
+from mobee.roadmap.building import tasks
+from mobee.roadmap.building.build import build_roadmap
+from mobee.roadmap.building.settings import RoadmapSettings
+from mobee.roadmap.ik import costs
+from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.robot import Robot
+
+THUMB = (0.0, -1.0, 0.0)  # in the frame of a palm
+MARKER, PART = "right_palm", "right_arm"
+ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw")
+MOTORS = ("torso", *(f"r_{joint}" for joint in ARM))
+WATCHED = ("torso_yaw", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw")
+"""Motors whose torques show that the right arm has bumped into something."""
+PLACES = ((-0.45, -0.2), (0.0, 0.42), (0.0, 0.12))
+"""m, of the palm: x, y, and the height above that of a grasp."""
+FACES = (0.0, float(np.deg2rad(60.0)))  # rad, azimuths
+SPACING = (0.03, 0.03, 0.05, float(np.deg2rad(20.0)))  # m and rad
+NEIGHBOURS, LONGEST, MARGIN = 16, 0.5, float(np.deg2rad(10.0))
+ASIDE = (-0.24, 0.38, 0.0, float(np.deg2rad(30.0)))  # of a pose with the hand at the side of the table
+PLANS = 6
+AROUND, OVER = (
+    0.05,
+    0.065,
+)  # m, beside and above the place of the palm at a bump, where it does not go again: what is there stands on the table
+_LEFT = {"shoulder_pitch": -40.0, "shoulder_roll": 40.0, "shoulder_yaw": -30.0, "elbow": 100.0}  # degrees, the left arm aside
+_RIGHT = {"shoulder_pitch": 0.0, "shoulder_roll": 80.0, "shoulder_yaw": -20.0, "elbow": 70.0}  # the right elbow away from the body
+
+
+def icub_starts(robot: Robot) -> Array:
+    """Return postures (2, n) rad of an iCub from which inverse kinematics starts, its left arm aside; in one its right elbow is away."""
+    aside = _changed(robot, robot.home, "l", _LEFT)
+    return np.stack([aside, _changed(robot, aside, "r", _RIGHT)])
+
+
+def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
+    """Return a map of poses with the thumb up, over the place of the palm and the azimuth that it faces (thesis fig. 4.8); takes seconds.
+
+    `ground`: m, height of what things stand on.  The world of `grasp` should be that without the things.
+    """
+    low = ground + grasp.grip.height
+    box = [*PLACES[:2], (low + PLACES[2][0], low + PLACES[2][1])]
+    return build_roadmap(
+        grasp.model,
+        costs=[costs.orientation(grasp.marker, UP, direction=THUMB), costs.collision(), costs.home()],
+        task=tasks.place(grasp.marker, "xyz", box) + tasks.angle(grasp.marker, (0, 0, -1), (0, -1, 0), *FACES),
+        spacing=SPACING,
+        start=grasp.starts[0],
+        motors=list(grasp.motors),
+        seed=0,
+        settings=RoadmapSettings("least_squares", NEIGHBOURS, LONGEST, MARGIN),
+    )
+
+
+def aside(trm: Roadmap, ground: float, grip: Grip) -> Array:
+    """Return the posture (n,) rad of a map with the hand at the side of the table, where it hides nothing."""
+    posture: Array = trm.q[trm.exit(np.array(ASIDE) + np.array([0.0, 0.0, ground + grip.height, 0.0]))]
+    return posture
+
+
+class Planner(Protocol):
+    """Plans motions to pre-grasps."""
+
+    def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
+        """Return a path (K, n) rad from a posture to the pre-grasp (n,) rad, whose azimuth [rad] is given; None without one.
+
+        The palm must go around or over the places `blocked` (B, 3) m, where the arm has bumped into something.
+        """
+        ...
+
+
+class MapPlanner:
+    """Searches the pre-grasp map in a world."""
+
+    def __init__(self, trm: Roadmap, world: Model, marker: str) -> None:
+        self._map, self._world, self._marker = replace(trm, model=world), world, marker
+        self._palms = trm.model.evaluate(trm.q).position(marker)
+
+    def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
+        """See Planner."""
+        place = self._world.evaluate(goal).position(self._marker)
+        try:
+            path = self._without(blocked).path(start, [*place, azimuth], free=True)
+        except MobeeError:
+            return None
+        whole = np.concatenate([path, goal[None]])
+        return whole if is_free(self._world, whole[-2:]) and is_around(self._world, self._marker, whole, blocked) else None
+
+    def _without(self, blocked: Array) -> Roadmap:
+        """Return the map without the poses whose palms are near blocked places."""
+        if not len(blocked):
+            return self._map
+        kept = ~near_any(self._palms, blocked)
+        number = np.cumsum(kept) - 1
+        edges = self._map.edges[kept[self._map.edges].all(axis=1)]
+        return replace(self._map, q=self._map.q[kept], y=self._map.y[kept], edges=number[edges])
+
+
+def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
+    """Return which places (P, 3) m of a palm are beside, below or just above blocked places (B, 3) m."""
+    beside = np.linalg.norm(palms[:, None, :2] - blocked[:, :2], axis=2) <= AROUND
+    found: NDArray[np.bool_] = (beside & (palms[:, None, 2] < blocked[:, 2] + OVER)).any(axis=1)
+    return found
+
+
+def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
+    """Return whether the marker goes around or over the blocked places (B, 3) m on a path (K, n) rad; it may begin near one."""
+    if not len(blocked):
+        return True
+    shares = np.linspace(0.0, 1.0, 10)[:, None, None]
+    poses = (path[:-1] + shares * (path[1:] - path[:-1])).reshape(-1, path.shape[1])
+    palms = model.evaluate(poses).position(marker)
+    near = near_any(palms, blocked)
+    return bool(near.all() or not near[int(near.argmin()) :].any())
+
+
+@dataclass(slots=True)
+class Approach:
+    """How an approach went: azimuth [rad] of the pre-grasp, None if it gave up; bumps, plans, processor time of the plans [s]."""
+
+    azimuth: float | None = None
+    bumps: int = 0
+    plans: int = 0
+    planning: float = 0.0
+
+
+def approach(body: Body, picker: Picker, thing: Upright, plan: Planner, watched: Sequence[str] = WATCHED) -> Approach:
+    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm.
+
+    `watched`: see BumpWatch.
+    """
+    found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
+    watch = BumpWatch(model.robot, watched)
+    while found.plans < PLANS:
+        begun = time.process_time()
+        chosen = _planned(picker, thing, plan, body.q, blocked)
+        if chosen is None and len(blocked):  # nothing leads around: perhaps there was nothing
+            chosen, blocked = _planned(picker, thing, plan, body.q, blocked[:0]), blocked[:0]
+        found.planning, found.plans = found.planning + time.process_time() - begun, found.plans + 1
+        if chosen is None:
+            return found
+        azimuth, path, goal = chosen
+        ended = body.follow(path, FAST, watch)
+        if not ended.bumped:
+            picker.arrive(path[-1], goal)
+            found.azimuth = azimuth
+            return found
+        found.bumps += 1
+        blocked = np.concatenate([blocked, model.evaluate(ended.q).position(picker.grasp.marker)[None]])
+    return found
+
+
+def _planned(picker: Picker, thing: Upright, plan: Planner, here: Array, blocked: Array) -> tuple[float, Array, Array] | None:
+    """Return the azimuth [rad], a path (K, n) rad to beside the thing, and the pre-grasp (n,) rad; None if there is no free path."""
+    for azimuth, away, goal in pre_grasps(picker.grasp, thing):
+        path = plan.path(here, away, azimuth, blocked)
+        if path is not None:
+            return azimuth, path, goal
+    return None
+
+
+def _changed(robot: Robot, q: ArrayLike, side: str, degrees: dict[str, float]) -> Array:
+    found = np.array(q, dtype=np.float64)
+    for joint, angle in degrees.items():
+        found[robot.motor_index(f"{side}_{joint}")] = np.deg2rad(angle)
+    return found
