@@ -18,6 +18,7 @@ EXPERIMENTS = {
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "constraint-discovery": "experiments.claims.ch7_learning.constraint_discovery",
     "constraint-violations": "experiments.claims.ch5_control.constraint_violations",
+    "cup": "experiments.claims.ch4_vision.cup",
     "curious-cup": "experiments.claims.ch7_learning.curious_cup",
     "exploration-coverage": "experiments.claims.ch7_learning.exploration_coverage",
     "exploration-uniformity": "experiments.claims.ch7_learning.exploration_uniformity",

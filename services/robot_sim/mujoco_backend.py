@@ -81,6 +81,11 @@ class MujocoBackend:
         self._world.move(name, position=position)
         self._scene.move(name, position)
 
+    def set_posture(self, q: Array) -> None:
+        """Put the motors at q (n,) rad, at rest."""
+        self._scene.set_posture(q)
+        self.motors.restart(self.motors.seed, q)
+
     def contact(self) -> SolidContact:
         """Return the deepest solid contact of the last tick."""
         if not self._deepest:

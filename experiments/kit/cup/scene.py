@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A cup and clutter on the table at random places, and what the robot sees of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+import mobee
+from mobee import Geometry, World, box, cylinder
+from mobee.arrays import Array
+from mobee.behaviours.pick import Upright
+
+CUP = "cup"
+TOP = -0.1  # m, of the table
+RADIUS, HEIGHT = 0.028, 0.13  # m, of the cup: thumb and fingers of the iCub enclose it
+MASS, FRICTION = 0.15, 0.8  # kg, and coefficient
+CLUTTER_MASS, CLUTTER_FRICTION = 0.3, 0.6
+NEAR, FAR = np.array([-0.42, -0.05]), np.array([-0.27, 0.2])  # m, of the cup's places
+CORNER, END = np.array([-0.55, -0.2]), np.array([-0.2, 0.28])  # m, of the clutter's
+APART = 0.12, 0.09  # m, of clutter from the cup, and from other clutter
+MOST = 3  # pieces of clutter
+SEEN = 0.002  # m, standard deviation of a seen place along each axis, of calibrated cameras (docs/vision.md)
+INFLATED = 0.005  # m, by which things are enlarged when motions are planned
+COLOR = (0.05, 0.3, 0.85)
+FALLEN = np.deg2rad(25.0)  # a thing that leans more was knocked over
+_COLORS = ((0.1, 0.6, 0.15), (0.85, 0.7, 0.1), (0.6, 0.6, 0.65))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A piece of clutter that stands on the table at a place (2,) m; the cameras do not see one that is not `seen`."""
+
+    shape: Geometry
+    place: Array
+    height: float
+    seen: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where the cup stands, (2,) m, and the clutter by name."""
+
+    cup: Array
+    clutter: Mapping[str, Piece]
+
+
+def placement(rng: np.random.Generator) -> Placement:
+    """Draw a cup and 0 to 3 pieces of clutter; if there is any, the first piece is one that the cameras do not see."""
+    cup, count = rng.uniform(NEAR, FAR), int(rng.integers(MOST + 1))
+    found: dict[str, Piece] = {}
+    while len(found) < count:
+        place, kind = rng.uniform(CORNER, END), int(rng.integers(2))
+        width, height = rng.uniform(0.05, 0.07), rng.uniform(0.06, 0.1)
+        others = [piece.place for piece in found.values()]
+        if np.linalg.norm(place - cup) < APART[0] or any(np.linalg.norm(place - other) < APART[1] for other in others):
+            continue
+        shape = box(width, width, height) if kind else cylinder(0.5 * width, height)
+        found[f"clutter {len(found)}"] = Piece(shape, place, height, seen=bool(found))
+    return Placement(cup, found)
+
+
+def true_world(scene: Placement) -> World:
+    """Return the world of the physics: everything but the table moves when it is pushed."""
+    world = table()
+    world.add(CUP, cylinder(RADIUS, HEIGHT), position=standing(scene.cup, HEIGHT), role="target", color=COLOR, mass=MASS, friction=FRICTION)
+    for number, (name, piece) in enumerate(scene.clutter.items()):
+        at = standing(piece.place, piece.height)
+        world.add(name, piece.shape, position=at, role="target", color=_COLORS[number], mass=CLUTTER_MASS, friction=CLUTTER_FRICTION)
+    return world
+
+
+def table() -> World:
+    """Return the world with the table alone."""
+    world = mobee.load_world("table")
+    world.remove("ball")
+    return world
+
+
+def standing(place: Array, height: float) -> Array:
+    """Return the position (3,) m of the centre of a thing of this height that stands on the table at (2,) m."""
+    return np.array([*place, TOP + 0.5 * height])
+
+
+def grown(shape: Geometry, margin: float) -> Geometry:
+    """Return a cylinder or box that is larger by a margin [m] on every side."""
+    if shape.kind == "box":
+        return box(*(size + 2.0 * margin for size in shape.size))
+    return cylinder(shape.size[0] + margin, shape.size[1] + 2.0 * margin)
+
+
+class Eyes:
+    """What the cameras see of the things: their places with noise, and nothing of what is not seen."""
+
+    def __init__(self, scene: Placement, seed: int) -> None:
+        self._rng, self._scene = np.random.default_rng([seed, 434]), scene
+
+    def cup(self, place: Array) -> Upright:
+        """Return the cup as it is seen when it is at (2,) m."""
+        return Upright(place + SEEN * self._rng.standard_normal(2), RADIUS, HEIGHT, TOP)
+
+    def show(self, world: World, cup: Upright, margin: float) -> None:
+        """Put cup and seen clutter into a world, enlarged by a margin [m], with the role of targets."""
+        world.add(CUP, grown(cylinder(RADIUS, HEIGHT), margin), position=standing(cup.place, HEIGHT), role="target")
+        for name, piece in self._scene.clutter.items():
+            if piece.seen:
+                at = piece.place + SEEN * self._rng.standard_normal(2)
+                world.add(name, grown(piece.shape, margin), position=standing(at, piece.height), role="target")

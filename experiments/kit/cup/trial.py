@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One trial of the cup experiment: reach the pre-grasp, close the hand, lift the cup and put it down elsewhere, judged in the physics."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from experiments.kit.cup.approaches import RrtPlanner, ready, roadmap, robot, roomy_placement, side_grasp
+from experiments.kit.cup.learned import by_learner
+from experiments.kit.cup.scene import (
+    CUP,
+    FALLEN,
+    HEIGHT,
+    INFLATED,
+    RADIUS,
+    TOP,
+    Eyes,
+    Placement,
+    grown,
+    standing,
+    table,
+    true_world,
+)
+from experiments.kit.physics_plant import PhysicsPlant
+from mobee import Geometry, Model, World, cylinder
+from mobee.arrays import Array
+from mobee.behaviours.grasp import palm_beside
+from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near, touches
+from mobee.behaviours.pre_grasp import MARKER, Approach, MapPlanner, approach
+from mobee.model.world_object import WorldObject
+
+TORQUES = {"?_*_distal": 0.09, "?_pinky": 0.09, "?_hand_finger": 0.3, "?_thumb_*": 0.3, "?_index_*": 0.3, "?_middle_*": 0.3}
+"""N m, of the motors of the fingers: the robot's file has 40 for all."""
+NEAR, ANGLE = 0.02, float(np.deg2rad(15.0))  # m and rad, of the pre-grasp
+LIFTED, PLACED = 0.05, 0.05  # m: how high the cup must come, and how near to its goal
+UPRIGHT = float(np.deg2rad(10.0))
+SHIFTS = 0.07, 0.16  # m, of the goal from where the cup stood
+GOALS = 24
+
+
+@dataclass(slots=True)
+class Result:
+    """What a trial measured; m, rad, s.
+
+    `distance`, `angle`: of the palm from the place beside the true cup, and of its normal from the direction to it; `pre_grasp`: both are
+    small, and nothing was knocked over.  `pushed`: how far a thing was pushed until then, at most.  `lifted`: height; `placed`: distance
+    from the goal; `done`: lifted, and put down upright near its goal.  `why`: where it ended.
+    """
+
+    pre_grasp: bool = False
+    done: bool = False
+    distance: float = -1.0
+    angle: float = -1.0
+    pushed: float = -1.0
+    knocked: bool = False
+    lifted: float = 0.0
+    placed: float = -1.0
+    bumps: int = 0
+    plans: int = 0
+    planning: float = 0.0
+    clutter: int = 0
+    why: str = ""
+    seconds: float = 0.0
+
+
+class Trial:
+    """A scene, the plant in it and what it knows; `run` makes the trial."""
+
+    def __init__(self, method: str, seed: int) -> None:
+        self.scene: Placement = roomy_placement(seed)
+        self.eyes = Eyes(self.scene, seed)
+        self.seen = self.eyes.cup(self.scene.cup)
+        known, planned = table(), table()
+        self.eyes.show(known, self.seen, 0.0)
+        self.eyes.show(planned, self.seen, INFLATED)
+        self.plant = PhysicsPlant(Model(robot(), known), true_world(self.scene), seed, ready(), TORQUES)
+        self.plant.exempt = MARKER
+        self._planned = Model(robot(), planned)
+        self.grasp = side_grasp(self._planned)
+        self.picker = Picker(self.plant, self.grasp)
+        self._method, self._seed = method, seed
+        self.result = Result(clutter=len(self.scene.clutter))
+        self._before = {name: thing.position[:2].copy() for name, thing in self.plant.things.items()}
+
+    def run(self) -> Result:
+        """Make the trial."""
+        self.plant.stand(ready(), self.picker.motors)
+        found = self._approach()
+        result = self.result
+        result.bumps, result.plans, result.planning = found.bumps, found.plans, found.planning
+        if found.azimuth is None:
+            result.why = "no way to the pre-grasp"
+        else:
+            self._judge(found.azimuth)
+            self._pick(found.azimuth)
+        result.seconds = self.plant.time
+        return result
+
+    def _approach(self) -> Approach:
+        if self._method == "learner":
+            return by_learner(self.plant, self.seen)
+        planner = MapPlanner(roadmap(), self._planned, MARKER) if self._method == "map" else RrtPlanner(self._planned, self._seed)
+        return approach(self.plant, self.picker, self.seen, planner)
+
+    def _judge(self, azimuth: float) -> None:
+        """Compare the pose of the palm with the place beside the cup, where the cup truly is."""
+        things, result = self.plant.things, self.result
+        cup = things[CUP].position[:2]
+        wanted = palm_beside(cup, RADIUS, azimuth, self.grasp.grip.before, TOP, self.grasp.grip)
+        pose = self.plant.model.evaluate(self.plant.body.motors.q)
+        result.distance = float(np.linalg.norm(pose.position(MARKER) - wanted.position))
+        result.angle = float(np.arccos(np.clip(pose.rotation(MARKER)[:, 2] @ wanted.rotation[:, 2], -1.0, 1.0)))
+        result.pushed = max(float(np.linalg.norm(things[name].position[:2] - at)) for name, at in self._before.items())
+        result.knocked = any(leans(thing) > FALLEN for thing in things.values() if thing.movable)
+        result.pre_grasp = bool(result.distance <= NEAR and result.angle <= ANGLE and not result.knocked)
+
+    def _pick(self, azimuth: float) -> None:
+        result, world = self.result, self._planned.world
+        cup = self.plant.things[CUP]
+        if leans(cup) > FALLEN:
+            result.why = "the cup fell before the grasp"
+            return
+        seen = self.eyes.cup(cup.position[:2])  # looks again
+        world.set_role(CUP, "ghost")
+        try:
+            self.picker.close(seen, azimuth)
+            self.picker.lift(seen, azimuth)
+            cup = self.plant.things[CUP]
+            result.lifted = float(cup.position[2] - standing(cup.position[:2], HEIGHT)[2])
+            if result.lifted < LIFTED:
+                result.why = "the cup was not lifted"
+                return
+            slipped = self.picker.slipped(seen, np.append(self.eyes.cup(cup.position[:2]).place, cup.position[2]))
+            goal = self.picker.put(seen, self._goals(seen, azimuth), slipped, self._in_the_way)
+        except NoPosture as error:
+            result.why = str(error)
+            return
+        cup = self.plant.things[CUP]
+        result.placed = float(np.linalg.norm(cup.position[:2] - goal))
+        knocked = any(leans(thing) > FALLEN for thing in self.plant.things.values() if thing.movable)
+        stands = leans(cup) < UPRIGHT and abs(cup.position[2] - standing(goal, HEIGHT)[2]) < 0.01
+        result.done = bool(stands and result.placed <= PLACED and not knocked)
+        result.why = (
+            "" if result.done else "the cup does not stand at its goal" if not stands else "off its goal" if not knocked else "clutter fell"
+        )
+
+    def _goals(self, thing: Upright, azimuth: float) -> list[Array]:
+        """Return places for the cup without seen clutter near them."""
+        places = places_near(thing.place, azimuth, SHIFTS, GOALS, np.random.default_rng([self._seed, 437]))
+        others = [item.position[:2] for name, item in self._planned.world.objects.items() if name not in ("table", CUP)]
+        clear = [place for place in places if all(np.linalg.norm(place - other) > 0.09 for other in others)]
+        return [place for place in clear if -0.45 < place[0] < -0.24 and -0.08 < place[1] < 0.24]
+
+    def _in_the_way(self, path: Array) -> bool:
+        """Return whether the cup in the hand would touch something, but the table when it is put down, on a path of three postures."""
+        held = Model(robot(), World())
+        for name, item in self._planned.world.objects.items():
+            if name not in (CUP, "table"):
+                held.world.add(name, shape_of(item), position=item.position, rotation=item.rotation)
+        held.world.add(CUP, grown(cylinder(RADIUS, HEIGHT), INFLATED), position=self.plant.things[CUP].position)
+        held.attach(CUP, robot().links[robot().marker(MARKER).link], path[0])
+        return touches(held, path[:2])
+
+
+def leans(thing: WorldObject) -> float:
+    """Return how far a thing leans, rad."""
+    return float(np.arccos(np.clip(thing.rotation[2, 2], -1.0, 1.0)))
+
+
+def shape_of(item: WorldObject) -> Geometry:
+    """Return the shape of an object."""
+    return Geometry(item.kind, item.size)
+
+
+def run_trial(method: str, seed: int) -> dict[str, object]:
+    """Return the result of a trial as JSON values."""
+    return asdict(Trial(method, seed).run())

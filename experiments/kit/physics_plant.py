@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A plant with MuJoCo in one process: model, controller and physics tick by tick, as the live system runs them in lockstep.
+
+The model knows a world of its own, in which things are where they are believed to be; the physics has the true one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mobee import Controller, Model, World
+from mobee.arrays import Array, Ints
+from mobee.behaviours.bump import BumpWatch
+from mobee.behaviours.pick import Followed
+from mobee.control import SettleTest
+from mobee.control.gains import Verdict
+from mobee.model.contact import touched_by
+from mobee.model.pose import Pose
+from mobee.model.world_object import WorldObject
+from mobee.plant import Outcome
+from mobee.reach import ReachOutcome, ReachTarget
+from mobee.roadmap.playback import PERIOD, attractors, timed
+from mobee.simulation.actions import ReachesUnderWay
+from mobee.simulation.motors import MotorParameters
+from services.robot_sim.strength import with_torques
+
+if TYPE_CHECKING:
+    from services.robot_sim.mujoco_backend import MujocoBackend
+
+DT = 0.01  # s
+ENOUGH = float(np.deg2rad(0.7))  # rad, a posture is reached
+CORRECTIONS = 4  # of the attractor, for what forces keep the motors from a posture
+CORRECTED = 1.5  # s, at most, for each
+CALM = float(np.deg2rad(1.0))  # rad/s, of motors at rest
+MOMENT = 6  # periods of a path, before a bump
+BACK = 3.0  # s of the motion that is undone after a bump
+
+
+class PhysicsPlant:
+    """A ReachPlant whose body MuJoCo moves, with the law's default gains and motors as published.
+
+    Args:
+        model: the robot in the world as it is believed to be.
+        truth: the world of the physics.
+        seed: of the encoders' noise.
+        start: (n,) rad, the posture at the start, at rest.
+        torques: see `with_torques`.
+    """
+
+    def __init__(self, model: Model, truth: World, seed: int, start: Array, torques: Mapping[str, float]) -> None:
+        from services.robot_sim.mujoco_backend import MujocoBackend  # optional
+
+        self.model, self.robot, self.dt = model, model.robot, DT
+        self.controller = Controller(model)
+        self.body: MujocoBackend = MujocoBackend(with_torques(model.robot, torques), lambda: truth, MotorParameters(), seed, DT)
+        self.body.set_posture(start)
+        self.controller.reset(start)
+        self._track, self._reaches = model.track(), ReachesUnderWay(model, self.controller)
+        self._command, self._encoders = np.zeros(len(start)), start.copy()
+        self._pose: Pose = model.evaluate(start)
+        self._ticks = 0
+        self._watch: Callable[[float], None] | None = None
+        self.exempt: str | None = None
+        """A marker whose hand the targets do not push."""
+
+    @property
+    def q(self) -> Array:
+        """See Plant."""
+        return self._encoders.copy()
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._ticks * self.dt
+
+    @property
+    def things(self) -> Mapping[str, WorldObject]:
+        """The objects as they truly are."""
+        return self.body.world.objects
+
+    def every_tick(self, callback: Callable[[float], None] | None) -> None:
+        """Call a function with the time [s] after every tick, as for pictures; None: no more."""
+        self._watch = callback
+
+    def measure(self, part: str) -> Array:
+        """See Plant."""
+        return self._encoders[self.robot.part(part).slice].copy()
+
+    def tick(self) -> None:
+        """Run one control tick; a command moves the motors in the tick after the one in which it was computed."""
+        self._ticks += 1
+        self._encoders = self.body.motors.encoders(self._ticks, self.dt)
+        reaching = self._reaches.reaching
+        self._pose = self._track.evaluate(
+            self._encoders, (*reaching, self.exempt) if self.exempt and self.exempt not in reaching else reaching
+        )
+        velocity = self.controller.step(self._encoders, self.dt, pose=self._pose).velocity.copy()
+        self.body.motors.command(slice(None), "velocity", self._command)
+        self.body.step(self.dt)
+        self._command = velocity
+        if self._watch is not None:
+            self._watch(self.time)
+
+    def run(self, seconds: float) -> None:
+        """Run for a time."""
+        for _ in range(round(seconds / self.dt)):
+            self.tick()
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """See Plant."""
+        self._reaches.drop(part)
+        self.controller.set_attractor(part, target)
+        return self._settled(part)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """See ReachPlant."""
+        self._reaches.present(target)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """See ReachPlant."""
+        self._reaches.begin(part, marker, stay)
+        end = self._settled(part)
+        while self._reaches.ended(part, end, self.model.evaluate(self._encoders)):
+            end = self._settled(part)
+        return self._reaches.outcome(part)
+
+    def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+        """See Body; after a bump the robot moves back a little."""
+        wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
+        if watch is not None:
+            watch.begin()
+        passed: list[Array] = []
+        for attractor in attractors(self.robot, wanted, self.controller.gains):
+            self.controller.attractor = attractor if offset is None else np.clip(attractor + offset, *self.robot.limits.T)
+            for _ in range(round(PERIOD / self.dt)):
+                self.tick()
+                if watch is not None and watch.note(self._encoders, self.body.motors.efforts, self.dt):
+                    found = Followed(True, self.q, passed[-min(len(passed), MOMENT)] if passed else self.q)
+                    self._back_off(passed)
+                    return found
+            passed.append(self.q)
+        self._calm(CORRECTED)
+        return Followed(False, self.q, self.q)
+
+    def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
+        """See Body."""
+        self.controller.attractor = q if offset is None else np.clip(q + offset, *self.robot.limits.T)
+        self.run(seconds)
+
+    def stand(self, q: Array, motors: Ints) -> Array:
+        """See Body: what remains after a settled motion is added to the attractor, a few times."""
+        self.controller.attractor = q
+        for number in range(CORRECTIONS + 1):
+            self._calm(CORRECTED)
+            missing = np.zeros(len(q))
+            missing[motors] = (q - self._encoders)[motors]
+            if np.abs(missing).max() < ENOUGH or number == CORRECTIONS:
+                break
+            self.controller.attractor = np.clip(self.controller.attractor + missing, *self.robot.limits.T)
+        offset: Array = self.controller.attractor - q
+        return offset
+
+    def _back_off(self, passed: list[Array]) -> None:
+        """Move back to where the robot was a little earlier."""
+        self.controller.attractor = passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q
+        self._calm(CORRECTED)
+
+    def _calm(self, seconds: float) -> None:
+        """Run until no motor is commanded to move, or for a time."""
+        end, slow = self.time + seconds, CALM
+        self.run(0.2)
+        while self.time < end and np.abs(self.controller.velocity).max() > slow:
+            self.run(0.1)
+
+    def _settled(self, part: str) -> Outcome:
+        """Run until the part has settled or timed out."""
+        where, begun = self.robot.part(part).slice, self.time
+        test, verdict = SettleTest(self.controller.gains.settle, begun), _MOVING
+        while verdict == "moving":
+            self.tick()
+            speeds, changes = self.controller.velocity[where], self.controller.acceleration[where]
+            verdict = test.update(self.time, np.abs(speeds), np.abs(changes))
+        return Outcome(self.measure(part), verdict == "settled", self.time - begun, touched_by(self._pose, part))
+
+
+_MOVING: Verdict = "moving"

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+from experiments.kit.cup.approaches import ready, roadmap, robot  # noqa: E402  # only where MuJoCo is
+from experiments.kit.cup.scene import CUP, RADIUS, TOP, Piece, Placement, table, true_world  # noqa: E402  # only where MuJoCo is
+from experiments.kit.cup.trial import Trial  # noqa: E402  # only where MuJoCo is
+from experiments.kit.physics_plant import PhysicsPlant  # noqa: E402  # only where MuJoCo is
+from mobee import Model, ReachTarget, box  # noqa: E402  # only where MuJoCo is
+from mobee.behaviours.bump import BumpWatch  # noqa: E402  # only where MuJoCo is
+from mobee.behaviours.pick import FAST  # noqa: E402  # only where MuJoCo is
+from mobee.behaviours.pre_grasp import WATCHED  # noqa: E402  # only where MuJoCo is
+
+HIDDEN = Piece(box(0.06, 0.06, 0.09), np.array([-0.25, 0.2]), 0.09, seen=False)
+
+
+def test_a_hand_closes_around_a_cup_lifts_it_and_puts_it_down_elsewhere() -> None:
+    trial = Trial("map", 406)
+    assert not trial.scene.clutter
+    result = trial.run()
+    assert result.pre_grasp
+    assert result.distance < 0.01
+    assert result.lifted > 0.05
+    assert result.done, result.why
+    assert np.linalg.norm(trial.plant.things[CUP].position[:2] - trial.scene.cup) > 0.04
+    assert trial.plant.model.world.objects[CUP].position[2] == pytest.approx(TOP + 0.065)  # nobody has told the model that it moved
+
+
+def test_acting_and_reaching_end_as_on_other_plants() -> None:
+    model = Model(robot(), roadmap().model.world)
+    plant = PhysicsPlant(model, model.world, 0, ready(), {})
+    goal = plant.measure("right_arm")
+    goal[3] -= 0.2
+    outcome = plant.act("right_arm", goal)
+    assert outcome.settled
+    np.testing.assert_allclose(outcome.q[3], goal[3], atol=0.05)
+    place = model.evaluate(plant.q).position("right_palm") + (0.0, 0.0, 0.06)
+    plant.present(ReachTarget(place, RADIUS))
+    reached = plant.reach("right_arm", "right_palm", stay=True)
+    assert reached.settled
+    assert reached.missing < 0.02
+    plant.present(None)
+
+
+def test_a_bump_ends_a_motion_before_what_nobody_sees_is_knocked_over() -> None:
+    plant = PhysicsPlant(Model(robot(), table()), true_world(Placement(np.array([-0.5, -0.1]), {"clutter": HIDDEN})), 0, ready(), {})
+    trm = roadmap()
+    path = trm.path(ready(), [-0.24, 0.1, TOP + 0.105, 0.0])
+    ended = plant.follow(path, FAST, BumpWatch(robot(), WATCHED))
+    assert ended.bumped
+    thing = plant.things["clutter"]
+    np.testing.assert_allclose(thing.position[:2], HIDDEN.place, atol=0.02)
+    assert thing.rotation[2, 2] > 0.99
+    free = PhysicsPlant(Model(robot(), table()), table(), 0, ready(), {})
+    assert not free.follow(path, FAST, BumpWatch(robot(), WATCHED)).bumped
