@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`python -m services.cup`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from services.common.config import load_config
+from services.common.entry import explained, robot_of
+from services.common.service import Service
+from services.cup.config import Config
+from services.cup.node import CupNode
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Fetch the cup until it stands elsewhere, a signal or a shutdown call."""
+    config = load_config(Config, argv, "services.cup")
+    with explained("services.cup"):
+        robot = robot_of(config)
+        with Service("cup", config, robot) as service:
+            CupNode(service, config, robot).run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The running robot as a `Body` that follows paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from bus_schema.messages import State
+from mobee.arrays import Array, Ints
+from mobee.behaviours.bump import BumpWatch
+from mobee.behaviours.pick import Followed
+from mobee.control.gains import Gains
+from mobee.errors import ActionInterrupted
+from mobee.roadmap.playback import PERIOD, attractors, timed
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Robot
+from services.common.bus_follow import BusFollower
+from services.common.service import Service
+
+ENOUGH = float(np.deg2rad(0.7))  # rad, a posture is reached
+CORRECTIONS = 4  # of the attractor, for what forces keep the motors from a posture
+CALM = 1.5  # s, at most, for each
+SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
+HOLDS = 10  # in a row, after each of which the motion continues
+SLOWEST = 0.1  # simulated s in a s of real time
+STILL = 0.3  # s of the robot's clock in which nothing may be commanded to move
+MOMENT = 6  # periods of a path, before a bump
+BACK = 3.0  # s of the motion that is undone after a bump
+
+
+class Bumped(Exception):
+    """Ends a motion in which the arm has bumped into something."""
+
+
+class BusBody(BusFollower):
+    """The parts `parts` of the robot on the bus; `require_seen` is called before every step, and raises to end a motion."""
+
+    def __init__(self, service: Service, robot: Robot, parts: Sequence[str], gains: Gains, require_seen: Callable[[], None]) -> None:
+        super().__init__(service, robot)
+        self._parts, self._gains, self._require_seen = tuple(parts), gains, require_seen
+        self._torques = np.zeros(len(robot.motors))
+        self._watch: BumpWatch | None = None
+        self._last, self._bumped = 0.0, False
+        self._goal = robot.home
+        for part in robot.parts:
+            service.on_each(State, partial(self._note_state, part), part)
+
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None, offset: Array | None) -> Followed:
+        """See Body.follow."""
+        robot = self.robot
+        rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains))
+        if offset is not None:
+            rows = [np.clip(row + offset, *robot.limits.T) for row in rows]
+        if watch is not None:
+            watch.begin()
+        self._watch, self._bumped, self._last = watch, False, self._now
+        passed: list[Array] = []
+        begun = self._now
+        try:
+            for number, row in enumerate(rows):
+                self._step(row)
+                passed.append(self.q)
+                self._wait_until(begun + (number + 1) * PERIOD)
+        except Bumped:
+            self._watch, found = None, Followed(True, self.q, passed[-min(len(passed), MOMENT)] if passed else self.q)
+            self._back(passed)
+            return found
+        finally:
+            self._watch = None
+        self._calm()
+        return Followed(False, self.q, self.q)
+
+    def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
+        """See Body."""
+        self._step(q if offset is None else q + offset)
+        self._wait_until(self._now + seconds)
+
+    def stand(self, q: Array, motors: Ints) -> Array:
+        """See Body."""
+        aim = q.copy()
+        self._step(aim)
+        for number in range(CORRECTIONS + 1):
+            self._calm()
+            missing = np.zeros(len(q))
+            missing[motors] = (q - self.q)[motors]
+            if np.abs(missing).max() < ENOUGH or number == CORRECTIONS:
+                break
+            aim = np.clip(aim + missing, *self.robot.limits.T)
+            self._step(aim)
+        offset: Array = aim - q
+        return offset
+
+    def _back(self, passed: list[Array]) -> None:
+        """Move back to where the robot was a little earlier."""
+        self._step(passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q)
+        self._calm()
+
+    def _step(self, q: Array) -> None:
+        """Set the attractors of the parts to those of q (n,) rad; after a hold, as soon as the parts are under control again."""
+        self._require_seen()
+        self._goal = np.clip(q, *self.robot.limits.T)
+        for left in reversed(range(HOLDS)):
+            try:
+                for part in self._parts:
+                    self._aim(part, self._goal[self.robot.part(part).slice])
+                return
+            except ActionInterrupted:
+                if not left:
+                    raise
+                self.take(self._parts)
+
+    def _calm(self) -> None:
+        """Wait until nothing that carries the hand is commanded to move, or for CALM s of the robot's clock."""
+        end, still = self._now + CALM, self._now
+        slow = SLOW * fine_units(self.robot)
+        while self._now < end and self._now - still < STILL:
+            self._wait_until(self._now + PERIOD)
+            fast = any(
+                (np.abs(self._motion[part].dq) > slow[self.robot.part(part).slice]).any() for part in self._parts if part in self._motion
+            )
+            still = self._now if fast else still
+
+    def _wait_until(self, moment: float) -> None:
+        """Wait for a moment of the robot's clock, s; raises Bumped, and ActionInterrupted if a part is lost or the clock stands still."""
+        run, patience = self._runs, (moment - self._now) / SLOWEST + 5.0
+        while self._now < moment and not self._bumped:
+            try:
+                self._until(self._parts, run, lambda: self._now >= moment or self._bumped, patience, "the robot's clock stands still")
+            except ActionInterrupted:
+                if run != self._runs or self._has(self._parts):
+                    raise
+                self._step(self._goal)
+        self._require_seen()
+        if self._bumped:
+            self._bumped = False
+            raise Bumped
+
+    def _note_state(self, part: str, state: State) -> None:
+        self._torques[self.robot.part(part).slice] = state.tau
+        if self._watch is None or part != self._parts[-1] or not self._seen:
+            return
+        now = state.t * 1e-9
+        if self._watch.note(self._seen[-1][1], self._torques, now - self._last):
+            self._bumped = True
+        self._last = now
+
+
+class Mover:
+    """A `Body` of a BusBody."""
+
+    def __init__(self, body: BusBody) -> None:
+        self._body = body
+        self.press, self.stand = body.press, body.stand
+
+    @property
+    def q(self) -> Array:
+        """See Body."""
+        return self._body.q
+
+    def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+        """See Body."""
+        return self._body.follow_path(path, speed, watch, offset)
+
+
+__all__ = ["ActionInterrupted", "BusBody", "Mover"]
