@@ -52,6 +52,7 @@ class CupNode:
         self._status, self._done, self._failed = f"waits: no place of {config.target} yet", 0, 0
         self._seen: WorldObject | None = None
         self._hidden = False  # the hand hides it: the model's world, which keeps it for a while, is enough
+        self._gripped = False  # the hand has closed around it: it moves with the hand, seen or not
         self._planned = World()
         service.describe, service.mark = self._describe, lambda: None
         service.on_newest(WorldObject, self._note, config.target)
@@ -76,7 +77,7 @@ class CupNode:
 
     def _fetch(self) -> None:
         """Fetch the thing once; raises Paused and what the steps raise."""
-        self._hidden = False
+        self._hidden = self._gripped = False
         self._require_seen()
         self._report("takes torso and right arm")
         self._body.take(PARTS)
@@ -95,12 +96,14 @@ class CupNode:
             thing = self._thing()
             self._report("closes the hand")
             picker.close(thing, found.azimuth)
+            self._gripped = True
             self._report("lifts it")
             picker.lift(thing, found.azimuth)
             self._report("puts it down")
             goal = picker.put(thing, self._goals(thing, found.azimuth), self._slipped(picker, thing))
             self._set_roles("target")
-            self._go_aside(self._picker())
+            self._go_aside(self._picker())  # not seen on the way either: the hand was before it until now
+            self._gripped = False
             self._look(goal)
         finally:
             self._set_roles("target")
@@ -178,7 +181,9 @@ class CupNode:
         self._service.bus.event("warning", "cup_missed", f"{name} {where}")
 
     def _require_seen(self) -> None:
-        """Raise Paused unless the thing was seen a moment ago, or is hidden by the hand and the model still has it."""
+        """Raise Paused unless the thing was seen a moment ago, is hidden by the hand and not withdrawn, or is in the hand."""
+        if self._gripped:
+            return
         seen, now = self._seen, self._service.bus.t
         if seen is None:
             raise Paused(f"no place of {self._config.target} yet")
