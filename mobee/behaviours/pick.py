@@ -140,9 +140,8 @@ class Picker:
         there = self.body.q if self._there is None else self._there
         self.body.follow(np.stack([there, here]), SLOW, offset=self._offset)
         self._offset = self.body.stand(here, self.motors)
-        self.body.press(
-            self.grasp.closed(here), CLOSING, self._offset
-        )  # the fingers arrive before the thumb, which pushes the thing into them
+        # The fingers arrive before the thumb, which pushes the thing into them.
+        self.body.press(self.grasp.closed(here), CLOSING, self._offset)
         self._fingers = self.grasp.squeezed(self.body.q)
         self.body.press(self._held(here), SQUEEZING, self._offset)
 

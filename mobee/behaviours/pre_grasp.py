@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way to a pre-grasp: a map of poses beside upright things, and new plans where the arm bumps into something (thesis 4.3.3)."""
+"""Paths to a pre-grasp: a map of poses beside upright things, and new plans where the arm bumps into something (thesis 4.3.3)."""
 
 from __future__ import annotations
 
@@ -37,10 +37,8 @@ SPACING = (0.03, 0.03, 0.05, float(np.deg2rad(20.0)))  # m and rad
 NEIGHBOURS, LONGEST, MARGIN = 16, 0.5, float(np.deg2rad(10.0))
 ASIDE = (-0.24, 0.38, 0.0, float(np.deg2rad(30.0)))  # of a pose with the hand at the side of the table
 PLANS = 6
-AROUND, OVER = (
-    0.05,
-    0.065,
-)  # m, beside and above the place of the palm at a bump, where it does not go again: what is there stands on the table
+AROUND, OVER = 0.05, 0.065
+"""m, beside and above the place of the palm at a bump, to which it does not return: what is there stands on the table."""
 _LEFT = {"shoulder_pitch": -40.0, "shoulder_roll": 40.0, "shoulder_yaw": -30.0, "elbow": 100.0}  # degrees, the left arm aside
 _RIGHT = {"shoulder_pitch": 0.0, "shoulder_roll": 80.0, "shoulder_yaw": -20.0, "elbow": 70.0}  # the right elbow away from the body
 

@@ -163,6 +163,3 @@ class Mover:
     def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
         """See Body."""
         return self._body.follow_path(path, speed, watch, offset)
-
-
-__all__ = ["ActionInterrupted", "BusBody", "Mover"]

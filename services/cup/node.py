@@ -16,7 +16,7 @@ from mobee.behaviours.grasp import SideGrasp
 from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near
 from mobee.behaviours.pre_grasp import ASIDE, MOTORS, MapPlanner, approach, aside, icub_starts, pre_grasp_map
 from mobee.control.gains import Gains
-from mobee.errors import ActionInterrupted, MobeeError
+from mobee.errors import MobeeError
 from mobee.model.kinematics import matrix_from_quaternion
 from mobee.model.model import Model
 from mobee.model.world import World
@@ -68,9 +68,7 @@ class CupNode:
         while self._done < self._config.times:
             try:
                 self._fetch()
-            except (Paused, NoPosture, ActionInterrupted, CallFailed) as error:
-                self._pause(str(error))
-            except MobeeError as error:
+            except (MobeeError, CallFailed) as error:
                 self._pause(str(error))
             self._service.spin(time.monotonic() + PAUSE)
             self._service.check_router()
@@ -187,11 +185,10 @@ class CupNode:
         seen, now = self._seen, self._service.bus.t
         if seen is None:
             raise Paused(f"no place of {self._config.target} yet")
-        age = 1e-9 * (now - seen.t_capture)
         if seen.valid_until < now:
-            raise Paused(f"{self._config.target} is stale: its newest picture is {age:.1f} s old")
-        if not self._hidden and age > self._config.fresh:
-            raise Paused(f"no picture of {self._config.target} for {age:.1f} s")
+            raise Paused(f"{self._config.target} is stale: vision has withdrawn it")
+        if not self._hidden and 1e-9 * (now - seen.t_capture) > self._config.fresh:
+            raise Paused(f"no picture of {self._config.target} for {self._config.fresh:g} s")
 
     def _objects(self) -> list[ObjectState]:
         return self._service.call(keys.world_rpc("list"), Empty, WorldReply, tries=TRIES).objects
