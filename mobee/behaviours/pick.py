@@ -182,9 +182,9 @@ class Picker:
 
     def _set_down(self, path: Array, back: Array) -> None:
         self.body.follow(path[:2], GENTLE, offset=self._offset)
+        # At the end of the motion down nothing is corrected: the thing may have tilted in the hand and stand already.
         offset = self.body.stand(path[1], self.motors)
         self.body.follow(path[1:], SLOW, offset=offset)
-        offset = self.body.stand(path[2], self.motors)
         opened = self.grasp.opened(path[2])
         self.body.follow(np.stack([path[2], opened]), FAST, offset=offset)
         self.body.follow(np.stack([opened, back]), SLOW, offset=offset)
