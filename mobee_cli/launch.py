@@ -17,7 +17,8 @@ from services.common.identity import default_folder
 from services.launcher.run import Options, launch
 from services.launcher.scenario import shipped
 
-_NOTES = """Shipped scenarios: {scenarios}.
+_NOTES = """Shipped scenarios:
+{scenarios}.
 Ctrl-C ends all processes, a second Ctrl-C kills them. The summary goes to
 standard output, everything else to standard error."""
 

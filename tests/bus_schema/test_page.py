@@ -22,7 +22,8 @@ SHARED = {
     "behaviour.py": "behaviour",
     "followed_part.py": "behaviour",
 }  # files of services/common that one service uses
-FOLDERS = {"agents": "agent", "gaze": "behaviour", "assist": "behaviour"}  # whose parties have another name
+FOLDERS = {"agents": "agent", "gaze": "behaviour", "assist": "behaviour", "cup": "client"}  # whose parties have another name
+READ_ALL = ("", "operator", "client")
 IMPLIED = {"on_clock": "Clock", "on_tick": "Tick", "Body": "State", "StopLine": "EStop"}  # functions that read one stream
 PROGRAMS = {"client", "driver"}  # of a user, outside of this repository
 MIRRORS = "port_filter"  # publishes the robot's own streams to its clients
@@ -69,7 +70,7 @@ MAKERS = ((keys.drive, ("p",)), (keys.goal, ("p",)), (keys.sim, ()), (keys.world
 
 
 def service_of(path: Path) -> str:
-    """Return the party whose code a file is; the operator reads all streams, so the readers of `found` are services alone."""
+    """Return the party whose code a file is; operator and clients read all streams, so the readers of `found` are services alone."""
     if path.is_relative_to(ROOT / "mobee_cli"):
         return "operator"
     folder = path.relative_to(ROOT / "services").parts[0]
@@ -97,9 +98,9 @@ def found() -> tuple[dict[str, set[str]], dict[str, set[str]]]:
             name = aliases.get(arguments[0].id) if arguments and isinstance(arguments[0], ast.Name) else None
             if name and service and method == "publisher":
                 writers[name].add(service)
-            elif name and service not in ("", "operator") and method in ("on_newest", "on_each", "latest"):
+            elif name and service not in READ_ALL and method in ("on_newest", "on_each", "latest"):
                 readers[name].add(service)
-            if service not in ("", "operator") and method in IMPLIED and (method != "Body" or "services.common.body" in modules):
+            if service not in READ_ALL and method in IMPLIED and (method != "Body" or "services.common.body" in modules):
                 readers[IMPLIED[method]].add(service)
     return writers, readers
 

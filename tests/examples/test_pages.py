@@ -32,6 +32,7 @@ model = mobee.Model(robot, mobee.load_world("table"))
 GIVEN = {
     "docs/behaviours.md": "",
     "docs/control.md": "",
+    "docs/cup.md": "",
     "docs/gymnasium.md": "",
     "docs/installation.md": "",
     "docs/law.md": TABLE + "q = goal = robot.home\nf, wrench = np.zeros(41), np.zeros(6)\n",
@@ -87,6 +88,7 @@ RUN_ELSEWHERE = {
     r"mobee launch lockstep --page --runs runs": "tests/services/launcher/test_run.py",
     r"mobee launch eyes( --set .*)?": "tests/system/test_calibrate.py",
     r"mobee launch gaze.*": "tests/system/test_gaze.py",
+    r"mobee launch cup": "tests/services/cup/test_cup.py",
     r"mobee calibrate .*": "tests/mobee_cli/test_calibrate.py",
     r"mobee keys new": "tests/mobee_cli/test_keys.py",
     r"mobee keys add launcher_desk": "tests/mobee_cli/test_keys.py",

@@ -120,7 +120,7 @@ MISTAKES = (
     Mistake("convert arm.urdf mesh.urdf", ("mesh.urdf exists already", "overwrite it with --force")),
     Mistake("view icub --save icub.mp4", ("recordings must have a name that ends in .rrd",)),
     # scenario files and settings
-    Mistake("launch nofile.toml", ("nofile.toml: no such file", "or a shipped scenario: default")),
+    Mistake("launch nofile.toml", ("nofile.toml: no such file", "or a shipped scenario: ")),
     Mistake("launch arm.urdf", ("the file of a robot or a world, not a scenario", "--set shared.robot=arm.urdf")),
     Mistake("launch unknown_field.toml", ("unknown_field.toml:3: unknown field 'services.robot_sim.rat'. Did you mean 'rate'?",)),
     Mistake("launch wrong_type.toml", ("wrong_type.toml:2: services.robot_sim.rate: Expected a number, got a text",)),
