@@ -17,7 +17,7 @@ from mobee.vision.calibration.calibration import load_calibration
 from mobee.vision.imperfections import CameraSettings, camera_errors
 from tests.system.live import running
 
-pytestmark = [pytest.mark.system, pytest.mark.untimed]
+pytestmark = pytest.mark.system
 pytest.importorskip("pybullet")
 
 

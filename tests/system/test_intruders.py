@@ -75,7 +75,7 @@ class Secured:
         return [event.text for event in self.watcher.events if event.code == "access"]
 
     def is_reported(self, text: str) -> None:
-        until(lambda: any(text in said for said in self.reports()), 5.0, f"the launcher reports {text!r}, not only {self.reports()}")
+        until(lambda: any(text in said for said in self.reports()), 20.0, f"the launcher reports {text!r}, not only {self.reports()}")
 
     def header(self, src: str = "intruder") -> dict[str, Any]:
         clock = self.watcher.clock

@@ -15,7 +15,7 @@ part of the hand is, and a new plan is made.
 
 Ways to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries on the offline
 plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the same for all.
-The numbers of grip, bump and corrections were chosen with seeds below 520 in view; docs/cup.md has seeds from 520 on.
+The numbers of grip, bump and corrections were chosen with seeds below 520 in view; new results need seeds from 520 on.
 Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
 """
 
