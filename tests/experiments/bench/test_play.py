@@ -24,8 +24,9 @@ def test_the_start_with_the_median_time_is_reported() -> None:
 
 
 def test_a_service_that_is_left_is_found(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", "input()", "--config", str(tmp_path / "model.toml")]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
+    command = [sys.executable, "-c", "print('runs', flush=True); input()", "--config", str(tmp_path / "model.toml")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None and child.stdout.readline() == b"runs\n"  # before, the system may list it with its parent's command
         assert _left(str(tmp_path)) == [child.pid]
         child.communicate(b"\n")
     assert _left(str(tmp_path)) == []
