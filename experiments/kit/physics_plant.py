@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mobee import Controller, Model, World
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array
 from mobee.behaviours.bump import BumpWatch
-from mobee.behaviours.pick import Followed
+from mobee.behaviours.pick import BACK, CALM, Followed
 from mobee.control import SettleTest
 from mobee.control.gains import Verdict
 from mobee.model.contact import touched_by
@@ -31,12 +31,7 @@ if TYPE_CHECKING:
     from services.robot_sim.mujoco_backend import MujocoBackend
 
 DT = 0.01  # s
-ENOUGH = float(np.deg2rad(0.7))  # rad, a posture is reached
-CORRECTIONS = 4  # of the attractor, for what forces keep the motors from a posture
-CORRECTED = 1.5  # s, at most, for each
-CALM = float(np.deg2rad(1.0))  # rad/s, of motors at rest
-MOMENT = 6  # periods of a path, before a bump
-BACK = 3.0  # s of the motion that is undone after a bump
+SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
 
 
 class PhysicsPlant:
@@ -127,7 +122,7 @@ class PhysicsPlant:
             end = self._settled(part)
         return self._reaches.outcome(part)
 
-    def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
         """See Body; after a bump the robot moves back a little."""
         wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
         if watch is not None:
@@ -138,41 +133,28 @@ class PhysicsPlant:
             for _ in range(round(PERIOD / self.dt)):
                 self.tick()
                 if watch is not None and watch.note(self._encoders, self.body.motors.efforts, self.dt):
-                    found = Followed(True, self.q, passed[-min(len(passed), MOMENT)] if passed else self.q)
-                    self._back_off(passed)
+                    found = Followed(True, self.q)
+                    self.rest_at(passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q)
                     return found
             passed.append(self.q)
-        self._calm(CORRECTED)
-        return Followed(False, self.q, self.q)
+        self._calm()
+        return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
         """See Body."""
         self.controller.attractor = q if offset is None else np.clip(q + offset, *self.robot.limits.T)
         self.run(seconds)
 
-    def stand(self, q: Array, motors: Ints) -> Array:
-        """See Body: what remains after a settled motion is added to the attractor, a few times."""
+    def rest_at(self, q: Array) -> None:
+        """See Body."""
         self.controller.attractor = q
-        for number in range(CORRECTIONS + 1):
-            self._calm(CORRECTED)
-            missing = np.zeros(len(q))
-            missing[motors] = (q - self._encoders)[motors]
-            if np.abs(missing).max() < ENOUGH or number == CORRECTIONS:
-                break
-            self.controller.attractor = np.clip(self.controller.attractor + missing, *self.robot.limits.T)
-        offset: Array = self.controller.attractor - q
-        return offset
+        self._calm()
 
-    def _back_off(self, passed: list[Array]) -> None:
-        """Move back to where the robot was a little earlier."""
-        self.controller.attractor = passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q
-        self._calm(CORRECTED)
-
-    def _calm(self, seconds: float) -> None:
-        """Run until no motor is commanded to move, or for a time."""
-        end, slow = self.time + seconds, CALM
+    def _calm(self) -> None:
+        """Run until no motor is commanded to move, or for CALM s."""
+        end = self.time + CALM
         self.run(0.2)
-        while self.time < end and np.abs(self.controller.velocity).max() > slow:
+        while self.time < end and np.abs(self.controller.velocity).max() > SLOW:
             self.run(0.1)
 
     def _settled(self, part: str) -> Outcome:

@@ -26,17 +26,19 @@ LIFT = 0.1  # m
 ABOVE = 0.004  # m above the height of the grasp at which the hand opens
 STAND_OFF = 0.11  # m between thing and palm, from where the hand moves straight to the pre-grasp
 RETREAT = 0.09  # m between thing and palm, to which the hand goes back
+ENOUGH = float(np.deg2rad(0.7))  # rad from a posture, at which it is reached
+CORRECTIONS, CALM = 4, 1.5  # of the attractor, for what forces keep the motors from a posture; s, at most, for each
+BACK = 3.0  # s of a motion that are undone after a bump
 STEP = 0.03  # rad between two postures of a motion that are checked for contacts
 TURNS = tuple(np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0)).tolist())  # azimuths that are tried, beside the first one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """The end of a motion along a path: whether something was bumped into, the posture (n,) rad then, and the one a moment before."""
+    """The end of a motion along a path: whether something was bumped into, and the posture (n,) rad then."""
 
     bumped: bool
     q: Array
-    before: Array
 
 
 def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count: int, rng: np.random.Generator) -> Array:
@@ -56,7 +58,7 @@ class Body(Protocol):
         """The encoders, (n,) rad."""
         ...
 
-    def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
         """Move along a path (K, n) rad at a share of the largest speed; `watch`: ends it at a bump; `offset`: added to the attractor."""
         ...
 
@@ -64,8 +66,8 @@ class Body(Protocol):
         """Set the attractor to q (n,) rad at once, and leave it there for a time."""
         ...
 
-    def stand(self, q: Array, motors: Ints) -> Array:
-        """Bring motors, by index, to q (n,) rad against the forces on them; return the offset (n,) rad of the attractor that this needs."""
+    def rest_at(self, q: Array) -> None:
+        """Set the attractor to q (n,) rad, and wait until nothing is commanded to move, or for CALM s."""
         ...
 
 
@@ -127,19 +129,35 @@ class Picker:
         self._there: Array | None = None  # (n,) rad, of the pre-grasp
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
+    def stand(self, q: Array) -> Array:
+        """Bring torso and arm to q (n,) rad against the forces on them; return the offset (n,) rad of the attractor that this needs.
+
+        What remains after a settled motion is added to the attractor, a few times.
+        """
+        aim = q.copy()
+        for number in range(CORRECTIONS + 1):
+            self.body.rest_at(aim)
+            remaining = np.zeros(len(q))
+            remaining[self.motors] = (q - self.body.q)[self.motors]
+            if np.abs(remaining).max() < ENOUGH or number == CORRECTIONS:
+                break
+            aim = np.clip(aim + remaining, *self.grasp.model.robot.limits.T)
+        offset: Array = aim - q
+        return offset
+
     def arrive(self, away: Array, pre_grasp: Array) -> None:
         """Move the hand, which is at `away` (n,) rad, straight to the pre-grasp (n,) rad; keep what the forces there need."""
-        offset = self.body.stand(away, self.motors)
-        self.body.follow(np.stack([away, pre_grasp]), SLOW, offset=offset)
-        self._offset = self.body.stand(pre_grasp, self.motors)
+        offset = self.stand(away)
+        self.body.follow_path(np.stack([away, pre_grasp]), SLOW, offset=offset)
+        self._offset = self.stand(pre_grasp)
         self._there = pre_grasp
 
     def close(self, thing: Upright, azimuth: float) -> None:
         """Move the palm from the pre-grasp to the thing, and close the hand; raises NoPosture."""
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
-        self.body.follow(np.stack([there, here]), SLOW, offset=self._offset)
-        self._offset = self.body.stand(here, self.motors)
+        self.body.follow_path(np.stack([there, here]), SLOW, offset=self._offset)
+        self._offset = self.stand(here)
         # The fingers arrive before the thumb, which pushes the thing into them.
         self.body.press(self.grasp.closed(here), CLOSING, self._offset)
         self._fingers = self.grasp.squeezed(self.body.q)
@@ -148,8 +166,8 @@ class Picker:
     def lift(self, thing: Upright, azimuth: float) -> None:
         """Lift the thing straight up; raises NoPosture."""
         up, start = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT)), self._held(self.body.q)
-        self.body.follow(np.stack([start, up]), GENTLE, offset=self._offset)
-        self._offset = self.body.stand(up, self.motors)
+        self.body.follow_path(np.stack([start, up]), GENTLE, offset=self._offset)
+        self._offset = self.stand(up)
 
     def slipped(self, thing: Upright, centre: Array) -> Array:
         """Return how far a thing whose centre is seen at (3,) m has slipped in the hand, (3,) m in the frame of the palm."""
@@ -181,13 +199,13 @@ class Picker:
         raise NoPosture(f"none of {len(places)} places on the table can be reached with the thing in the hand")
 
     def _set_down(self, path: Array, back: Array) -> None:
-        self.body.follow(path[:2], GENTLE, offset=self._offset)
+        self.body.follow_path(path[:2], GENTLE, offset=self._offset)
         # At the end of the motion down nothing is corrected: the thing may have tilted in the hand and stand already.
-        offset = self.body.stand(path[1], self.motors)
-        self.body.follow(path[1:], SLOW, offset=offset)
+        offset = self.stand(path[1])
+        self.body.follow_path(path[1:], SLOW, offset=offset)
         opened = self.grasp.opened(path[2])
-        self.body.follow(np.stack([path[2], opened]), FAST, offset=offset)
-        self.body.follow(np.stack([opened, back]), SLOW, offset=offset)
+        self.body.follow_path(np.stack([path[2], opened]), FAST, offset=offset)
+        self.body.follow_path(np.stack([opened, back]), SLOW, offset=offset)
         self._offset = None
 
     def _held(self, q: Array) -> Array:

@@ -156,7 +156,7 @@ def approach(body: Body, picker: Picker, thing: Upright, plan: Planner, watched:
         if chosen is None:
             return found
         azimuth, path, goal = chosen
-        ended = body.follow(path, FAST, watch)
+        ended = body.follow_path(path, FAST, watch)
         if not ended.bumped:
             picker.arrive(path[-1], goal)
             found.azimuth = azimuth

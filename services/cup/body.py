@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 
 from bus_schema.messages import State
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array
 from mobee.behaviours.bump import BumpWatch
-from mobee.behaviours.pick import Followed
+from mobee.behaviours.pick import BACK, CALM, Followed
 from mobee.control.gains import Gains
 from mobee.errors import ActionInterrupted
 from mobee.roadmap.playback import PERIOD, attractors, timed
@@ -20,15 +20,10 @@ from mobee.robot.robot import Robot
 from services.common.bus_follow import BusFollower
 from services.common.service import Service
 
-ENOUGH = float(np.deg2rad(0.7))  # rad, a posture is reached
-CORRECTIONS = 4  # of the attractor, for what forces keep the motors from a posture
-CALM = 1.5  # s, at most, for each
 SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
 HOLDS = 10  # in a row, after each of which the motion continues
 SLOWEST = 0.1  # simulated s in a s of real time
 STILL = 0.3  # s of the robot's clock in which nothing may be commanded to move
-MOMENT = 6  # periods of a path, before a bump
-BACK = 3.0  # s of the motion that is undone after a bump
 
 
 class Bumped(Exception):
@@ -48,8 +43,8 @@ class BusBody(BusFollower):
         for part in robot.parts:
             service.on_each(State, partial(self._note_state, part), part)
 
-    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None, offset: Array | None) -> Followed:
-        """See Body.follow."""
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+        """See Body; after a bump the robot moves back a little."""
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains))
         if offset is not None:
@@ -65,37 +60,22 @@ class BusBody(BusFollower):
                 passed.append(self.q)
                 self._wait_until(begun + (number + 1) * PERIOD)
         except Bumped:
-            self._watch, found = None, Followed(True, self.q, passed[-min(len(passed), MOMENT)] if passed else self.q)
-            self._back(passed)
+            self._watch, found = None, Followed(True, self.q)
+            self.rest_at(passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q)
             return found
         finally:
             self._watch = None
         self._calm()
-        return Followed(False, self.q, self.q)
+        return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
         """See Body."""
         self._step(q if offset is None else q + offset)
         self._wait_until(self._now + seconds)
 
-    def stand(self, q: Array, motors: Ints) -> Array:
+    def rest_at(self, q: Array) -> None:
         """See Body."""
-        aim = q.copy()
-        self._step(aim)
-        for number in range(CORRECTIONS + 1):
-            self._calm()
-            missing = np.zeros(len(q))
-            missing[motors] = (q - self.q)[motors]
-            if np.abs(missing).max() < ENOUGH or number == CORRECTIONS:
-                break
-            aim = np.clip(aim + missing, *self.robot.limits.T)
-            self._step(aim)
-        offset: Array = aim - q
-        return offset
-
-    def _back(self, passed: list[Array]) -> None:
-        """Move back to where the robot was a little earlier."""
-        self._step(passed[-min(len(passed), round(BACK / PERIOD))] if passed else self.q)
+        self._step(q)
         self._calm()
 
     def _step(self, q: Array) -> None:
@@ -146,20 +126,3 @@ class BusBody(BusFollower):
         if self._watch.note(self._seen[-1][1], self._torques, now - self._last):
             self._bumped = True
         self._last = now
-
-
-class Mover:
-    """A `Body` of a BusBody."""
-
-    def __init__(self, body: BusBody) -> None:
-        self._body = body
-        self.press, self.stand = body.press, body.stand
-
-    @property
-    def q(self) -> Array:
-        """See Body."""
-        return self._body.q
-
-    def follow(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
-        """See Body."""
-        return self._body.follow_path(path, speed, watch, offset)

@@ -13,7 +13,7 @@ from bus_schema.rpc import Done, Empty, ObjectState, SetRole
 from bus_schema.rpc import World as WorldReply
 from mobee.arrays import Array
 from mobee.behaviours.grasp import SideGrasp
-from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near
+from mobee.behaviours.pick import FAST, NoPosture, Picker, Upright, places_near
 from mobee.behaviours.pre_grasp import ASIDE, MOTORS, MapPlanner, approach, aside, icub_starts, pre_grasp_map
 from mobee.control.gains import Gains
 from mobee.errors import MobeeError
@@ -24,7 +24,7 @@ from mobee.model.world_object import Geometry
 from mobee.robot.robot import Robot
 from services.common.rpc import CallFailed
 from services.common.service import Service
-from services.cup.body import BusBody, Mover
+from services.cup.body import BusBody
 from services.cup.config import Config
 
 PARTS = ("torso", "right_arm")
@@ -118,7 +118,7 @@ class CupNode:
                 world.add(item.name, grown, position=item.position, rotation=turn, role="target")
         self._planned = world
         grasp = SideGrasp(Model(self._robot, world), self._config.marker, MOTORS, icub_starts(self._robot))
-        return Picker(Mover(self._body), grasp)
+        return Picker(self._body, grasp)
 
     def _planner(self, picker: Picker) -> MapPlanner:
         return MapPlanner(self._map, picker.grasp.model, self._config.marker)
@@ -131,7 +131,7 @@ class CupNode:
         path = self._planner(picker).path(np.clip(here, *self._robot.limits.T), away, ASIDE[-1], np.empty((0, 3)))
         if path is None:
             raise NoPosture(f"no free motion to {place.round(2).tolist()} m, at the side of the table")
-        picker.body.follow(path, 0.4)
+        picker.body.follow_path(path, FAST)
 
     def _thing(self) -> Upright:
         """Return the thing where vision has it; raises Paused."""

@@ -86,7 +86,7 @@ class Trial:
 
     def run(self) -> Result:
         """Make the trial."""
-        self.plant.stand(ready(), self.picker.motors)
+        self.picker.stand(ready())
         found = self._approach()
         result = self.result
         result.bumps, result.plans, result.planning = found.bumps, found.plans, found.planning

@@ -49,10 +49,10 @@ def test_a_bump_ends_a_motion_before_what_nobody_sees_is_knocked_over() -> None:
     plant = PhysicsPlant(Model(robot(), table()), true_world(Placement(np.array([-0.5, -0.1]), {"clutter": HIDDEN})), 0, ready(), {})
     trm = roadmap()
     path = trm.path(ready(), [-0.24, 0.1, TOP + 0.105, 0.0])
-    ended = plant.follow(path, FAST, BumpWatch(robot(), WATCHED))
+    ended = plant.follow_path(path, FAST, BumpWatch(robot(), WATCHED))
     assert ended.bumped
     thing = plant.things["clutter"]
     np.testing.assert_allclose(thing.position[:2], HIDDEN.place, atol=0.02)
     assert thing.rotation[2, 2] > 0.99
     free = PhysicsPlant(Model(robot(), table()), table(), 0, ready(), {})
-    assert not free.follow(path, FAST, BumpWatch(robot(), WATCHED)).bumped
+    assert not free.follow_path(path, FAST, BumpWatch(robot(), WATCHED)).bumped
