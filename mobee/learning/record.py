@@ -38,6 +38,8 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
         raise InvalidValue(f"the space on record is of robot {settings['robot']!r}, given {robot.name!r}: load that robot.")
     try:
         space = _object_space(settings, robot) if kind == "object" else _posture_space(kinds[kind], settings, robot)
+    except MobeeError:  # such as UnknownName, which is a KeyError, for a joint that the robot does not have
+        raise
     except (KeyError, TypeError) as error:  # of a name, or a value of a type, that this program never writes
         raise InvalidValue(f"the record of a {kind} is damaged: {' '.join(str(error).split())}") from error
     if space.settings["digest"] != settings["digest"]:
