@@ -29,6 +29,11 @@ class Geometry:
     kind: ShapeKind
     size: tuple[float, ...]
 
+    def grown(self, margin: float) -> Geometry:
+        """Return the shape with its surface moved outward by a margin [m], inward if it is negative."""
+        factors = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[self.kind]
+        return Geometry(self.kind, tuple(size + factor * margin for size, factor in zip(self.size, factors, strict=True)))
+
 
 def sphere(radius: float) -> Geometry:
     """Return a sphere of this radius [m]; raises InvalidValue unless it is 1e-9 to 1e5."""

@@ -113,7 +113,7 @@ class CupNode:
         for item in self._objects():
             if item.role != "obstacle":
                 margin = MARGIN - (item.margin if item.name == self._config.target else 0.0)  # beside it thumb and fingers have little room
-                grown = _grown(Geometry(item.geometry.kind, tuple(item.geometry.size)), margin)
+                grown = Geometry(item.geometry.kind, tuple(item.geometry.size)).grown(margin)
                 turn = matrix_from_quaternion(np.array(item.quaternion))
                 world.add(item.name, grown, position=item.position, rotation=turn, role="target")
         self._planned = world
@@ -231,8 +231,3 @@ def _only_obstacles(world: World) -> World:
         if item.role != "obstacle":
             world.remove(name)
     return world
-
-
-def _grown(shape: Geometry, margin: float) -> Geometry:
-    factors = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[shape.kind]
-    return Geometry(shape.kind, tuple(size + factor * margin for size, factor in zip(shape.size, factors, strict=True)))

@@ -201,8 +201,7 @@ class WorldServer:
 def _shape(given: Geometry, margin: float) -> geometry.Geometry:
     """Return a shape of the bus, larger by a margin [m] on each side, as a Geometry; raises InvalidValue for a wrong number of sizes."""
     require_sizes(given)
-    wider = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[given.kind]
-    return geometry.Geometry(given.kind, tuple(size + factor * margin for size, factor in zip(given.size, wider, strict=True)))
+    return geometry.Geometry(given.kind, tuple(given.size)).grown(margin)
 
 
 def _rotation(quaternion: list[float]) -> Array:

@@ -84,13 +84,6 @@ def standing(place: Array, height: float) -> Array:
     return np.array([*place, TOP + 0.5 * height])
 
 
-def grown(shape: Geometry, margin: float) -> Geometry:
-    """Return a cylinder or box that is larger by a margin [m] on every side."""
-    if shape.kind == "box":
-        return box(*(size + 2.0 * margin for size in shape.size))
-    return cylinder(shape.size[0] + margin, shape.size[1] + 2.0 * margin)
-
-
 class Eyes:
     """What the cameras see of the things: their places with noise, and nothing of what is not seen."""
 
@@ -103,8 +96,8 @@ class Eyes:
 
     def show(self, world: World, cup: Upright, margin: float) -> None:
         """Put cup and seen clutter into a world, enlarged by a margin [m], with the role of targets."""
-        world.add(CUP, grown(cylinder(RADIUS, HEIGHT), margin), position=standing(cup.place, HEIGHT), role="target")
+        world.add(CUP, cylinder(RADIUS, HEIGHT).grown(margin), position=standing(cup.place, HEIGHT), role="target")
         for name, piece in self._scene.clutter.items():
             if piece.seen:
                 at = piece.place + SEEN * self._rng.standard_normal(2)
-                world.add(name, grown(piece.shape, margin), position=standing(at, piece.height), role="target")
+                world.add(name, piece.shape.grown(margin), position=standing(at, piece.height), role="target")

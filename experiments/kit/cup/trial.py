@@ -18,7 +18,6 @@ from experiments.kit.cup.scene import (
     TOP,
     Eyes,
     Placement,
-    grown,
     standing,
     table,
     true_world,
@@ -158,8 +157,8 @@ class Trial:
         held = Model(robot(), World())
         for name, item in self._planned.world.objects.items():
             if name not in (CUP, "table"):
-                held.world.add(name, shape_of(item), position=item.position, rotation=item.rotation)
-        held.world.add(CUP, grown(cylinder(RADIUS, HEIGHT), INFLATED), position=self.plant.things[CUP].position)
+                held.world.add(name, Geometry(item.kind, item.size), position=item.position, rotation=item.rotation)
+        held.world.add(CUP, cylinder(RADIUS, HEIGHT).grown(INFLATED), position=self.plant.things[CUP].position)
         held.attach(CUP, robot().links[robot().marker(MARKER).link], path[0])
         return touches(held, path[:2])
 
@@ -167,11 +166,6 @@ class Trial:
 def leans(thing: WorldObject) -> float:
     """Return how far a thing leans, rad."""
     return float(np.arccos(np.clip(thing.rotation[2, 2], -1.0, 1.0)))
-
-
-def shape_of(item: WorldObject) -> Geometry:
-    """Return the shape of an object."""
-    return Geometry(item.kind, item.size)
 
 
 def run_trial(method: str, seed: int) -> dict[str, object]:
