@@ -179,7 +179,7 @@ class Picker:
     def put(self, thing: Upright, places: Sequence[Array], slipped: Array, blocked: Callable[[Array], bool] = lambda path: False) -> Array:
         """Put what is in the hand down at the first of the places (2,) m that works, open the hand and retreat; return the place.
 
-        `slipped`: (3,) m, see the method.  `blocked`: whether something is in the way of the thing on a path (K, n) rad.  Raises NoPosture.
+        `slipped`: (3,) m, see the method.  `blocked`: whether something blocks the thing on a path (K, n) rad.  Raises NoPosture.
         """
         here = self.body.q
         for place in places:

@@ -89,7 +89,7 @@ class CupNode:
             self._set_roles("ghost")
             found = approach(picker.body, picker, thing, self._planner(picker))
             if found.azimuth is None:
-                raise NoPosture(f"no way to a pre-grasp beside {self._config.target}, after {found.plans} plans and {found.bumps} bumps")
+                raise NoPosture(f"no path to a pre-grasp beside {self._config.target}, after {found.plans} plans and {found.bumps} bumps")
             self._planned.set_role(self._config.target, "ghost")
             thing = self._thing()
             self._report("closes the hand")
@@ -100,7 +100,7 @@ class CupNode:
             self._report("puts it down")
             goal = picker.put(thing, self._goals(thing, found.azimuth), self._slipped(picker, thing))
             self._set_roles("target")
-            self._go_aside(self._picker())  # not seen on the way either: the hand was before it until now
+            self._go_aside(self._picker())  # without pictures of it: the hand hid it until now
             self._gripped = False
             self._look(goal)
         finally:

@@ -12,7 +12,7 @@ delay, play and encoder noise, finger motors of 0.3 and 0.09 N m.  The hand is n
 clutter, as in a reach; a jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan leads around or over
 that place of the palm.
 
-Ways to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries on the offline
+Paths to the pre-grasp come from: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries on the offline
 plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the same for all.
 The numbers of grip, bump and corrections were chosen with seeds below 520 in view; new results need seeds from 520 on.
 Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
@@ -39,7 +39,7 @@ Runs = Sequence[Mapping[str, Any]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition for each way to the pre-grasp."""
+    """Return a condition for each planner."""
     return [Condition(name, {"method": name}) for name in METHODS]
 
 
@@ -63,7 +63,7 @@ def _reasons(runs: Runs) -> dict[str, int]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each way, and why trials ended early; `planning`: processor time of all plans of a trial."""
+    """Return a row for each planner, and why trials ended early; `planning`: processor time of all plans of a trial."""
     rows: dict[str, Any] = {}
     reasons: dict[str, Any] = {}
     for name, runs in grouped(found, "method", tuple(METHODS)).items():
@@ -81,7 +81,7 @@ def findings(found: Cells) -> dict[str, Any]:
             "robot time, s": round(float(np.median([run["seconds"] for run in runs])), 0),
         }
         reasons[METHODS[name]] = _reasons(runs)
-    return {"ways": rows, "ended": reasons}
+    return {"planners": rows, "ended": reasons}
 
 
 def plot(found: Cells) -> Any:

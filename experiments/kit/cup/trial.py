@@ -90,7 +90,7 @@ class Trial:
         result = self.result
         result.bumps, result.plans, result.planning = found.bumps, found.plans, found.planning
         if found.azimuth is None:
-            result.why = "no way to the pre-grasp"
+            result.why = "no path to the pre-grasp"
         else:
             self._judge(found.azimuth)
             self._pick(found.azimuth)
