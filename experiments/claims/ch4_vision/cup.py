@@ -12,8 +12,9 @@ delay, play and encoder noise, finger motors of 0.3 and 0.09 N m.  The hand is n
 clutter, as in a reach; a jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan leads around or over
 that place of the palm.
 
-Paths to the pre-grasp come from: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries on the offline
-plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the same for all.
+Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries
+on the offline plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the
+same for all.
 The numbers of grip, bump and corrections were chosen with seeds below 520 in view; new results need seeds from 520 on.
 Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
 """
