@@ -13,6 +13,6 @@
 namespace mobee {
 
 // Increase it, and ABI in mobee/_core/__init__.py, when the arguments or the meaning of a function change.
-constexpr std::int64_t abi = 3;
+constexpr std::int64_t abi = 4;
 
 }  // namespace mobee

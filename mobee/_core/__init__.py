@@ -37,7 +37,7 @@ BYTES = ctypes.c_char_p
 
 _NOTHING: Any = ctypes.c_char * 0
 
-ABI = 3
+ABI = 4
 """The version of the interface that is declared here; `mobee_abi` of a library must return the same. See core/interface.hpp."""
 
 FORCED = "MOBEE_CORE"

@@ -51,11 +51,62 @@ class _Picture(ctypes.Structure):
     """`Picture` of core/picture.hpp."""
 
     _fields_ = (
-        *((name, ADDRESS) for name in ("volumes", "surfaces", "depth", "which", "normal")),
-        *((name, INTEGER) for name in ("count", "surface_count", "height", "width", "perspective")),
+        *((name, ADDRESS) for name in ("volumes", "surfaces", "depth", "which", "normal", "before", "columns")),
+        *((name, INTEGER) for name in ("rays", "count", "surface_count", "height", "width", "perspective")),
         *((name, REAL * 3) for name in ("origin", "right", "down", "ahead")),
         *((name, REAL) for name in ("left", "top", "step", "nearest")),
     )
+
+
+class _Light(ctypes.Structure):
+    """`Light` of core/picture.hpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("which", "normal", "rays", "colors", "brightness")),
+        ("count", INTEGER),
+        ("towards", REAL * 3),
+        ("nothing", ctypes.c_float * 3),
+        *((name, ctypes.c_float) for name in ("ambient", "diffuse")),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen:
+    """Some pixels of a picture, numbered row by row.
+
+    `before` (H, W + 1): the number of chosen pixels before each pixel, and before the end of each row.  `columns` (K + 3,): that of each;
+    the last three are of no pixel.
+    """
+
+    before: NDArray[np.int32]
+    columns: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, mask: NDArray[np.bool_]) -> Chosen:
+        """Return the pixels of a mask (H, W)."""
+        before = np.zeros((mask.shape[0], mask.shape[1] + 1), np.int32)
+        before[:, 1:] = np.cumsum(mask.ravel()).reshape(mask.shape)
+        before[1:, 0] = before[:-1, -1]
+        return cls(before, np.append(np.nonzero(mask)[1], [0, 0, 0]).astype(np.int32))
+
+    @property
+    def count(self) -> int:
+        """The number K of chosen pixels."""
+        return len(self.columns) - 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lamp:
+    """A lamp far away, in the direction `towards` (3,), a unit vector in the root frame.
+
+    `ambient`: brightness of a surface that is turned away from it; `diffuse`: how much brighter one is that faces it.  `nothing`: red,
+    green and blue, 0 to 255, of a pixel that shows nothing.
+    """
+
+    towards: tuple[float, float, float]
+    ambient: float
+    diffuse: float
+    nothing: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,24 +129,41 @@ class Rays:
 
 
 _cast = function("cast", ADDRESS)
+_shade = function("shade", ADDRESS)
 _convex_size = function("convex_size", result=INTEGER)
 _surface_size = function("surface_size", result=INTEGER)
 
 
-def cast(volumes: NDArray[np.void], surfaces: NDArray[np.void], rays: Rays) -> tuple[Floats, NDArray[np.int32], Floats]:
+def cast(
+    volumes: NDArray[np.void], surfaces: NDArray[np.void], rays: Rays, chosen: Chosen | None = None
+) -> tuple[Floats, NDArray[np.int32], Floats]:
     """Return the first volume or surface that each ray hits, among volumes (N,) `CONVEX` and surfaces (M,) `SURFACE`.
 
     Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of volumes, or numbers of surfaces, (H, W), -1 where
-    there is nothing; and outward normals (H, W, 3), root frame.
+    there is nothing; and outward normals (H, W, 3), root frame.  With `chosen` pixels the shapes are (K,) and (K, 3).
     """
     for table, row, size in ((volumes, CONVEX, _convex_size()), (surfaces, SURFACE, _surface_size())):
         if table.dtype != row or row.itemsize != size:
             raise RuntimeError(f"the library's rows have {size} bytes and another layout than {table.dtype}")
-    shape = rays.height, rays.width
+    shape = (rays.height, rays.width) if chosen is None else (chosen.count,)
+    if chosen is not None and chosen.before.shape != (rays.height, rays.width + 1):
+        raise ValueError(f"pixels chosen of a picture of another size than {rays.width} x {rays.height}")
     depth, which, normal = np.empty(shape, np.float32), np.empty(shape, np.int32), np.empty((*shape, 3), np.float32)
     arrays = (address(array) for array in (volumes, surfaces, depth, which, normal))
+    choice = (None, None) if chosen is None else (address(chosen.before), address(chosen.columns))
     vectors = ((REAL * 3)(*vector) for vector in (rays.origin, *rays.axes))
-    numbers = (rays.left, rays.top, rays.step, rays.nearest)
-    picture = _Picture(*arrays, len(volumes), len(surfaces), *shape, rays.perspective, *vectors, *numbers)
+    numbers = (depth.size, len(volumes), len(surfaces), rays.height, rays.width, rays.perspective)
+    picture = _Picture(*arrays, *choice, *numbers, *vectors, rays.left, rays.top, rays.step, rays.nearest)
     _cast(ctypes.addressof(picture))
     return depth, which, normal
+
+
+def shade(which: NDArray[np.int32], normal: Floats, pixels: NDArray[np.int64], colors: Floats, lamp: Lamp, brightness: Floats) -> None:
+    """Add to the brightness (K, 3) of pixels, red, green and blue, 0 to 255, that of what their rays meet.
+
+    `which` (R,) and `normal` (R, 3): as of `cast`; `pixels` (K,): indices of rays; `colors` (N, 3): 0 to 255, by number.
+    """
+    arrays = (address(array) for array in (which, normal, pixels, colors, brightness))
+    towards, nothing = (REAL * 3)(*(float(np.float32(one)) for one in lamp.towards)), (ctypes.c_float * 3)(*lamp.nothing)
+    light = _Light(*arrays, len(pixels), towards, nothing, lamp.ambient, lamp.diffuse)
+    _shade(ctypes.addressof(light))

@@ -4,19 +4,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.rays import cast
+from mobee._core.rays import Chosen, Lamp, cast, shade
 from mobee.arrays import Array, Ints
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion
 from mobee.model.world import World, WorldObject
 from mobee.rendering.camera import Camera as View
-from mobee.rendering.camera import Floats, Raster, eye_camera
+from mobee.rendering.camera import Floats, eye_camera
 from mobee.rendering.link_solids import LinkSolid, link_solids
-from mobee.rendering.solid import Color, Solid, packed
+from mobee.rendering.solid import Color, Packed, Solid, packed
 from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.robot import Robot
 from mobee.robot.visual import Camera
@@ -25,8 +25,27 @@ Picture = NDArray[np.uint8]
 
 BACKGROUND = (168, 174, 182)
 OTHER_COLOR: Color = (0.6, 0.6, 0.55)
-LIGHT = np.array([0.37, -0.24, 0.90], np.float32)  # unit vector towards the lamp: behind, left of and above the robot
-AMBIENT, DIFFUSE = 0.65, 0.4  # brightness of a surface that is turned away from the lamp, and how much brighter one is that faces it
+LAMP = Lamp((0.37, -0.24, 0.90), ambient=0.65, diffuse=0.4, nothing=BACKGROUND)  # behind, left of and above the robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pixels:
+    """Pixels of a view: the rays that they need (None: those of the whole view), and the index of the ray of each, (K,)."""
+
+    chosen: Chosen | None
+    rays: Ints
+
+    @classmethod
+    def some(cls, height: int, width: int, places: Ints) -> Pixels:
+        """Return the pixels at some places (K,), row * width + column, of a view."""
+        mask = np.zeros(height * width, np.bool_)
+        mask[places] = True
+        return cls(Chosen.of(mask.reshape(height, width)), (np.cumsum(mask) - 1)[places])
+
+    @classmethod
+    def every(cls, height: int, width: int) -> Pixels:
+        """Return all pixels of a view."""
+        return cls(None, np.arange(height * width))
 
 
 class Scene:
@@ -49,6 +68,8 @@ class Scene:
         self._around = list(around)
         self._objects = {item.name: _object_solid(item) for item in world.objects.values()}
         self._transforms = link_transforms(robot, robot.home)
+        self._shown: dict[frozenset[int], _Shown] = {}  # by hidden links
+        self._every = Pixels.every(height, width)
 
     def intrinsics(self, name: str) -> Array:
         """Return the matrix (3, 3) of a camera, with the middles of pixels at integers and the origin top left."""
@@ -72,36 +93,51 @@ class Scene:
 
     def draw(self, name: str) -> Picture:
         """Return the picture of a camera: (height, width, 3) bytes, red, green, blue."""
-        seen = Raster(self._view(name), self._solids(self.cameras[name].hidden))
-        brightness = AMBIENT + DIFFUSE * np.maximum(seen.normal @ LIGHT, 0.0)
-        picture: Picture = np.minimum(255.0 * seen.color * brightness[..., None], 255.0).astype(np.uint8)
-        picture[np.isinf(seen.depth)] = BACKGROUND
-        return picture
+        width, height = self._size
+        brightness = np.zeros((height * width, 3), np.float32)
+        self.light(self._view(name), self.cameras[name].hidden, self._every, brightness)
+        picture: Picture = brightness.astype(np.uint8)
+        return picture.reshape(height, width, 3)
 
-    def light(self, view: View, hidden: frozenset[int], pixels: Ints) -> Floats:
-        """Return the brightness (K, 3) of red, green and blue in some pixels of a view, 0 to 255, without the `hidden` links.
-
-        `pixels`: (K,), row * width + column.
-        """
-        solids = self._solids(hidden)
-        packs = packed(solids)
-        _, which, normal = cast(packs.volumes, packs.surfaces, view.rays())
-        colors = np.array([*(solids[number].color for number in packs.numbers), (0.0, 0.0, 0.0)], np.float32)  # the last is of nothing
-        seen = which.ravel()[pixels]
-        brightness = AMBIENT + DIFFUSE * np.maximum(normal.reshape(-1, 3)[pixels] @ LIGHT, 0.0)
-        found: Floats = np.minimum(255.0 * colors[seen] * brightness[:, None], 255.0)
-        found[seen < 0] = BACKGROUND
-        return found
-
-    def _solids(self, hidden: frozenset[int]) -> list[Solid]:
-        robot = [one.at(self._transforms) for one in self._link_solids if one.link not in hidden]
-        return [*robot, *self._objects.values(), *self._around]
+    def light(self, view: View, hidden: frozenset[int], pixels: Pixels, brightness: Floats) -> None:
+        """Add to the brightness (K, 3) of red, green and blue, 0 to 255, that of pixels of a view, without the `hidden` links."""
+        if hidden not in self._shown:
+            self._shown[hidden] = _Shown([one for one in self._link_solids if one.link not in hidden], self._objects, self._around)
+        shown = self._shown[hidden]
+        packs = shown.at(self._transforms, self._objects)
+        _, which, normal = cast(packs.volumes, packs.surfaces, view.rays(), pixels.chosen)
+        shade(which, normal, pixels.rays, shown.colors, LAMP, brightness)
 
     def _view(self, name: str) -> View:
         camera = self.cameras[name]
         origin, rotation = camera_frame(camera, self._transforms)
         axes = rotation.T * np.array([[1.0], [-1.0], [1.0]])  # right, up, ahead
         return eye_camera(origin, axes, *self._size, camera.view_deg)
+
+
+class _Shown:
+    """What a camera sees, packed once: later only the places of links and objects are written."""
+
+    def __init__(self, worn: Sequence[LinkSolid], objects: Mapping[str, Solid], around: Sequence[Solid]) -> None:
+        solids = [*(one.solid for one in worn), *objects.values(), *around]
+        self._packs = packed(solids)
+        numbers, convex = np.array(self._packs.numbers, dtype=np.intp), len(self._packs.volumes)
+        self._volumes, self._surfaces = (part[part < len(worn)] for part in (numbers[:convex], numbers[convex:]))
+        self._links = np.array([one.link for one in worn], dtype=np.intp)
+        self._positions = np.array([one.solid.position for one in worn]).reshape(-1, 3, 1)
+        self._rotations = np.array([one.solid.rotation for one in worn]).reshape(-1, 3, 3)
+        self.colors = (np.float32(255.0) * np.array([solids[number].color for number in numbers], np.float32)).reshape(-1, 3)
+
+    def at(self, transforms: Array, objects: Mapping[str, Solid]) -> Packed:
+        """Return the solids where links, by their transforms (L, 4, 4), and objects are."""
+        links = transforms[self._links]
+        positions = (links[:, :3, :3] @ self._positions)[..., 0] + links[:, :3, 3]
+        rotations = links[:, :3, :3] @ self._rotations
+        for table, own in ((self._packs.volumes, self._volumes), (self._packs.surfaces, self._surfaces)):
+            table["center"][: len(own)], table["rotation"][: len(own)] = positions[own], rotations[own]
+        for row, solid in zip(self._packs.volumes[len(self._volumes) :], objects.values(), strict=False):  # objects are volumes
+            row["center"], row["rotation"] = solid.position, solid.rotation
+        return self._packs
 
 
 def _object_solid(item: WorldObject) -> Solid:

@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array
 from mobee.rendering.camera import Camera as View
 from mobee.rendering.camera import Floats
-from mobee.rendering.scene import Picture, Scene
+from mobee.rendering.scene import Picture, Pixels, Scene
 from mobee.vision.imperfections import CameraErrors, CameraSettings
 from mobee.vision.mount import camera_frames
 
@@ -41,12 +41,12 @@ class Sensor:
         size = np.ceil((np.nanmax(every, axis=0) - low) * self._scale).astype(int) + MARGIN
         self._width, self._height = int(size[0]), int(size[1])
         self._corners = [low - offset / self._scale for offset in offsets]  # of each sample's plane: left and top
-        self._index: list[Ints] = []
+        self._pixels: list[Pixels] = []
         for corner, places in zip(self._corners, flat, strict=True):
             at = np.floor((places - corner) * self._scale)
             inside = np.isfinite(at).all(axis=1)
             at = np.where(inside[:, None], at, 0.0).astype(np.intp).clip(0, size - 1)
-            self._index.append(at[:, 1] * self._width + at[:, 0])
+            self._pixels.append(Pixels.some(self._height, self._width, at[:, 1] * self._width + at[:, 0]))
 
     def moments(self) -> Array:
         """Return the times (samples,) s of the samples, from the middle of the exposure."""
@@ -58,15 +58,14 @@ class Sensor:
         left, top = self._corners[sample]
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
-    def pixels(self, sample: int) -> Ints:
+    def pixels(self, sample: int) -> Pixels:
         """Return the pixels (height * width,) of a sample's view that the pixels of the picture show."""
-        return self._index[sample]
+        return self._pixels[sample]
 
-    def develop(self, samples: Sequence[Floats], rng: np.random.Generator) -> Picture:
-        """Return the picture (height, width, 3), with noise, of the brightness of all samples, each (height * width, 3), 0 to 255."""
+    def develop(self, light: Floats, rng: np.random.Generator) -> Picture:
+        """Return the picture (height, width, 3), with noise, of the sum of the brightness of all samples (height * width, 3)."""
         settings = self._settings
-        light = sum(samples[1:], samples[0])
-        electrons = light * np.float32(settings.full_well / settings.gain / 255.0 / len(samples))
+        electrons = light * np.float32(settings.full_well / settings.gain / 255.0 / settings.samples)
         deviation = np.sqrt(electrons + np.float32(settings.read_noise**2))  # of shot and read noise, both nearly normal
         first = int(rng.integers(NOISE_TABLE - electrons.size))
         electrons += deviation * _noise_table(NOISE_TABLE)[first : first + electrons.size].reshape(electrons.shape)
@@ -102,12 +101,13 @@ class Cameras:
         `postures`: the true positions of all motors, (n,) rad, at each of the `moments`; those of the head differ from the encoders
         by `errors.encoders`, which this method adds.
         """
-        camera, scene, views = self._scene.cameras[name], self._scene, []
+        camera, scene = self._scene.cameras[name], self._scene
+        light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)
         for sample, q in enumerate(postures):
             scene.pose(q + self.errors.encoders)
             frame = camera_frames(camera, scene.transforms, self.errors.mounts[name])
-            views.append(scene.light(self._sensor.view(sample, *frame), camera.hidden, self._sensor.pixels(sample)))
-        return self._sensor.develop(views, self._rng)
+            scene.light(self._sensor.view(sample, *frame), camera.hidden, self._sensor.pixels(sample), light)
+        return self._sensor.develop(light, self._rng)
 
 
 def _spread(count: int) -> Array:

@@ -16,10 +16,14 @@ import mobee
 from mobee._core.learning import gaussian_sums
 from mobee.learning.reaching.histories import Histories
 from mobee.learning.tabular import TabularPlant, half_space
+from mobee.rendering.room import clutter, room
+from mobee.rendering.scene import Scene
 from mobee.roadmap.edges import check_edges
 from mobee.roadmap.ik.least_squares import Descent
 from mobee.roadmap.ik.problem import Problem
 from mobee.robot.load import Robot
+from mobee.vision.exposure import Cameras
+from mobee.vision.imperfections import CameraSettings, camera_errors
 
 ARM = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
 
@@ -133,6 +137,15 @@ def edges() -> str:
     return digest(check_edges(mobee.Model(robot, mobee.load_world("table")), q, np.array([(i, i + 1) for i in range(10)]), 0.1))
 
 
+def pictures() -> str:
+    """What an eye sees of a room, and an imperfect one of it."""
+    robot, world = mobee.load_robot("icub"), mobee.load_world("table")
+    scene = Scene(robot, world, around=[*room(10), *clutter(world.objects.values(), 10)])
+    settings = CameraSettings(samples=2)
+    eyes = Cameras(scene, settings, camera_errors(settings, robot, list(scene.cameras), seed=10), seed=10)
+    return digest(scene.draw("left"), eyes.expose("right", [robot.home, robot.home + 0.01]))
+
+
 PARTS: tuple[Callable[[], str], ...] = (
     evaluation,
     jacobians,
@@ -144,6 +157,7 @@ PARTS: tuple[Callable[[], str], ...] = (
     exploring,
     histories,
     edges,
+    pictures,
 )
 
 if __name__ == "__main__":

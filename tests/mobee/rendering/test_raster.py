@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mobee._core.rays import Chosen, cast
 from mobee.errors import UnknownName
 from mobee.rendering.camera import NEAREST, Camera, Raster, camera_axes, eye_camera, framing, pixel_middles
-from mobee.rendering.solid import Solid, ball
+from mobee.rendering.mesh import Piece, mesh_of
+from mobee.rendering.solid import Solid, ball, packed
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 AHEAD = camera_axes((0.0, 0.0))  # looks along x
@@ -113,6 +117,23 @@ def test_an_eye_sees_a_turned_volume_where_points_along_its_rays_begin_to_be_ins
     late = first[both] - seen.depth[both]
     assert (late >= -1e-4).all() and (late <= 0.0011).all()
     assert (np.isfinite(seen.depth) & ~both).sum() <= 3  # only where less than a step of the ray is inside
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 10**6))
+def test_chosen_rays_meet_what_the_rays_of_the_whole_picture_meet(seed: int) -> None:
+    """Also boxes that surround the eye or are behind it, and triangles smaller than a pixel and larger than the picture."""
+    rng = np.random.default_rng(seed)
+    solids = [replace(shape, position=rng.uniform(-0.3, 0.3, 3), rotation=turn(seed)) for shape in SHAPES]
+    corners = np.concatenate([rng.uniform(-2.0, 2.0, (9, 3)), rng.uniform(-0.01, 0.01, (90, 3))])
+    mesh = mesh_of(Piece(corners, np.arange(99).reshape(33, 3)))
+    packs = packed([*solids, Solid("mesh", (), np.zeros(3), np.eye(3), BLUE, mesh=mesh)])
+    for eye in (eye_camera(rng.uniform(-0.3, 0.3, 3), turn(seed + 1), 37, 23, 90.0), replace(camera(1.0, 23, turn(seed + 1)), width=37)):
+        every = cast(packs.volumes, packs.surfaces, eye.rays())
+        mask = rng.uniform(size=(23, 37)) < 0.6
+        some = cast(packs.volumes, packs.surfaces, eye.rays(), Chosen.of(mask))
+        for whole, part in zip(every, some, strict=True):
+            np.testing.assert_array_equal(part, whole[mask])
 
 
 def test_the_hull_of_a_boxs_corners_is_seen_as_the_box() -> None:
