@@ -3,12 +3,16 @@
 
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects); with optics = "dragonfly" tick in place of the states.
 Writes: vision/image/{camera}, vision/camera/{camera}; only while there are subscribers.
+
+Imperfect pictures are drawn while their latency passes: as soon as the truth is known until the end of the exposure.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +21,7 @@ from bus_schema.messages import Camera, Clock, Image, Truth
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Picture, Scene
 from mobee.rendering.solid import Solid
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
@@ -27,7 +31,7 @@ from services.common.body import Body
 from services.common.rate import Percentiles
 from services.common.service import Service, run_node
 from services.robot_sim.config import RendererConfig
-from services.robot_sim.renderer_imperfect import ImperfectCameras
+from services.robot_sim.renderer_imperfect import ImperfectCameras, Stamp
 
 
 class RendererNode:
@@ -44,6 +48,8 @@ class RendererNode:
         self._images = {name: service.bus.publisher(Image, name) for name in self._scene.cameras}
         self._cameras = {name: service.bus.publisher(Camera, name) for name in self._scene.cameras}
         self._due = 0  # ns, bus clock
+        self._waiting: deque[tuple[int, dict[str, Picture]]] = deque()  # imperfect pictures whose latency passes, after their time, ns
+        self._will_expose = False
         self._frame_time, self._pair_time = Percentiles(), Percentiles()
         self._frame_work = Percentiles()  # without the time that others had the processor
         self._mark()
@@ -56,19 +62,19 @@ class RendererNode:
         errors = camera_errors(settings, robot, list(cameras_of(robot, config.cameras)), config.seed)
         objects = config.load_world().objects.values()
         self._scene = _scene(config, robot, errors.tag, [*room(config.seed), *clutter(objects, config.seed)])
-        return ImperfectCameras(self._service, robot, self._scene, settings, errors, config.seed)
+        return ImperfectCameras(
+            self._service, robot, self._scene, settings, errors, config.seed, on_truth=self._expose_soon, on_encoders=self._publish_waiting
+        )
+
+    def _are_wanted(self) -> bool:
+        return any(self._images[name].has_subscribers or self._cameras[name].has_subscribers for name in self._scene.cameras)
 
     def _tick(self, clock: Clock) -> None:
-        late, now = (0, clock.t) if self._imperfect is None else (self._imperfect.latency, self._imperfect.newest)
-        if now < self._due + late:
+        """Draw ideal pictures that are due."""
+        if self._imperfect is not None or clock.t < self._due:
             return
-        if not any(self._images[name].has_subscribers or self._cameras[name].has_subscribers for name in self._scene.cameras):
+        if not self._are_wanted():
             self._due = clock.t + self._period
-            return
-        if self._imperfect is not None:
-            exposed = max(self._due, now - late - self._period)
-            self._due = exposed + self._period
-            self._expose(self._imperfect, exposed)
             return
         # Just after a clock message the newest states are all of the tick before it; if not, the next tick will do.
         if self._body.update() and len({state.k for state in self._body.states.values()}) == 1:
@@ -85,10 +91,7 @@ class RendererNode:
                 self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
         self._scene.pose(q)
         for name in self._scene.cameras:
-            start, work = time.perf_counter(), time.thread_time()
-            picture = self._scene.draw(name)
-            self._frame_time.add(1e3 * (time.perf_counter() - start))
-            self._frame_work.add(1e3 * (time.thread_time() - work))
+            picture = self._measured(partial(self._scene.draw, name))
             stamp: dict[str, Any] = {"k": state.k, "t": state.t, "camera": name, "k_capture": state.k}
             self._cameras[name].put(
                 **stamp,
@@ -104,38 +107,78 @@ class RendererNode:
         self._pairs += 1
         self._pair_time.add(1e3 * (time.perf_counter() - begin))
 
-    def _expose(self, cameras: ImperfectCameras, t: int) -> None:
-        """Publish the pictures of an exposure at time t [ns]; with none if the truth around it is missing."""
+    def _measured(self, draw: Callable[[], Picture]) -> Picture:
+        start, work = time.perf_counter(), time.thread_time()
+        picture = draw()
+        self._frame_time.add(1e3 * (time.perf_counter() - start))
+        self._frame_work.add(1e3 * (time.thread_time() - work))
+        return picture
+
+    def _expose_soon(self) -> None:
+        """Expose after the messages that wait already: drawing may have taken longer than the time between two pictures."""
+        if not self._will_expose:
+            self._will_expose = True
+            self._service.inbox.put(lambda: self._service.bus.guarded("pictures", self._expose))
+
+    def _expose(self) -> None:
+        """Draw imperfect pictures that are due."""
+        self._will_expose = False
+        cameras = self._imperfect
+        if cameras is None or cameras.exposed < self._due:
+            return
+        if not self._are_wanted():
+            self._due = cameras.exposed + self._period
+            return
+        t = max(self._due, cameras.exposed - self._period)
+        self._due = t + self._period
         begin = time.perf_counter()
         try:
-            found = cameras.expose(1e-9 * t)
+            postures = cameras.postures(1e-9 * t)
         except InvalidValue as error:
-            self._missed += 1
-            self._service.bus.reject("truth", str(error))
+            self._miss(error)
             return
-        lens = cameras.settings.lens
-        t_stamp = max(0, round(1e9 * found.stamp))
-        k = t_stamp // max(1, self._service.bus.dt)
-        for name, picture in found.pictures:
-            stamp: dict[str, Any] = {"k": k, "t": t_stamp, "camera": name, "k_capture": k}
+        pictures = {name: self._measured(partial(cameras.draw, name, postures)) for name in self._scene.cameras}
+        self._pair_time.add(1e3 * (time.perf_counter() - begin))
+        self._waiting.append((t, pictures))
+        self._publish_waiting()
+
+    def _publish_waiting(self) -> None:
+        """Publish the imperfect pictures whose latency has passed."""
+        cameras = self._imperfect
+        while cameras is not None and self._waiting and self._waiting[0][0] <= cameras.arrived:
+            t, pictures = self._waiting.popleft()
+            try:
+                self._put(cameras, cameras.stamp(1e-9 * t), pictures)
+            except InvalidValue as error:
+                self._miss(error)
+
+    def _miss(self, error: InvalidValue) -> None:
+        self._missed += 1
+        self._service.bus.reject("truth", str(error))
+
+    def _put(self, cameras: ImperfectCameras, stamp: Stamp, pictures: dict[str, Picture]) -> None:
+        lens, t = cameras.settings.lens, max(0, round(1e9 * stamp.t))
+        k = t // max(1, self._service.bus.dt)
+        for name, picture in pictures.items():
+            common: dict[str, Any] = {"k": k, "t": t, "camera": name, "k_capture": k}
             self._cameras[name].put(
-                **stamp,
+                **common,
                 intrinsics=lens.matrix.ravel().tolist(),
                 distortion=list(lens.distortion),
                 exposure=cameras.settings.exposure,
-                q=found.q.tolist(),
-                dq=found.dq.tolist(),
-                readings=found.readings,
+                q=stamp.q.tolist(),
+                dq=stamp.dq.tolist(),
+                readings=stamp.readings,
             )
             height, width, _ = picture.shape
-            self._images[name].put(**stamp, width=width, height=height, encoding="rgb8", data=picture.tobytes())
+            self._images[name].put(**common, width=width, height=height, encoding="rgb8", data=picture.tobytes())
         self._pairs += 1
-        self._pair_time.add(1e3 * (time.perf_counter() - begin))
 
     def _new_run(self) -> None:
         self._body.forget()
         if self._imperfect is not None:
             self._imperfect.forget()
+        self._waiting.clear()
         self._due = 0
 
     def _mark(self) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,26 +24,36 @@ FARTHEST = 0.03  # s between two messages of the truth, between which postures a
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Exposure:
-    """An exposure: its stamp [s] by the camera's clock, the encoders then, and its pictures, which are drawn when they are iterated.
+class Stamp:
+    """The time `t` [s] of an exposure by the camera's clock, and the encoders then: `q` (n,) rad and `dq` (n,) rad/s.
 
-    `q` (n,) rad and `dq` (n,) rad/s; `readings`: the number of readings of each encoder in them.
+    `readings`: the number of readings of each encoder in them.
     """
 
-    stamp: float
+    t: float
     q: Array
     dq: Array
     readings: int
-    pictures: Iterator[tuple[str, Picture]]
 
 
 class ImperfectCameras:
     """Follows truth and encoders on the bus, and exposes pictures in the recent past."""
 
-    def __init__(self, service: Service, robot: Robot, scene: Scene, settings: CameraSettings, errors: CameraErrors, seed: int) -> None:
-        """`seed`: of the noise in stamps and pictures."""
+    def __init__(
+        self,
+        service: Service,
+        robot: Robot,
+        scene: Scene,
+        settings: CameraSettings,
+        errors: CameraErrors,
+        seed: int,
+        on_truth: Callable[[], None],
+        on_encoders: Callable[[], None],
+    ) -> None:
+        """`seed`: of the noise in stamps and pictures.  `on_truth`, `on_encoders`: called when these are known until a later time."""
         self.settings, self.errors = settings, errors
         self._scene, self._bus = scene, service.bus
+        self._on_truth, self._on_encoders = on_truth, on_encoders
         self._cameras = Cameras(scene, settings, errors, seed)
         self._rng = np.random.default_rng([seed, 0x7374616D70])
         self._truths: deque[tuple[float, Array]] = deque(maxlen=TRUTHS)
@@ -60,21 +70,27 @@ class ImperfectCameras:
         self._ticked = 0.0
 
     @property
-    def latency(self) -> int:
-        """The true latency of the pictures, ns, without the time for which they are drawn."""
-        return round(1e9 * (self.settings.latency + self.errors.latency))
+    def exposed(self) -> int:
+        """The time of the newest exposure that can be drawn, ns: the truth is known until its end."""
+        return round(1e9 * (self._truths[-1][0] - 0.5 * self.settings.exposure)) if self._truths else 0
 
     @property
-    def newest(self) -> int:
-        """The time until which truth and encoders are known, ns: messages that wait are handled after the clock's."""
-        return round(1e9 * min(self._truths[-1][0], self._ticked)) if self._truths else 0
+    def arrived(self) -> int:
+        """The time of the newest exposure whose pictures have come out of the camera, ns."""
+        return round(1e9 * (self._ticked - self.settings.latency - self.errors.latency))
 
-    def expose(self, t: float) -> Exposure:
-        """Return the exposure whose middle is at time t [s]; raises InvalidValue if truth or encoders are missing around it."""
+    def postures(self, t: float) -> list[Array]:
+        """Return the true postures in the exposure whose middle is at time t [s]; raises InvalidValue if the truth is missing around it."""
+        return [self._true_at(t + moment) for moment in self._cameras.moments]
+
+    def draw(self, name: str, postures: list[Array]) -> Picture:
+        """Return the picture of a camera, of an exposure with these postures."""
+        return self._cameras.expose(name, postures)
+
+    def stamp(self, t: float) -> Stamp:
+        """Return the stamp of the exposure at time t [s]; raises InvalidValue if readings of the encoders are missing around it."""
         stamp = t + self.errors.latency + self.settings.jitter * float(self._rng.standard_normal())
-        q, dq, readings = self._readings.at(stamp)
-        postures = [self._true_at(t + moment) for moment in self._cameras.moments]
-        return Exposure(stamp, q, dq, readings, ((name, self._cameras.expose(name, postures)) for name in self._scene.cameras))
+        return Stamp(stamp, *self._readings.at(stamp))
 
     def _true_at(self, t: float) -> Array:
         times = np.array([time for time, _ in self._truths])
@@ -91,8 +107,10 @@ class ImperfectCameras:
             self._truths.append((t, np.array(truth.q)))
         for thing in truth.objects:
             self._scene.place(thing.name, np.array(thing.position), np.array(thing.quaternion))
+        self._on_truth()
 
     def _note_tick(self, tick: Tick) -> None:
         q, self._ticked = np.array(tick.q), 1e-9 * tick.t
         for part, status in tick.parts.items():
             self._readings.note(part, 1e-9 * status.t, q[self._parts[part]])
+        self._on_encoders()
