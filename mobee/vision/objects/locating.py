@@ -13,7 +13,7 @@ from mobee.arrays import Array
 from mobee.model.world_object import WorldObject
 from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.eyes import Eye, Eyes
-from mobee.vision.objects.placing import FARTHEST, NEAREST, Placed, place
+from mobee.vision.objects.placing import FARTHEST, NEAREST, Outline, Placed, place
 from mobee.vision.objects.silhouette import surface
 from mobee.vision.objects.thing import Thing
 
@@ -36,10 +36,11 @@ def locate_all(
     """
     found: list[tuple[Placed, Thing, int, int]] = []
     first, second = eyes.names
-    sights = {name: _Sights.of(eye, detections[name]) for name, eye in zip(eyes.names, eyes.eyes, strict=True)}
+    outlines = {name: Outline.all_of(eye, detections[name]) for name, eye in zip(eyes.names, eyes.eyes, strict=True)}
+    sights = {name: _Sights.of(eye, detections[name], outlines[name]) for name, eye in zip(eyes.names, eyes.eyes, strict=True)}
     for thing in things:
         for a, b in _pairs(thing, sights[first], sights[second]):
-            placed = place(thing, {first: detections[first][a], second: detections[second][b]}, eyes)
+            placed = place(thing, (outlines[first][a], outlines[second][b]), eyes)
             if placed is not None and not any(_reaches_into(thing, placed, solid) for solid in solids):
                 found.append((placed, thing, a, b))
     chosen: list[tuple[Placed, Thing]] = []
@@ -69,10 +70,10 @@ class _Sights:
     angles: Array
 
     @classmethod
-    def of(cls, eye: Eye, detections: Sequence[Detection]) -> _Sights:
-        centres = np.array([one.centre for one in detections]).reshape(-1, 2)
+    def of(cls, eye: Eye, detections: Sequence[Detection], outlines: Sequence[Outline]) -> _Sights:
+        rays = np.array([one.ray for one in outlines]).reshape(-1, 3)
         angles = np.array([2.0 * np.sqrt(one.area / np.pi) / eye.lens.fx for one in detections])
-        return cls(np.array([one.name for one in detections]), eye.position, eye.lens.unproject(centres) @ eye.rotation.T, angles)
+        return cls(np.array([one.name for one in detections]), eye.position, rays, angles)
 
 
 def _pairs(thing: Thing, left: _Sights, right: _Sights) -> list[tuple[int, int]]:

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from mobee._core.silhouettes import Silhouette
 from mobee.arrays import Array
 from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.eyes import Eye, Eyes
@@ -19,6 +20,7 @@ EDGE = 0.3  # px, standard deviation of a point on an outline; this and the next
 SHIFT = 0.08  # px, of the whole outline in one picture, along column and row
 SHIFT_BOTH = 0.12  # px, of the outlines in both pictures together: the light comes from one side
 WIDER = 0.12  # px, of the outline in one picture outwards
+FEWEST = 8  # points of an outline
 DIRECTIONS = 72  # of the lines that touch a silhouette
 LOOSE, TIGHT = 6.0, 0.9  # px: a residual of this length has a quarter of its weight, in the first steps and in the last
 LOOSE_STEPS, STEPS, ENOUGH = 3, 10, 1e-4  # of Gauss and Newton; m
@@ -59,38 +61,52 @@ class Placed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Outline:
-    """An outline in one picture: flat points (m, 2) in the plane at distance 1, and the pixels of a step in it (m, 2, 2), inverted."""
+class Outline:
+    """An outline in one picture: flat points (m, 2) in the plane at distance 1, and the pixels of a step in it (m, 2, 2), inverted.
+
+    `ray` (3,): the unit vector through its middle, root frame.
+    """
 
     eye: Eye
     flat: Array
     inverse: Array
+    ray: Array
 
     @classmethod
-    def of(cls, eye: Eye, outline: Array) -> _Outline | None:
+    def all_of(cls, eye: Eye, detections: Sequence[Detection]) -> list[Outline]:
+        """Return the outlines of detections in one picture; without the points that the lens does not show."""
+        if not detections:
+            return []
         lens = eye.lens
-        flat = lens.undistort((outline - (lens.cx, lens.cy)) / (lens.fx, lens.fy))
-        flat = flat[np.isfinite(flat).all(axis=1)]
-        if len(flat) < 8:
-            return None
+        every = np.concatenate([*(one.outline for one in detections), [one.centre for one in detections]])
+        flat = lens.undistort((every - (lens.cx, lens.cy)) / (lens.fx, lens.fy))
         slope = np.array([[lens.fx], [lens.fy]]) * lens.distortion_slope(flat)
-        inverse = np.asarray(np.linalg.inv(slope), dtype=np.float64)
-        return cls(eye, flat, inverse)
+        shown = np.asarray(np.isfinite(flat).all(axis=1))
+        inverse = np.full(slope.shape, np.nan)
+        inverse[shown] = np.linalg.inv(slope[shown])
+        rays = np.concatenate([flat[len(flat) - len(detections) :], np.ones((len(detections), 1))], axis=1) @ eye.rotation.T
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        found, first = [], 0
+        for one, ray in zip(detections, rays, strict=True):
+            mine = np.flatnonzero(shown[first : first + len(one.outline)]) + first
+            found.append(cls(eye, flat[mine], inverse[mine], ray))
+            first += len(one.outline)
+        return found
 
 
 _ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
 _NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
-def place(thing: Thing, outlines: Mapping[str, Detection], eyes: Eyes) -> Placed | None:
-    """Return the place of a thing from its outlines by camera; None if they do not fit it, or the thing is too near or too far."""
-    seen = [_Outline.of(eye, outlines[name].outline) for name, eye in zip(eyes.names, eyes.eyes, strict=True)]
-    rays = [eye.rotation @ eye.lens.unproject(outlines[name].centre) for name, eye in zip(eyes.names, eyes.eyes, strict=True)]
-    start = nearest_to_rays(np.array([eye.position for eye in eyes.eyes]), np.array(rays))
-    if np.isnan(start).any() or any(one is None for one in seen) or not _in_range(eyes, start):
+def place(thing: Thing, outlines: Sequence[Outline], eyes: Eyes) -> Placed | None:
+    """Return the place of a thing from its outlines; None if they do not fit it, or the thing is too near or too far.
+
+    `outlines`: in the order of the cameras of `eyes`.
+    """
+    start = nearest_to_rays(np.array([eye.position for eye in eyes.eyes]), np.array([one.ray for one in outlines]))
+    if np.isnan(start).any() or min(len(one.flat) for one in outlines) < FEWEST or not _in_range(eyes, start):
         return None
-    every = [one for one in seen if one is not None]
-    fits = [_fit(thing, every, eyes, start, yaw) for yaw in (YAWS if thing.kind == "box" else YAWS[:1])]
+    fits = [_fit(thing, outlines, eyes, start, yaw) for yaw in (YAWS if thing.kind == "box" else YAWS[:1])]
     good = [fit for fit in fits if fit is not None]
     return min(good, key=lambda fit: fit[0], default=(0.0, None))[1]
 
@@ -111,7 +127,7 @@ class _Guess:
     errors: Array  # (c,), in standard deviations
 
 
-def _fit(thing: Thing, seen: list[_Outline], eyes: Eyes, start: Array, yaw: float) -> tuple[float, Placed] | None:
+def _fit(thing: Thing, seen: Sequence[Outline], eyes: Eyes, start: Array, yaw: float) -> tuple[float, Placed] | None:
     """Return the best fit from a first position and yaw, after its cost; None if it does not explain the outlines."""
     lengths, turns = len(thing.size), int(thing.kind == "box")
     own = 3 + lengths + turns
@@ -119,8 +135,9 @@ def _fit(thing: Thing, seen: list[_Outline], eyes: Eyes, start: Array, yaw: floa
     guess = _Guess(start, np.zeros(lengths), yaw, np.zeros(count))
     tolerance = max(thing.tolerance, 1e-3)
     prior = np.concatenate([np.zeros(3), np.full(lengths, tolerance**-2), np.zeros(turns), np.ones(count)])
+    compared = [_compared(thing, one, eyes, number) for number, one in enumerate(seen)]
     for step in range(STEPS):
-        rows = _rows(thing, seen, eyes, guess)
+        rows = _rows(thing, seen, compared, guess)
         if rows is None:
             return None
         residual, slopes, _ = rows
@@ -129,8 +146,10 @@ def _fit(thing: Thing, seen: list[_Outline], eyes: Eyes, start: Array, yaw: floa
         width = LOOSE if step < LOOSE_STEPS else TIGHT
         weight = (1.0 + (residual / width) ** 2) ** -2 / EDGE**2
         values = np.concatenate([np.zeros(3), guess.log_size, np.zeros(turns), guess.errors])
-        normal = (slopes.T * weight) @ slopes + np.diag(prior)
-        change = -np.linalg.solve(normal + 1e-9 * np.diag(np.diag(normal)), slopes.T @ (weight * residual) + prior * values)
+        normal = (slopes.T * weight) @ slopes
+        normal.flat[:: len(prior) + 1] += prior
+        normal.flat[:: len(prior) + 1] *= 1.0 + 1e-9
+        change = -np.linalg.solve(normal, slopes.T @ (weight * residual) + prior * values)
         change[:3] *= min(1.0, 0.05 / max(float(np.linalg.norm(change[:3])), 1e-12))
         guess.position = guess.position + change[:3]
         guess.log_size = np.clip(guess.log_size + change[3 : 3 + lengths], -0.7, 0.7)
@@ -138,14 +157,14 @@ def _fit(thing: Thing, seen: list[_Outline], eyes: Eyes, start: Array, yaw: floa
         guess.errors = guess.errors + change[own:]
         if step >= LOOSE_STEPS and float(np.abs(change[:3]).max()) < ENOUGH:
             break
-    rows = _rows(thing, seen, eyes, guess)
+    rows = _rows(thing, seen, compared, guess)
     if rows is None or (np.abs(guess.log_size) > MOST_SIZE * tolerance).any() or not _in_range(eyes, guess.position):
         return None
     return _judged(thing, seen, eyes, guess, rows, prior)
 
 
 def _judged(
-    thing: Thing, seen: list[_Outline], eyes: Eyes, guess: _Guess, rows: tuple[Array, Array, Array], prior: Array
+    thing: Thing, seen: Sequence[Outline], eyes: Eyes, guess: _Guess, rows: tuple[Array, Array, Array], prior: Array
 ) -> tuple[float, Placed] | None:
     """Return a fit with its covariance, after its cost; None if too few points fit, or they are on a small part of the silhouette."""
     residual, slopes, parts = rows
@@ -194,43 +213,29 @@ def _projected(eye: Eye, position: Array) -> Array:
     return flat
 
 
-def _rows(thing: Thing, seen: list[_Outline], eyes: Eyes, guess: _Guess) -> tuple[Array, Array, Array] | None:
+def _compared(thing: Thing, one: Outline, eyes: Eyes, number: int) -> Silhouette:
+    """Return what compares an outline in the picture of a camera, by its number, with silhouettes of the thing."""
+    mine, length_of = slice(6 * number, 6 * number + 6), [0, 0, 0]
+    for length, axes in enumerate(SCALED[thing.kind]):
+        for axis in axes:
+            length_of[axis] = length
+    camera = one.eye.position, one.eye.rotation, eyes.noise[mine], eyes.bias[mine]
+    shifts = SHIFT, WIDER, SHIFT_BOTH
+    return Silhouette(camera, (number, len(eyes.eyes)), one.flat, one.inverse, _NORMALS, length_of, thing.kind == "box", shifts)
+
+
+def _rows(thing: Thing, seen: Sequence[Outline], compared: list[Silhouette], guess: _Guess) -> tuple[Array, Array, Array] | None:
     """Return the residuals (m,) px of all points, positive outside the silhouette, their slopes (m, p), and whose they are (m,).
 
     None if the thing is not wholly ahead of a camera.
     """
     size, turn = np.array(thing.size) * np.exp(guess.log_size), upright(guess.yaw)
-    residuals, slopes, parts = [], [], []
-    for number, one in enumerate(seen):
+    rows = []
+    for one, silhouette in zip(seen, compared, strict=True):
         local = one.eye.rotation.T @ (guess.position - one.eye.position)
         if local[2] <= 1.2 * float(np.linalg.norm(size)):
             return None
-        offsets, farthest = touching(thing.kind, size, local, one.eye.rotation.T @ turn, _NORMALS)
-        distance = one.flat @ _NORMALS.T - farthest
-        nearest = distance.argmax(axis=1)
-        normal, along, offset = _NORMALS[nearest], farthest[nearest], offsets[nearest]
-        gradient = np.einsum("mij,mi->mj", one.inverse, normal)
-        scale = np.linalg.norm(gradient, axis=1)  # of a pixel in the plane at distance 1
-        residual = distance[np.arange(len(nearest)), nearest] / scale
-        ahead = local[2] + offset[:, 2]
-        by_point = -np.column_stack([normal, -along]) / (ahead * scale)[:, None] @ one.eye.rotation.T  # of the root frame
-        offset = offset @ one.eye.rotation.T
-        columns = [by_point]
-        inside = offset @ turn
-        by_inside = by_point @ turn
-        columns += [(by_inside[:, axes] * inside[:, axes]).sum(axis=1)[:, None] for axes in map(list, SCALED[thing.kind])]
-        if thing.kind == "box":
-            columns.append((by_point[:, 1] * offset[:, 0] - by_point[:, 0] * offset[:, 1])[:, None])
-        away = guess.position + offset - one.eye.position
-        by_camera = -np.column_stack([by_point, np.cross(away, by_point)])
-        mine = slice(6 * number, 6 * number + 6)
-        columns += [by_camera @ eyes.noise[mine], by_camera @ eyes.bias[mine]]
-        unit = gradient / scale[:, None]
-        shift = np.zeros((len(unit), 3 * len(seen)))
-        shift[:, 3 * number : 3 * number + 2], shift[:, 3 * number + 2] = SHIFT * unit, WIDER
-        columns += [shift, SHIFT_BOTH * unit]
-        residuals.append(residual)
-        slopes.append(np.concatenate(columns, axis=1))
-        parts.append(np.full(len(residual), number))
-    slope = np.concatenate(slopes)
-    return np.concatenate(residuals) + slope[:, -len(guess.errors) :] @ guess.errors, slope, np.concatenate(parts)
+        touched = touching(thing.kind, size, local, one.eye.rotation.T @ turn, _NORMALS)
+        rows.append(silhouette.rows(guess.position, turn, touched, guess.errors))
+    residuals, slopes = zip(*rows, strict=True)
+    return np.concatenate(residuals), np.concatenate(slopes), np.repeat(np.arange(len(rows)), [len(one) for one in residuals])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,15 +13,22 @@ from hypothesis import strategies as st
 
 from mobee import World, box
 from mobee.vision.mount import rotation_of
+from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.eyes import Eye, Eyes
 from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import EDGE, place
+from mobee.vision.objects.placing import EDGE, Outline, Placed
+from mobee.vision.objects.placing import place as place_outlines
 from mobee.vision.objects.silhouette import surface, touching, upright
 from mobee.vision.objects.thing import Thing
 from tests.mobee.vision.objects.drawn import BALL, BOX, CUP, THINGS, eyes, seen
 
 PLACES = st.tuples(st.floats(-0.45, -0.25), st.floats(-0.12, 0.12), st.floats(-0.06, 0.06)).map(np.array)
 YAWS = st.floats(-3.0, 3.0)
+
+
+def place(thing: Thing, found: Mapping[str, Detection], view: Eyes) -> Placed | None:
+    """The place of a thing that was detected once in each picture."""
+    return place_outlines(thing, [Outline.all_of(eye, [found[name]])[0] for name, eye in zip(view.names, view.eyes, strict=True)], view)
 
 
 @given(PLACES, st.sampled_from(THINGS), st.floats(0.0, 6.28))

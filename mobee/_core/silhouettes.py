@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distances of an outline's points from the silhouette of a shape, and their slopes; declares core/silhouettes.cpp."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core import ADDRESS, INTEGER, REAL, address, function
+
+Array = NDArray[np.float64]
+
+
+class _Silhouette(ctypes.Structure):
+    """`Silhouette` of core/silhouettes.cpp."""
+
+    _fields_ = (
+        *(
+            (name, ADDRESS)
+            for name in ("flat", "inverse", "normals", "offsets", "farthest", "noise", "bias", "errors", "residual", "slopes")
+        ),
+        *((name, INTEGER) for name in ("points", "directions", "noises", "biases", "cameras", "number", "lengths", "turns")),
+        ("length_of", INTEGER * 3),
+        *((name, REAL * count) for name, count in (("origin", 3), ("view", 9), ("position", 3), ("turn", 9))),
+        *((name, REAL) for name in ("shift", "wider", "shift_both")),
+    )
+
+
+_silhouette = function("silhouette", ADDRESS)
+
+
+class Silhouette:
+    """The outline of a shape in the picture of one camera, against which the shape's silhouette is compared again and again."""
+
+    def __init__(
+        self,
+        camera: tuple[Array, Array, Array, Array],
+        number: tuple[int, int],
+        flat: Array,
+        inverse: Array,
+        normals: Array,
+        length_of: Sequence[int],
+        turns: bool,
+        shifts: tuple[float, float, float],
+    ) -> None:
+        """Arrays as in core/silhouettes.cpp.
+
+        Args:
+            camera: its origin (3,) m and rotation (3, 3), columns right, down and ahead, and the factors of its errors, noise and bias.
+            number: of this camera, and of all cameras.
+            flat: points (m, 2) of the outline in the plane at distance 1.
+            inverse: a step in that plane by a step of pixels, (m, 2, 2).
+            normals: of the lines that touch the silhouette, (K, 2).
+            length_of: which length each of the three axes of the shape has.
+            turns: the angle about the vertical is unknown, too.
+            shifts: px of an outline along column and row, outwards, and of those in all pictures together.
+        """
+        origin, view, noise, bias = camera
+        self._kept = tuple(np.ascontiguousarray(array, dtype=np.float64) for array in (flat, inverse, normals, noise, bias))
+        lengths, errors = max(length_of) + 1, noise.shape[1] + bias.shape[1] + 3 * number[1] + 2
+        self._residual, self._slopes = np.empty(len(flat)), np.empty((len(flat), 3 + lengths + turns + errors))
+        names = ("flat", "inverse", "normals", "noise", "bias", "residual", "slopes")
+        arrays = zip(names, (*self._kept, self._residual, self._slopes), strict=True)
+        self._given = _Silhouette(
+            **{name: address(array) for name, array in arrays},
+            points=len(flat),
+            directions=len(normals),
+            noises=noise.shape[1],
+            biases=bias.shape[1],
+            number=number[0],
+            cameras=number[1],
+            lengths=lengths,
+            turns=turns,
+            shift=shifts[0],
+            wider=shifts[1],
+            shift_both=shifts[2],
+            length_of=(INTEGER * 3)(*length_of),
+            origin=(REAL * 3)(*origin),
+            view=(REAL * 9)(*view.ravel()),
+        )
+
+    def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
+        """Return the residuals (m,) px, positive outside the silhouette, and their slopes (m, p), which the next call overwrites.
+
+        Args:
+            position: of the shape's middle (3,) m.
+            turn: rotation of the shape's axes (3, 3).
+            touching: points (K, 3) m where lines along the normals touch the shape, from its middle in the camera's axes, and how far
+                their images are along the normals (K,).
+            errors: of the cameras and outlines, in standard deviations.
+        """
+        given, (offsets, farthest) = self._given, (np.ascontiguousarray(array, dtype=np.float64) for array in touching)
+        errors = np.ascontiguousarray(errors, dtype=np.float64)
+        given.offsets, given.farthest, given.errors = address(offsets), address(farthest), address(errors)
+        given.position[:], given.turn[:] = position.tolist(), turn.ravel().tolist()
+        _silhouette(ctypes.addressof(given))
+        return self._residual, self._slopes
