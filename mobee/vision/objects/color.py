@@ -7,15 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
-from scipy.spatial import ConvexHull, QhullError
 
-from mobee.arrays import Array
+from mobee._core.regions import regions
 from mobee.rendering.scene import Picture
 from mobee.rendering.solid import Color
 from mobee.vision.objects.detection import Detection, Detector
 from mobee.vision.objects.thing import Thing
-from mobee.vision.regions import boxes, label, without_holes
 
 HUE = float(np.tan(np.deg2rad(20.0)))  # of the largest angle from the thing's hue
 PALE = 0.35  # share of the thing's saturation below which a pixel is not of its colour
@@ -25,7 +22,6 @@ AROUND = 5  # px: side of the square in which the colour of a whole pixel is loo
 FEWEST = 16  # points of an outline
 MOST = 100  # points of an outline that are kept
 SOLID = 0.6  # share of its convex hull that a region must fill: the things are convex
-STEPS = ((0, 1), (0, -1), (1, 0), (-1, 0))  # row and column of the neighbours of a pixel
 
 
 def by_color(things: Sequence[Thing]) -> Detector:
@@ -64,53 +60,12 @@ def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
 def _regions(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
     """Return the regions with a likeness, as detections."""
     height, width = likeness.shape
-    rough = label(likeness > 0.0, diagonal=True)
     found = []
-    for number, (rows, columns) in enumerate(boxes(rough), start=1):
-        if (rough[rows, columns] == number).sum() < AREA:
+    for region in regions(likeness, AREA, AROUND):
+        outline, filled = region.outline, min(1.0, region.area / max(region.hull, 1e-9))
+        within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
+        if within.sum() < FEWEST or filled < SOLID:
             continue
-        inside = np.s_[max(0, rows.start - 1) : rows.stop + 1, max(0, columns.start - 1) : columns.stop + 1]
-        corner = np.array([inside[1].start, inside[0].start])
-        own = np.where(rough[inside] == number, likeness[inside], 0.0)
-        share = np.minimum(own / np.maximum(maximum_filter(own, AROUND), 1.0), 1.0)
-        parts = label(share >= 0.5, diagonal=False)
-        for part, where in enumerate(boxes(parts), start=1):
-            if (parts[where] == part).sum() < AREA:
-                continue
-            region = without_holes(parts == part)
-            outline = _outline(region, share)
-            filled = _filled(region, outline)
-            outline += corner
-            within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
-            if within.sum() < FEWEST or filled < SOLID:
-                continue
-            every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
-            found.append(Detection(name, outline[within][every], float(region.sum()), filled * float(within.mean())))
+        every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
+        found.append(Detection(name, outline[within][every], float(region.area), filled * float(within.mean())))
     return found
-
-
-def _outline(region: NDArray[np.bool_], share: Array) -> Array:
-    """Return points (m, 2) where the outline crosses the lines between neighbouring pixels, column and row, around the region.
-
-    `share`: how much of each pixel is of the region's colour, from which the place between two pixels follows.
-    """
-    wide, shares = np.pad(region, 1), np.pad(share, 1)
-    points = []
-    for step in STEPS:
-        outside = ~np.roll(wide, (-step[0], -step[1]), axis=(0, 1))
-        rows, columns = np.nonzero(wide & outside)
-        next_rows, next_columns = rows + step[0], columns + step[1]
-        covered = shares[rows, columns] + np.where(wide[next_rows, next_columns], 0.0, shares[next_rows, next_columns]) - 0.5
-        points.append(np.stack([columns + step[1] * covered, rows + step[0] * covered], axis=1) - 1.0)
-    found = np.concatenate(points)
-    middle = found.mean(axis=0)
-    around: Array = found[np.argsort(np.arctan2(found[:, 1] - middle[1], found[:, 0] - middle[0]))]
-    return around
-
-
-def _filled(region: NDArray[np.bool_], outline: Array) -> float:
-    """Return the share of the convex hull of its outline that a region fills."""
-    try:
-        return min(1.0, float(region.sum() / ConvexHull(outline).volume))
-    except QhullError:
-        return 0.0

@@ -24,6 +24,8 @@ from mobee.roadmap.ik.problem import Problem
 from mobee.robot.load import Robot
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraSettings, camera_errors
+from mobee.vision.objects.detectors import detector_of
+from mobee.vision.objects.thing import things_in
 
 ARM = ("l_shoulder_pitch", "l_shoulder_roll", "l_shoulder_yaw", "l_elbow")
 
@@ -138,12 +140,14 @@ def edges() -> str:
 
 
 def pictures() -> str:
-    """What an eye sees of a room, and an imperfect one of it."""
+    """What an eye sees of a room, and an imperfect one of it, and the red things in it."""
     robot, world = mobee.load_robot("icub"), mobee.load_world("table")
     scene = Scene(robot, world, around=[*room(10), *clutter(world.objects.values(), 10)])
     settings = CameraSettings(samples=2)
     eyes = Cameras(scene, settings, camera_errors(settings, robot, list(scene.cameras), seed=10), seed=10)
-    return digest(scene.draw("left"), eyes.expose("right", [robot.home, robot.home + 0.01]))
+    picture = eyes.expose("right", [robot.home, robot.home + 0.01])
+    red = [one.outline for one in detector_of("color", things_in(world))(picture)]
+    return digest(scene.draw("left"), picture, *red)
 
 
 PARTS: tuple[Callable[[], str], ...] = (

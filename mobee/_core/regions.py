@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Regions of a colour in a picture, and their outlines; declares core/regions.cpp."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core import ADDRESS, INTEGER, address, function
+
+
+class _Coloring(ctypes.Structure):
+    """`Coloring` of core/regions.cpp."""
+
+    _fields_ = (
+        *((name, ADDRESS) for name in ("likeness", "points", "ends", "areas", "hulls")),
+        *((name, INTEGER) for name in ("height", "width", "least", "around")),
+    )
+
+
+_regions = function("regions", ADDRESS, result=INTEGER)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """A region without holes: its outline (m, 2) px, column and row, by the angle about its middle; its area and that of its hull, px."""
+
+    outline: NDArray[np.float64]
+    area: int
+    hull: float
+
+
+def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Region]:
+    """Return the regions of a colour, those connected by corners one after the other, and within them those connected by sides.
+
+    Args:
+        likeness: how much of the colour is in each pixel (H, W), 0 for none; linear in the share of the pixel that has the colour.
+        least: px, area of the smallest region.
+        around: px, odd, side of the square in which the colour of a whole pixel is looked up.
+    """
+    likeness = np.ascontiguousarray(likeness, dtype=np.float32)
+    smallest = max(1, int(np.ceil(least)))
+    most = likeness.size // smallest + 1
+    points = np.empty((4 * likeness.size, 2))  # pages that are not written take no memory
+    ends, areas, hulls = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    arrays = (address(array) for array in (likeness, points, ends, areas, hulls))
+    given = _Coloring(*arrays, *likeness.shape, smallest, around)
+    count: int = _regions(ctypes.addressof(given))
+    outlines = np.split(points[: ends[count - 1] if count else 0].copy(), ends[: max(0, count - 1)])
+    return [Region(one, int(area), float(hull)) for one, area, hull in zip(outlines, areas[:count], hulls[:count], strict=False)]
