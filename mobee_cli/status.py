@@ -71,6 +71,7 @@ def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[s
             "uptime_s": stat.uptime if stat else None,
             "restarts": restarts.get(who),
             "rejected": stat.rejected if stat else {},
+            "numbers": dict(stat.numbers) if stat else {},
             "health": dict(stat.health) if stat else {},
             "warnings": stat.warnings if stat else [],
             "text": stat.text if stat else "",

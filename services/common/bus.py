@@ -15,7 +15,7 @@ import zenoh.ext
 from zenoh.handlers import Callback, RingChannel
 
 from bus_schema import VERSION, Refused, decode, encode, encoding_of
-from bus_schema.messages import Event, Message, Tick
+from bus_schema.messages import Clock, Event, Message, Tick, Turn
 from bus_schema.stream import Delivery
 from mobee.errors import MobeeError
 
@@ -142,12 +142,23 @@ class Bus:
         self.session, self.who, self.log = session, who, log
         self.run, self.k, self.t = NO_RUN, 0, 0
         self.dt = 0  # ns a tick
+        self._speed, self._ticked = 0.0, 0.0  # simulated seconds a second, 0 in lockstep; monotonic clock, when `t` was noted
         self.part_sizes: dict[str, int] = {}
         self.robot_size: int | None = None
         self.rejected: Counter[str] = Counter()
         self.control: Delivery = "LATEST"  # delivery class of CONTROL streams: STEP in lockstep
         self._reported: dict[str, float] = {}
         self._events: Publisher[Event] = self.publisher(Event, who)
+
+    def note_time(self, message: Clock | Turn) -> None:
+        """Take the bus clock from a message."""
+        self.k, self.t, self.dt = message.k, message.t, message.dt
+        self._speed = message.rate if isinstance(message, Clock) and message.mode == "free" else 0.0
+        self._ticked = time.monotonic()
+
+    def now(self) -> int:
+        """Return the bus clock, ns, in free mode also in the middle of a tick or of a long computation; never behind `t`."""
+        return self.t + round(1e9 * self._speed * (time.monotonic() - self._ticked))
 
     def publisher(self, cls: type[_M], name: str = "", delivery: Delivery | None = None) -> Publisher[_M]:
         """Return a publisher of a stream.

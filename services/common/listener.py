@@ -134,7 +134,7 @@ class Listener:
             if cls is self._beats_of:
                 self._note_beat(time)
             self.inject_test_delay()
-            self.bus.k, self.bus.t, self.bus.dt = time.k, time.t, time.dt
+            self.bus.note_time(time)
             if time.run != self.bus.run:
                 known, self.bus.run = self.bus.run, time.run
                 if known != NO_RUN:

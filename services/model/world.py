@@ -91,7 +91,7 @@ class WorldServer:
             return
         self._perceived.add(seen.name)
         if seen.t_capture > self._captured.get(seen.name, -1):
-            self.latency.add(1e-6 * (self._service.bus.t - seen.t_capture))
+            self.latency.add(1e-6 * (self._service.bus.now() - seen.t_capture))
         self._margins[seen.name], self._captured[seen.name] = margin, seen.t_capture
         if is_new or seen.name in self._expiry:
             self._expiry[seen.name] = seen.valid_until

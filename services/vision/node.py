@@ -159,7 +159,7 @@ class VisionNode:
         until = round(1e9 * (track.seen + self._config.valid_for))
         self._put(track, until)
         if track.seen == track.t:
-            self._latency.add(1e-6 * (self._service.bus.t - stamp))
+            self._latency.add(1e-6 * (self._service.bus.now() - stamp))
 
     def _withdraw(self, track: Track, why: str) -> None:
         if track.name not in self._stale:

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import pytest
 
-from mobee_cli.status import _as_text
+from bus_schema import VERSION
+from bus_schema.rpc import Stat
+from mobee_cli.status import _as_text, _services
 
 HEALTH = {"rate": 99.8, "age_ms": 4.2, "gap_ms": 1131.0, "refused_rate": 0.0, "memory_mb": 61.4, "files": 31, "threads": 4, "waiting": 0}
 
@@ -36,3 +38,10 @@ def test_each_process_has_a_row_of_health_in_80_columns_with_bad_numbers_marked(
 def test_the_text_of_a_service_moves_no_cursor() -> None:
     text = _as_text({"services": {"robot_sim": service(text="stop by a\nb\x1b[2J")}, "parts": {}, "agents": {}})
     assert "stop by a b\\x1b[2J" in text and "\x1b" not in text
+
+
+def test_a_service_has_the_numbers_that_it_answers_and_one_that_is_silent_has_none() -> None:
+    numbers = {"look_ms_p50": 11.5, "latency_ms_p95": 62.0}
+    stat = Stat(v=VERSION, who="vision", instance="i1", pid=1, uptime=2.0, ready=True, rejected={}, text="", numbers=numbers)
+    found = _services({"vision": ["i1"], "model": ["i2"]}, {"vision": stat})
+    assert found["vision"]["numbers"] == numbers and found["model"]["numbers"] == {}

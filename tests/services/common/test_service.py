@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -265,3 +266,13 @@ def test_random_bytes_on_every_key_do_no_harm(bus: Rig, clock: Any, rng: np.rand
         bus.session.put(key, rng.bytes(int(rng.integers(0, 300))), encoding=encoding)
     assert numbers(bus)["k"] == before
     clock()
+
+
+@pytest.mark.parametrize(("mode", "runs"), [("free", True), ("lock", False), ("paused", False)])
+def test_the_bus_clock_runs_on_between_two_ticks_except_in_lockstep_and_pauses(
+    bus: Rig, mode: Literal["free", "lock", "paused"], runs: bool
+) -> None:
+    known = Bus(bus.bus.session, "clock", logging.getLogger("clock"))
+    known.note_time(Clock(v=VERSION, run="r1", src="robot_sim", seq=0, k=5, t=50, tw=0, dt=10, mode=mode, rate=2.0))
+    time.sleep(0.005)
+    assert known.t == 50 and (known.now() >= 50 + 10_000_000 if runs else known.now() == 50)

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus_schema.messages import Camera, Image
+from bus_schema.messages import Camera, Image, PartStatus, Tick
 from mobee import World, box, cylinder, load_world, sphere
 from mobee.rendering.scene import BACKGROUND, Scene
 from mobee.robot.cameras import camera_frame, cameras_of
 from mobee.robot.load import load_robot
+from mobee.vision.imperfections import CameraSettings
 from services.common.cameras import frame_at_capture
 from tests.services.harness import wait_for
 from tests.services.robots import seer
-from tests.services.stage import LOOKING_DOWN, Stage, posture
+from tests.services.stage import LOOKING_DOWN, TICK, Stage, posture
 
 ROBOT = load_robot("icub")
 EYES = cameras_of(ROBOT)
@@ -159,5 +160,47 @@ def test_pictures_are_drawn_in_pairs_and_only_for_subscribers(free_port: int) ->
             seen = np.array(camera.intrinsics).reshape(3, 3) @ (rotation.T @ (ball - origin))
             rows, columns = np.nonzero(red(pixels))
             np.testing.assert_allclose([columns.mean(), rows.mean()], seen[:2] / seen[2], atol=0.8)
+    finally:
+        stage.close()
+
+
+def test_imperfect_pictures_come_after_their_latency_with_the_encoders_at_their_stamp(free_port: int) -> None:
+    stage, settings = Stage(free_port), CameraSettings()
+    ticks = stage.publisher(Tick)
+    status = {"mode": "velocity", "gate": "armed", "faults": 0, "epoch": 1, "cmd_seq": 0, "cmd_age": 1}
+    turning = 0.1 * np.arange(len(DOWN)) / len(DOWN)  # rad/s
+
+    def q(seconds: float) -> np.ndarray:
+        return DOWN + turning * seconds
+
+    images = {eye: stage.latest(Image, eye) for eye in EYES}
+    cameras = {eye: stage.latest(Camera, eye) for eye in EYES}
+    pairs: list[tuple[float, Camera]] = []  # age [s] at arrival
+    taken: dict[str, Any] = {}
+
+    def enough() -> bool:
+        """Send encoders and truth of the newest tick beside its clock, and take what has come."""
+        k, t = stage.k, 1e-9 * stage.bus.t
+        parts = {name: PartStatus(k=k, t=stage.bus.t, **status) for name in stage.robot.parts}
+        ticks.put(q=q(t).tolist(), parts=parts, dt=TICK, mode="free", rate=1.0)
+        stage._truth.put(q=q(t + 1e-9 * TICK).tolist(), depth=0.0, pair="", gap=-1.0, objects=[])
+        for name, stream in [*((f"image {eye}", images[eye]) for eye in EYES), *((eye, cameras[eye]) for eye in EYES)]:
+            message = stream.take()
+            if message is not None:
+                taken[name] = message
+        if len(taken) == 4 and len({message.k_capture for message in taken.values()}) == 1:
+            pairs.append((t - 1e-9 * taken["left"].t, taken["left"]))
+            taken.clear()
+        return len(pairs) >= 6
+
+    try:
+        with stage.running("services.robot_sim.renderer", "renderer", "--optics", "dragonfly", "--frame-rate", "15"):
+            assert stage.play(DOWN, enough)
+        for age, camera in pairs:
+            assert age >= settings.latency - 5.0 * settings.jitter  # stamps have no other error: they are what the camera says
+            np.testing.assert_allclose(camera.q, q(1e-9 * camera.t), atol=1e-6)
+            np.testing.assert_allclose(camera.dq, turning, atol=1e-4)
+            assert camera.readings == 7 and camera.exposure == settings.exposure
+        assert np.diff([camera.t for _, camera in pairs]).min() > 0
     finally:
         stage.close()
