@@ -200,7 +200,7 @@ def test_imperfect_pictures_come_after_their_latency_with_the_encoders_at_their_
             assert age >= settings.latency - 5.0 * settings.jitter  # stamps have no other error: they are what the camera says
             np.testing.assert_allclose(camera.q, q(1e-9 * camera.t), atol=1e-6)
             np.testing.assert_allclose(camera.dq, turning, atol=1e-4)
-            assert camera.readings == 7 and camera.exposure == settings.exposure
+            assert 2 <= camera.readings <= 7 and camera.exposure == settings.exposure  # fewer at the start
         assert np.diff([camera.t for _, camera in pairs]).min() > 0
     finally:
         stage.close()
