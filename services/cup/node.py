@@ -14,7 +14,7 @@ from bus_schema.rpc import World as WorldReply
 from mobee.arrays import Array
 from mobee.behaviours.grasp import SideGrasp
 from mobee.behaviours.pick import FAST, NoPosture, Picker, Upright, places_near
-from mobee.behaviours.pre_grasp import ASIDE, MOTORS, MapPlanner, approach, aside, icub_starts, pre_grasp_map
+from mobee.behaviours.pre_grasp import ASIDE, MOTORS, WATCHED, MapPlanner, approach, aside, icub_starts, pre_grasp_map
 from mobee.control.gains import Gains
 from mobee.errors import MobeeError
 from mobee.model.kinematics import matrix_from_quaternion
@@ -118,7 +118,7 @@ class CupNode:
                 world.add(item.name, grown, position=item.position, rotation=turn, role="target")
         self._planned = world
         grasp = SideGrasp(Model(self._robot, world), self._config.marker, MOTORS, icub_starts(self._robot))
-        return Picker(self._body, grasp)
+        return Picker(self._body, grasp, WATCHED)
 
     def _planner(self, picker: Picker) -> MapPlanner:
         return MapPlanner(self._map, picker.grasp.model, self._config.marker)

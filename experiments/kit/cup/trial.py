@@ -27,7 +27,7 @@ from mobee import Geometry, Model, World, cylinder
 from mobee.arrays import Array
 from mobee.behaviours.grasp import palm_beside
 from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near, touches
-from mobee.behaviours.pre_grasp import MARKER, Approach, MapPlanner, approach
+from mobee.behaviours.pre_grasp import MARKER, WATCHED, Approach, MapPlanner, approach
 from mobee.model.world_object import WorldObject
 
 TORQUES = {"?_*_distal": 0.09, "?_pinky": 0.09, "?_hand_finger": 0.3, "?_thumb_*": 0.3, "?_index_*": 0.3, "?_middle_*": 0.3}
@@ -78,7 +78,7 @@ class Trial:
         self.plant.exempt = MARKER
         self._planned = Model(robot(), planned)
         self.grasp = side_grasp(self._planned)
-        self.picker = Picker(self.plant, self.grasp)
+        self.picker = Picker(self.plant, self.grasp, WATCHED)
         self._method, self._seed = method, seed
         self.result = Result(clutter=len(self.scene.clutter))
         self._before = {name: thing.position[:2].copy() for name, thing in self.plant.things.items()}
