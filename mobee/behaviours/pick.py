@@ -17,6 +17,8 @@ from mobee.behaviours.bump import BumpWatch
 from mobee.behaviours.grasp import SideGrasp, palm_beside
 from mobee.errors import MobeeError
 from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.model.world_object import Geometry, cylinder
 from mobee.roadmap.ik.problem import chosen
 
 FAST, SLOW, GENTLE = 0.4, 0.3, 0.4  # shares of the largest speed: free motions, beside things, with the thing in the hand
@@ -29,6 +31,7 @@ STAND_OFFS = (0.11, 0.0), (0.095, 0.0), (0.05, 0.1)
 PUTS = 3  # places at which it tries to put a thing down
 NEAR = 0.7  # share of the motion down on which bumps are noticed: after it the thing may touch what it will stand on
 BUMPED = 0.06  # m around a place with a bump, in which no other is tried
+CARRIED, CLEAR = "carried", 0.005  # name of the thing in the hand in plans; m by which it is enlarged there
 RETREAT = 0.09  # m between thing and palm, to which the hand goes back
 ENOUGH = float(np.deg2rad(0.7))  # rad from a posture, at which it is reached
 CORRECTIONS, CALM = 4, 1.5  # of the attractor, for what forces keep the motors from a posture; s, at most, for each
@@ -204,20 +207,21 @@ class Picker:
 
     def slipped(self, thing: Upright, centre: Array) -> Array:
         """Return how far a thing whose centre is seen at (3,) m has slipped in the hand, (3,) m in the frame of the palm."""
-        pose, grip, marker = self.grasp.model.evaluate(self.body.q), self.grasp.grip, self.grasp.marker
-        gripped = np.array([grip.along, grip.height - 0.5 * thing.height, thing.radius + grip.gap])
-        found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - gripped
+        pose, marker = self.grasp.model.evaluate(self.body.q), self.grasp.marker
+        found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - self._gripped(thing)
         return found
 
-    def put(self, thing: Upright, places: Sequence[Array], slipped: Array, blocked: Callable[[Array], bool] = lambda path: False) -> Array:
+    def put(self, thing: Upright, places: Sequence[Array], centre: Array | None = None) -> Array:
         """Put what is in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
 
         The first place at which the law pushes little is taken.  Where hand or thing bumps into something on the motion down, the hand
-        goes up again, to another place.  `slipped`: (3,) m, see the method.  `blocked`: whether something blocks the thing on a path
-        (K, n) rad.  Raises NoPosture.
+        goes up again, to another place.  `centre`: (3,) m, where the thing is seen; None: where the hand has gripped it.
+        Raises NoPosture.
         """
+        slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
+        held = self._model_with(thing, slipped)
         for _ in range(PUTS):
-            motion = self._motion_to(thing, places, slipped, blocked)
+            motion = self._motion_to(thing, places, slipped, held)
             if motion is None:
                 break
             self.move(motion.path[:2], GENTLE)
@@ -233,7 +237,7 @@ class Picker:
             places = [place for place in places if np.linalg.norm(place - motion.place) > BUMPED]
         raise NoPosture(f"none of the places on the table can be reached with the thing in the hand; {len(places)} were not tried")
 
-    def _motion_to(self, thing: Upright, places: Sequence[Array], slipped: Array, blocked: Callable[[Array], bool]) -> _Motion | None:
+    def _motion_to(self, thing: Upright, places: Sequence[Array], slipped: Array, held: Model) -> _Motion | None:
         """Return the motion to the first place at which the law pushes little, or else that with the smallest push; None without one."""
         here, grasp = self.body.q, self.grasp
         best: tuple[float, _Motion] | None = None
@@ -251,11 +255,29 @@ class Picker:
             push = max(LITTLE_PUSH, grasp.push(up), grasp.push(down))
             if best is not None and push >= best[0]:
                 continue
-            if is_free(grasp.model, path) and is_free(grasp.model, after) and not blocked(path):
+            if is_free(held, path[:2]) and is_free(grasp.model, path) and is_free(grasp.model, after):
                 best = push, _Motion(place, path, back)
                 if push == LITTLE_PUSH:
                     break
         return None if best is None else best[1]
+
+    def _gripped(self, thing: Upright) -> Array:
+        """Return where the centre of a thing is in the frame of the palm when the hand closes around it, (3,) m."""
+        grip = self.grasp.grip
+        return np.array([grip.along, grip.height - 0.5 * thing.height, thing.radius + grip.gap])
+
+    def _model_with(self, thing: Upright, slipped: Array) -> Model:
+        """Return a model of the robot with the thing in its hand, a little enlarged, among what is around it."""
+        model, marker, q = self.grasp.model, self.grasp.marker, self.body.q
+        world, pose = World(), model.evaluate(q)
+        for name, item in model.world.objects.items():
+            if item.role != "ghost":
+                world.add(name, Geometry(item.kind, item.size), position=item.position, rotation=item.rotation)
+        centre = pose.position(marker) + pose.rotation(marker) @ (self._gripped(thing) + slipped)
+        world.add(CARRIED, cylinder(thing.radius, thing.height).grown(CLEAR), position=centre)
+        found = Model(model.robot, world)
+        found.attach(CARRIED, model.robot.links[model.robot.marker(marker).link], q)
+        return found
 
     def _held(self, q: Array) -> Array:
         """Return q (n,) rad with the fingers as they hold the thing."""

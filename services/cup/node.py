@@ -98,7 +98,7 @@ class CupNode:
             self._report("lifts it")
             picker.lift(thing, found.azimuth)
             self._report("puts it down")
-            goal = picker.put(thing, self._goals(thing, found.azimuth), self._slipped(picker, thing))
+            goal = picker.put(thing, self._goals(thing, found.azimuth), self._centre(picker, thing))
             self._set_roles("target")
             self._go_aside(self._picker())  # without pictures of it: the hand hid it until now
             self._gripped = False
@@ -141,13 +141,13 @@ class CupNode:
             raise Paused(f"no place of {self._config.target} yet")
         return Upright(np.array(seen.position[:2]), float(seen.geometry.size[0]), float(seen.geometry.size[1]), GROUND)
 
-    def _slipped(self, picker: Picker, thing: Upright) -> Array:
-        """Return how far the thing has slipped in the hand, (3,) m in the frame of the palm; 0 if the hand hides it."""
+    def _centre(self, picker: Picker, thing: Upright) -> Array | None:
+        """Return where the thing in the hand is seen, (3,) m; None if the hand hides it."""
         seen = self._seen
         if seen is None or 1e-9 * (self._service.bus.t - seen.t_capture) > self._config.fresh:
-            return np.zeros(3)
-        slipped = picker.slipped(thing, np.array(seen.position))
-        return slipped if np.linalg.norm(slipped) < SLIP else np.zeros(3)
+            return None
+        centre = np.array(seen.position)
+        return centre if np.linalg.norm(picker.slipped(thing, centre)) < SLIP else None
 
     def _goals(self, thing: Upright, azimuth: float) -> list[Array]:
         """Return free places for the thing on the table."""
