@@ -14,7 +14,7 @@ import numpy as np
 from mobee import Controller, Model, World
 from mobee.arrays import Array
 from mobee.behaviours.bump import BumpWatch
-from mobee.behaviours.pick import BACK, CALM, Followed
+from mobee.behaviours.pick import BACK, CALM, Followed, Forces
 from mobee.control import SettleTest
 from mobee.control.gains import Verdict
 from mobee.model.contact import touched_by
@@ -122,14 +122,14 @@ class PhysicsPlant:
             end = self._settled(part)
         return self._reaches.outcome(part)
 
-    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
         """See Body; after a bump the robot moves back a little."""
         wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
         if watch is not None:
             watch.begin()
         passed: list[Array] = []
-        for attractor in attractors(self.robot, wanted, self.controller.gains):
-            self.controller.attractor = attractor if offset is None else np.clip(attractor + offset, *self.robot.limits.T)
+        for attractor in attractors(self.robot, wanted, self.controller.gains, forces):
+            self.controller.attractor = attractor
             for _ in range(round(PERIOD / self.dt)):
                 self.tick()
                 if watch is not None and watch.note(self._encoders, self.body.motors.efforts, self.dt):
@@ -140,9 +140,9 @@ class PhysicsPlant:
         self._calm()
         return Followed(False, self.q)
 
-    def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
+    def press(self, q: Array, seconds: float) -> None:
         """See Body."""
-        self.controller.attractor = q if offset is None else np.clip(q + offset, *self.robot.limits.T)
+        self.controller.attractor = q
         self.run(seconds)
 
     def rest_at(self, q: Array) -> None:

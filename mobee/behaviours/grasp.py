@@ -17,7 +17,8 @@ from mobee.model.model import Model
 from mobee.roadmap.ik import costs
 from mobee.roadmap.ik.ngik import solve_ik
 from mobee.roadmap.ik.problem import chosen
-from mobee.robot.motor_units import limit_zones
+from mobee.roadmap.playback import attractor_for
+from mobee.robot.motor_units import limit_zones, motor_units
 from mobee.robot.robot import Robot
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -83,9 +84,10 @@ class SideGrasp:
     ) -> None:
         self.model, self.marker, self.motors, self.grip = model, marker, tuple(motors), Grip() if grip is None else grip
         self.hand = Hand(model.robot, marker)
-        law = Gains.default() if gains is None else gains
-        self._narrow = Model(_narrowed(model.robot, chosen(model.robot, motors), law), model.world)
-        self._controller = Controller(model, law)
+        self.gains = Gains.default() if gains is None else gains
+        self._moved = chosen(model.robot, motors)
+        self._narrow = Model(_narrowed(model.robot, self._moved, self.gains), model.world)
+        self._controller = Controller(model, self.gains)
         names = [model.robot.motors[index] for index in self.hand.motors]
         self._thumb, self._oppose, self._spread = (
             self.hand.motors[[word in name for name in names]] for word in ("thumb", "thumb_oppose", "hand_finger")
@@ -118,7 +120,7 @@ class SideGrasp:
         found: list[tuple[float, Array]] = []
         for start in self.starts if starts is None else starts:
             within = np.clip(start, *self._narrow.robot.limits.T)
-            terms = [costs.position(self.marker, palm.position), costs.orientation(self.marker, palm.rotation)]
+            terms = [costs.position(self.marker, palm.position), costs.orientation(self.marker, palm.rotation), costs.constraints()]
             solution = solve_ik(
                 self._narrow,
                 costs=[*terms, costs.collision(), costs.home(within)],
@@ -127,14 +129,25 @@ class SideGrasp:
                 method="least_squares",
             )
             if solution.reached:
-                found.append((self._push(solution.q), solution.q))
+                found.append((self.push(solution.q), solution.q))
         return min(found, key=lambda one: one[0])[1] if found else None
 
-    def _push(self, q: Array) -> float:
-        """Return the largest force of the law on a motor but those of the fingers, rad/s^2, while the hand may be near its target."""
-        forces = np.abs(self._controller.forces(self.model.evaluate(q, reaching=self.marker)).total)
-        forces[self.hand.motors] = 0.0
-        return float(forces.max())
+    def push(self, q: Array) -> float:
+        """Return the largest of the `forces` at q (n,) rad, rad/s^2."""
+        return float(np.abs(self.forces(q)).max())
+
+    def forces(self, q: Array) -> Array:
+        """Return the law's forces (n,) rad/s^2 at q (n,) rad, without spring and damping, on the motors that move.
+
+        The hand may be near its target, whose field does not push it.
+        """
+        found = np.zeros(len(q))
+        found[self._moved] = self._controller.forces(self.model.evaluate(q, reaching=self.marker)).total[self._moved]
+        return found
+
+    def attractor(self, q: Array) -> Array:
+        """Return the attractor (n,) rad with which the law holds q (n,) rad against its forces."""
+        return attractor_for(self.model.robot, self.gains, q, -self.forces(q))
 
     def _closed(self, q: Array, fingers: float, thumb: float) -> Array:
         found = self.hand.posture(q, fingers)
@@ -144,10 +157,12 @@ class SideGrasp:
 
 
 def _narrowed(robot: Robot, columns: Ints, gains: Gains) -> Robot:
-    """Return the robot with the ranges of some motors without the zones before their limits, in which the law pushes inward."""
+    """Return the robot without the zones, in which the law pushes, before the limits of some motors and before the clauses' bounds."""
     zones = limit_zones(robot, gains.of_robot("limit_width", robot))
     table = list(robot.motor_table)
     for index in columns.tolist():
         low, high = robot.limits[index] + zones[index] * np.array([1.0, -1.0])
         table[index] = replace(table[index], limits=(low, high), home=float(np.clip(table[index].home, low, high)))
-    return replace(robot, motor_table=tuple(table))
+    units = motor_units(robot)
+    clauses = [replace(one, b=one.b - gains.constraint_width * np.linalg.norm(one.a * units, axis=1)) for one in robot.clauses]
+    return replace(robot, motor_table=tuple(table), clauses=tuple(clauses))

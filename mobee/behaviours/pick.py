@@ -17,20 +17,29 @@ from mobee.behaviours.bump import BumpWatch
 from mobee.behaviours.grasp import SideGrasp, palm_beside
 from mobee.errors import MobeeError
 from mobee.model.model import Model
+from mobee.model.world import World
+from mobee.model.world_object import Geometry, cylinder
 from mobee.roadmap.ik.problem import chosen
 
 FAST, SLOW, GENTLE = 0.4, 0.3, 0.4  # shares of the largest speed: free motions, beside things, with the thing in the hand
 AZIMUTHS = float(np.deg2rad(-20.0)), float(np.deg2rad(70.0))  # of the right hand
 CLOSING, SQUEEZING = 2.0, 0.5  # s
-LIFT = 0.1  # m
+LIFT = 0.08  # m: higher, the forearm comes nearer to the body
 ABOVE = 0.004  # m above the height of the grasp at which the hand opens
-STAND_OFF = 0.11  # m between thing and palm, from where the hand moves straight to the pre-grasp
+STAND_OFFS = (0.11, 0.0), (0.095, 0.0), (0.05, 0.1)
+"""m between thing and palm, and above the pre-grasp, from where the hand moves straight to the pre-grasp: the first that works."""
+PUTS = 3  # places at which it tries to put a thing down
+NEAR = 0.7  # share of the motion down on which bumps are noticed: after it the thing may touch what it will stand on
+BUMPED = 0.06  # m around a place with a bump, in which no other is tried
+CARRIED, CLEAR = "carried", 0.005  # name of the thing in the hand in plans; m by which it is enlarged there
 RETREAT = 0.09  # m between thing and palm, to which the hand goes back
 ENOUGH = float(np.deg2rad(0.7))  # rad from a posture, at which it is reached
 CORRECTIONS, CALM = 4, 1.5  # of the attractor, for what forces keep the motors from a posture; s, at most, for each
 BACK = 3.0  # s of a motion that are undone after a bump
+FARTHEST = 0.7  # rad between two of the last postures before the thing: with more, the palm would leave the straight line
+LITTLE_PUSH = 1.5  # rad/s^2 of the law on a motor, which the attractor makes up for
 STEP = 0.03  # rad between two postures of a motion that are checked for contacts
-TURNS = tuple(np.deg2rad((0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0)).tolist())  # azimuths that are tried, beside the first one
+TURNS = tuple(np.deg2rad(sorted(np.arange(45.0, -46.0, -7.5), key=abs)).tolist())  # azimuths that are tried, beside the first one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +59,10 @@ def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count
     return found
 
 
+Forces = Callable[[Array], Array]
+"""The law's forces (n,) rad/s^2 at a posture (n,) rad, without spring and damping."""
+
+
 class Body(Protocol):
     """A robot that follows paths under the law."""
 
@@ -58,11 +71,11 @@ class Body(Protocol):
         """The encoders, (n,) rad."""
         ...
 
-    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
-        """Move along a path (K, n) rad at a share of the largest speed; `watch`: ends it at a bump; `offset`: added to the attractor."""
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
+        """Move along a path (K, n) rad at a share of the largest speed; `watch`: ends it at a bump; `forces`: of the law, are balanced."""
         ...
 
-    def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
+    def press(self, q: Array, seconds: float) -> None:
         """Set the attractor to q (n,) rad at once, and leave it there for a time."""
         ...
 
@@ -99,18 +112,37 @@ def pre_grasps(grasp: SideGrasp, thing: Upright) -> Iterator[tuple[float, Array,
     """Yield azimuths [rad] and postures (n,) rad before and at pre-grasps from which the hand can move to the thing, the best first.
 
     In the first posture the whole hand is beside the thing: between it and the pre-grasp thumb and fingers are near the thing.
+    The best are those in which the law pushes little until the thing is lifted: what it pushes keeps the palm from its pose.
     """
+    found = []
     for turn in TURNS:
         azimuth = azimuth_beside(thing.place) + turn
         if not AZIMUTHS[0] <= azimuth <= AZIMUTHS[1]:
             continue
         inner = beside(grasp, thing, azimuth, grasp.grip.gap, 0.0, None)
-        if inner is None:
+        up = None if inner is None else beside(grasp, thing, azimuth, grasp.grip.gap, LIFT, inner[None])
+        if inner is None or up is None:
             continue
-        outer = beside(grasp, thing, azimuth, grasp.grip.before, 0.0, np.concatenate([inner[None], grasp.starts]))
-        away = None if outer is None else beside(grasp, thing, azimuth, STAND_OFF, 0.0, np.concatenate([outer[None], grasp.starts]))
-        if outer is not None and away is not None and is_free(grasp.model, np.stack([away, outer, inner])):
-            yield azimuth, away, outer
+        outer = beside(grasp, thing, azimuth, grasp.grip.before, 0.0, inner[None])
+        if outer is None:
+            continue
+        for gap, above in STAND_OFFS:
+            away = beside(grasp, thing, azimuth, gap, above, outer[None])
+            path = None if away is None else np.stack([away, outer, inner])
+            if away is not None and path is not None and np.abs(np.diff(path, axis=0)).max() <= FARTHEST and is_free(grasp.model, path):
+                found.append((max(LITTLE_PUSH, *(grasp.push(q) for q in (outer, inner, up))), azimuth, away, outer))
+                break
+    for _, *one in sorted(found, key=lambda one: one[0]):
+        yield one[0], one[1], one[2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Motion:
+    """How a thing gets to a place (2,) m: postures (3, n) rad where it is, above the place and there, and one (n,) to retreat to."""
+
+    place: Array
+    path: Array
+    back: Array
 
 
 class Picker:
@@ -119,22 +151,22 @@ class Picker:
     Args:
         body: the robot.
         grasp: postures; the world of its model has what must not be touched, not the thing.
+        watched: motors whose torques show bumps, see BumpWatch.
     """
 
-    def __init__(self, body: Body, grasp: SideGrasp) -> None:
-        self.body, self.grasp = body, grasp
+    def __init__(self, body: Body, grasp: SideGrasp, watched: Sequence[str]) -> None:
+        self.body, self.grasp, self.watched = body, grasp, tuple(watched)
         robot = grasp.model.robot
         self.motors: Ints = chosen(robot, grasp.motors)
-        self._offset: Array | None = None
         self._there: Array | None = None  # (n,) rad, of the pre-grasp
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
     def stand(self, q: Array) -> Array:
-        """Bring torso and arm to q (n,) rad against the forces on them; return the offset (n,) rad of the attractor that this needs.
+        """Bring torso and arm to q (n,) rad; return the attractor (n,) rad that this needs.
 
         What remains after a settled motion is added to the attractor, a few times.
         """
-        aim = q.copy()
+        aim = self.grasp.attractor(q)
         for number in range(CORRECTIONS + 1):
             self.body.rest_at(aim)
             remaining = np.zeros(len(q))
@@ -142,71 +174,110 @@ class Picker:
             if np.abs(remaining).max() < ENOUGH or number == CORRECTIONS:
                 break
             aim = np.clip(aim + remaining, *self.grasp.model.robot.limits.T)
-        offset: Array = aim - q
-        return offset
+        return aim
+
+    def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
+        """Move along a path (K, n) rad, the attractor making up for the law's forces; return whether something was bumped into."""
+        return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
     def arrive(self, away: Array, pre_grasp: Array) -> None:
-        """Move the hand, which is at `away` (n,) rad, straight to the pre-grasp (n,) rad; keep what the forces there need."""
-        offset = self.stand(away)
-        self.body.follow_path(np.stack([away, pre_grasp]), SLOW, offset=offset)
-        self._offset = self.stand(pre_grasp)
+        """Move the hand, which is at `away` (n,) rad, straight to the pre-grasp (n,) rad."""
+        self.stand(away)
+        self.move(np.stack([away, pre_grasp]), SLOW)
+        self.stand(pre_grasp)
         self._there = pre_grasp
 
     def close(self, thing: Upright, azimuth: float) -> None:
         """Move the palm from the pre-grasp to the thing, and close the hand; raises NoPosture."""
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
-        self.body.follow_path(np.stack([there, here]), SLOW, offset=self._offset)
-        self._offset = self.stand(here)
+        self.move(np.stack([there, here]), SLOW)
+        aim, fingers = self.stand(here), self.grasp.hand.motors
         # The fingers arrive before the thumb, which pushes the thing into them.
-        self.body.press(self.grasp.closed(here), CLOSING, self._offset)
+        aim[fingers] = self.grasp.closed(here)[fingers]
+        self.body.press(aim, CLOSING)
         self._fingers = self.grasp.squeezed(self.body.q)
-        self.body.press(self._held(here), SQUEEZING, self._offset)
+        aim[fingers] = self._fingers
+        self.body.press(aim, SQUEEZING)
 
     def lift(self, thing: Upright, azimuth: float) -> None:
         """Lift the thing straight up; raises NoPosture."""
-        up, start = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT)), self._held(self.body.q)
-        self.body.follow_path(np.stack([start, up]), GENTLE, offset=self._offset)
-        self._offset = self.stand(up)
+        up = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT))
+        self.move(np.stack([self._held(self.body.q), up]), GENTLE)
 
     def slipped(self, thing: Upright, centre: Array) -> Array:
         """Return how far a thing whose centre is seen at (3,) m has slipped in the hand, (3,) m in the frame of the palm."""
-        pose, grip, marker = self.grasp.model.evaluate(self.body.q), self.grasp.grip, self.grasp.marker
-        gripped = np.array([grip.along, grip.height - 0.5 * thing.height, thing.radius + grip.gap])
-        found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - gripped
+        pose, marker = self.grasp.model.evaluate(self.body.q), self.grasp.marker
+        found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - self._gripped(thing)
         return found
 
-    def put(self, thing: Upright, places: Sequence[Array], slipped: Array, blocked: Callable[[Array], bool] = lambda path: False) -> Array:
-        """Put what is in the hand down at the first of the places (2,) m that works, open the hand and retreat; return the place.
+    def put(self, thing: Upright, places: Sequence[Array], centre: Array | None = None) -> Array:
+        """Put what is in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
 
-        `slipped`: (3,) m, see the method.  `blocked`: whether something blocks the thing on a path (K, n) rad.  Raises NoPosture.
+        The first place at which the law pushes little is taken.  Where hand or thing bumps into something on the motion down, the hand
+        goes up again, to another place.  `centre`: (3,) m, where the thing is seen; None: where the hand has gripped it.
+        Raises NoPosture.
         """
-        here = self.body.q
+        slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
+        held = self._model_with(thing, slipped)
+        for _ in range(PUTS):
+            motion = self._motion_to(thing, places, slipped, held)
+            if motion is None:
+                break
+            self.move(motion.path[:2], GENTLE)
+            up, down = motion.path[1:]
+            near = up + NEAR * (down - up)
+            if not self.move(np.stack([up, near]), SLOW, BumpWatch(self.grasp.model.robot, self.watched)):
+                self.move(np.stack([near, down]), SLOW)
+                opened = self.grasp.opened(down)
+                self.move(np.stack([down, opened]), FAST)
+                self.move(np.stack([opened, motion.back]), SLOW)
+                return motion.place
+            self.move(np.stack([self._held(self.body.q), up]), GENTLE)
+            places = [place for place in places if np.linalg.norm(place - motion.place) > BUMPED]
+        raise NoPosture(f"none of the places on the table can be reached with the thing in the hand; {len(places)} were not tried")
+
+    def _motion_to(self, thing: Upright, places: Sequence[Array], slipped: Array, held: Model) -> _Motion | None:
+        """Return the motion to the first place at which the law pushes little, or else that with the smallest push; None without one."""
+        here, grasp = self.body.q, self.grasp
+        best: tuple[float, _Motion] | None = None
         for place in places:
             azimuth = azimuth_beside(place)
             normal = np.array([-np.sin(azimuth), -np.cos(azimuth)])
             aside = slipped[0] * np.array([normal[1], -normal[0]]) + slipped[2] * normal
             there = Upright(place - aside, thing.radius, thing.height, thing.ground + max(slipped[1], 0.0))
-            up = beside(self.grasp, there, azimuth, self.grasp.grip.gap, LIFT, here[None])
-            down = None if up is None else beside(self.grasp, there, azimuth, self.grasp.grip.gap, ABOVE, up[None])
-            back = None if down is None else beside(self.grasp, there, azimuth, RETREAT, ABOVE, down[None])
+            up = beside(grasp, there, azimuth, grasp.grip.gap, LIFT, here[None])
+            down = None if up is None else beside(grasp, there, azimuth, grasp.grip.gap, ABOVE, up[None])
+            back = None if down is None else beside(grasp, there, azimuth, RETREAT, ABOVE, down[None])
             if up is None or down is None or back is None:
                 continue
-            path = np.stack([self._held(q) for q in (here, up, down)])
-            if is_free(self.grasp.model, path) and not blocked(path):
-                self._set_down(path, back)
-                return place
-        raise NoPosture(f"none of {len(places)} places on the table can be reached with the thing in the hand")
+            path, after = np.stack([self._held(q) for q in (here, up, down)]), np.stack([grasp.opened(down), back])
+            push = max(LITTLE_PUSH, grasp.push(up), grasp.push(down))
+            if best is not None and push >= best[0]:
+                continue
+            if is_free(held, path[:2]) and is_free(grasp.model, path) and is_free(grasp.model, after):
+                best = push, _Motion(place, path, back)
+                if push == LITTLE_PUSH:
+                    break
+        return None if best is None else best[1]
 
-    def _set_down(self, path: Array, back: Array) -> None:
-        self.body.follow_path(path[:2], GENTLE, offset=self._offset)
-        # At the end of the motion down nothing is corrected: the thing may have tilted in the hand and stand already.
-        offset = self.stand(path[1])
-        self.body.follow_path(path[1:], SLOW, offset=offset)
-        opened = self.grasp.opened(path[2])
-        self.body.follow_path(np.stack([path[2], opened]), FAST, offset=offset)
-        self.body.follow_path(np.stack([opened, back]), SLOW, offset=offset)
-        self._offset = None
+    def _gripped(self, thing: Upright) -> Array:
+        """Return where the centre of a thing is in the frame of the palm when the hand closes around it, (3,) m."""
+        grip = self.grasp.grip
+        return np.array([grip.along, grip.height - 0.5 * thing.height, thing.radius + grip.gap])
+
+    def _model_with(self, thing: Upright, slipped: Array) -> Model:
+        """Return a model of the robot with the thing in its hand, a little enlarged, among what is around it."""
+        model, marker, q = self.grasp.model, self.grasp.marker, self.body.q
+        world, pose = World(), model.evaluate(q)
+        for name, item in model.world.objects.items():
+            if item.role != "ghost":
+                world.add(name, Geometry(item.kind, item.size), position=item.position, rotation=item.rotation)
+        centre = pose.position(marker) + pose.rotation(marker) @ (self._gripped(thing) + slipped)
+        world.add(CARRIED, cylinder(thing.radius, thing.height).grown(CLEAR), position=centre)
+        found = Model(model.robot, world)
+        found.attach(CARRIED, model.robot.links[model.robot.marker(marker).link], q)
+        return found
 
     def _held(self, q: Array) -> Array:
         """Return q (n,) rad with the fingers as they hold the thing."""

@@ -140,18 +140,18 @@ class Approach:
     planning: float = 0.0
 
 
-def approach(body: Body, picker: Picker, thing: Upright, plan: Planner, watched: Sequence[str] = WATCHED) -> Approach:
-    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm.
-
-    `watched`: see BumpWatch.
-    """
+def approach(body: Body, picker: Picker, thing: Upright, plan: Planner) -> Approach:
+    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm."""
     found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
-    watch = BumpWatch(model.robot, watched)
+    watch = BumpWatch(model.robot, picker.watched)
+    bumped: list[float] = []  # azimuths, rad, on the motions to which it has bumped into something
     while found.plans < PLANS:
         begun = time.process_time()
-        chosen = _planned(picker, thing, plan, body.q, blocked)
+        grasps = sorted(pre_grasps(picker.grasp, thing), key=lambda one: bumped.count(one[0]))
+        chosen = _planned(grasps, plan, body.q, blocked)
         if chosen is None and len(blocked):  # nothing leads around: perhaps there was nothing
-            chosen, blocked = _planned(picker, thing, plan, body.q, blocked[:0]), blocked[:0]
+            blocked = blocked[:0]
+            chosen = _planned(grasps, plan, body.q, blocked)
         found.planning, found.plans = found.planning + time.process_time() - begun, found.plans + 1
         if chosen is None:
             return found
@@ -162,13 +162,14 @@ def approach(body: Body, picker: Picker, thing: Upright, plan: Planner, watched:
             found.azimuth = azimuth
             return found
         found.bumps += 1
+        bumped.append(azimuth)
         blocked = np.concatenate([blocked, model.evaluate(ended.q).position(picker.grasp.marker)[None]])
     return found
 
 
-def _planned(picker: Picker, thing: Upright, plan: Planner, here: Array, blocked: Array) -> tuple[float, Array, Array] | None:
+def _planned(grasps: Sequence[tuple[float, Array, Array]], plan: Planner, here: Array, blocked: Array) -> tuple[float, Array, Array] | None:
     """Return the azimuth [rad], a path (K, n) rad to beside the thing, and the pre-grasp (n,) rad; None if there is no free path."""
-    for azimuth, away, goal in pre_grasps(picker.grasp, thing):
+    for azimuth, away, goal in grasps:
         path = plan.path(here, away, azimuth, blocked)
         if path is not None:
             return azimuth, path, goal

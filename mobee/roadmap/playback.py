@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -269,17 +269,27 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
     return reference(path, speed * _HARD * fastest, speed * _HARD * hardest, rounding, dt)
 
 
-def attractors(robot: Robot, wanted: Reference, gains: Gains) -> Iterator[Array]:
+def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[Array], Array] | None = None) -> Iterator[Array]:
     """Yield the attractor (n,) rad every PERIOD, ahead of the motion such that the law's spring produces the motion (eq. 5.7).
 
-    The last attractor is the end of the reference.  A motor that does not move in the reference keeps its position.
+    The last attractor is the end of the reference, moved against the forces there.  A motor that does not move in the reference keeps its
+    position.  `forces`: the law's other forces (n,) rad/s^2 at a posture (n,) rad, which the spring balances too; None: none.
     """
-    strength, stiffness, damping = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness", "damping"))
+    damping = gains.of_robot("damping", robot)
     held = np.arange(0.0, wanted.times[-1] + PERIOD, PERIOD) + 0.5 * PERIOD  # each is in force for a period: meant for its middle
     for row in np.minimum(np.searchsorted(wanted.times, held), len(wanted.times) - 1):
-        force = np.clip(wanted.acceleration[row] + damping * wanted.velocity[row], -_HARD * strength, _HARD * strength)
-        ahead = force * strength / (stiffness * (strength - np.abs(force)))
-        yield np.clip(wanted.q[row] + ahead, *robot.limits.T)
+        q = wanted.q[row]
+        force = wanted.acceleration[row] + damping * wanted.velocity[row]
+        yield attractor_for(robot, gains, q, force if forces is None else force - forces(q))
+
+
+def attractor_for(robot: Robot, gains: Gains, q: Array, force: Array) -> Array:
+    """Return the attractor (n,) rad whose spring pulls with a force (n,) rad/s^2 at q (n,) rad (eq. 5.7), as far as it can."""
+    strength, stiffness = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness"))
+    force = np.clip(force, -_HARD * strength, _HARD * strength)
+    ahead = force * strength / (stiffness * (strength - np.abs(force)))
+    found: Array = np.clip(q + ahead, *robot.limits.T)
+    return found
 
 
 def at(wanted: Reference, times: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from bus_schema.messages import State
 from mobee.arrays import Array
 from mobee.behaviours.bump import BumpWatch
-from mobee.behaviours.pick import BACK, CALM, Followed
+from mobee.behaviours.pick import BACK, CALM, Followed, Forces
 from mobee.control.gains import Gains
 from mobee.errors import ActionInterrupted
 from mobee.roadmap.playback import PERIOD, attractors, timed
@@ -43,12 +43,10 @@ class BusBody(BusFollower):
         for part in robot.parts:
             service.on_each(State, partial(self._note_state, part), part)
 
-    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, offset: Array | None = None) -> Followed:
+    def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
         """See Body; after a bump the robot moves back a little."""
         robot = self.robot
-        rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains))
-        if offset is not None:
-            rows = [np.clip(row + offset, *robot.limits.T) for row in rows]
+        rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))
         if watch is not None:
             watch.begin()
         self._watch, self._bumped, self._last = watch, False, self._now
@@ -68,9 +66,9 @@ class BusBody(BusFollower):
         self._calm()
         return Followed(False, self.q)
 
-    def press(self, q: Array, seconds: float, offset: Array | None = None) -> None:
+    def press(self, q: Array, seconds: float) -> None:
         """See Body."""
-        self._step(q if offset is None else q + offset)
+        self._step(q)
         self._wait_until(self._now + seconds)
 
     def rest_at(self, q: Array) -> None:

@@ -14,7 +14,7 @@ from bus_schema.rpc import World as WorldReply
 from mobee.arrays import Array
 from mobee.behaviours.grasp import SideGrasp
 from mobee.behaviours.pick import FAST, NoPosture, Picker, Upright, places_near
-from mobee.behaviours.pre_grasp import ASIDE, MOTORS, MapPlanner, approach, aside, icub_starts, pre_grasp_map
+from mobee.behaviours.pre_grasp import ASIDE, MOTORS, WATCHED, MapPlanner, approach, aside, icub_starts, pre_grasp_map
 from mobee.control.gains import Gains
 from mobee.errors import MobeeError
 from mobee.model.kinematics import matrix_from_quaternion
@@ -30,7 +30,6 @@ from services.cup.config import Config
 PARTS = ("torso", "right_arm")
 TRIES = 3  # of a call
 PAUSE = 0.5  # s of real time between two checks while it waits
-GROUND = -0.1  # m, of the table
 MARGIN = 0.004  # m, by which things are enlarged in plans, beside the uncertainty of their places
 SHIFTS, GOALS = (0.07, 0.16), 24  # m, of a new place from the old one; places that are tried
 AREA = ((-0.45, -0.24), (-0.08, 0.24))  # m, on the table, in which the right hand puts things down
@@ -58,9 +57,9 @@ class CupNode:
         service.on_newest(WorldObject, self._note, config.target)
         service.on_run(self._forget)
         self._body = BusBody(service, robot, PARTS, Gains.named(config.gains), self._require_seen)
-        table = _only_obstacles(config.load_world())
+        table, self._ground = _only_obstacles(config.load_world()), config.ground()
         self._grasp = SideGrasp(Model(robot, table), config.marker, MOTORS, icub_starts(robot))
-        self._map = pre_grasp_map(self._grasp, GROUND)
+        self._map = pre_grasp_map(self._grasp, self._ground)
 
     def run(self) -> None:
         """Fetch the thing until it was put down as often as asked."""
@@ -98,7 +97,7 @@ class CupNode:
             self._report("lifts it")
             picker.lift(thing, found.azimuth)
             self._report("puts it down")
-            goal = picker.put(thing, self._goals(thing, found.azimuth), self._slipped(picker, thing))
+            goal = picker.put(thing, self._goals(thing, found.azimuth), self._centre(picker, thing))
             self._set_roles("target")
             self._go_aside(self._picker())  # without pictures of it: the hand hid it until now
             self._gripped = False
@@ -118,7 +117,7 @@ class CupNode:
                 world.add(item.name, grown, position=item.position, rotation=turn, role="target")
         self._planned = world
         grasp = SideGrasp(Model(self._robot, world), self._config.marker, MOTORS, icub_starts(self._robot))
-        return Picker(self._body, grasp)
+        return Picker(self._body, grasp, WATCHED)
 
     def _planner(self, picker: Picker) -> MapPlanner:
         return MapPlanner(self._map, picker.grasp.model, self._config.marker)
@@ -126,7 +125,7 @@ class CupNode:
     def _go_aside(self, picker: Picker) -> None:
         """Move the hand to the side of the table, around what is seen, so that it hides nothing."""
         self._report("moves its hand aside")
-        away = aside(self._map, GROUND, picker.grasp.grip)
+        away = aside(self._map, self._ground, picker.grasp.grip)
         place, here = picker.grasp.model.evaluate(away).position(self._config.marker), self._body.q
         path = self._planner(picker).path(np.clip(here, *self._robot.limits.T), away, ASIDE[-1], np.empty((0, 3)))
         if path is None:
@@ -139,15 +138,15 @@ class CupNode:
         seen = self._seen
         if seen is None:
             raise Paused(f"no place of {self._config.target} yet")
-        return Upright(np.array(seen.position[:2]), float(seen.geometry.size[0]), float(seen.geometry.size[1]), GROUND)
+        return Upright(np.array(seen.position[:2]), float(seen.geometry.size[0]), float(seen.geometry.size[1]), self._ground)
 
-    def _slipped(self, picker: Picker, thing: Upright) -> Array:
-        """Return how far the thing has slipped in the hand, (3,) m in the frame of the palm; 0 if the hand hides it."""
+    def _centre(self, picker: Picker, thing: Upright) -> Array | None:
+        """Return where the thing in the hand is seen, (3,) m; None if the hand hides it."""
         seen = self._seen
         if seen is None or 1e-9 * (self._service.bus.t - seen.t_capture) > self._config.fresh:
-            return np.zeros(3)
-        slipped = picker.slipped(thing, np.array(seen.position))
-        return slipped if np.linalg.norm(slipped) < SLIP else np.zeros(3)
+            return None
+        centre = np.array(seen.position)
+        return centre if np.linalg.norm(picker.slipped(thing, centre)) < SLIP else None
 
     def _goals(self, thing: Upright, azimuth: float) -> list[Array]:
         """Return free places for the thing on the table."""

@@ -23,11 +23,11 @@ from experiments.kit.cup.scene import (
     true_world,
 )
 from experiments.kit.physics_plant import PhysicsPlant
-from mobee import Geometry, Model, World, cylinder
+from mobee import Model
 from mobee.arrays import Array
 from mobee.behaviours.grasp import palm_beside
-from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near, touches
-from mobee.behaviours.pre_grasp import MARKER, Approach, MapPlanner, approach
+from mobee.behaviours.pick import NoPosture, Picker, Upright, places_near
+from mobee.behaviours.pre_grasp import MARKER, WATCHED, Approach, MapPlanner, approach
 from mobee.model.world_object import WorldObject
 
 TORQUES = {"?_*_distal": 0.09, "?_pinky": 0.09, "?_hand_finger": 0.3, "?_thumb_*": 0.3, "?_index_*": 0.3, "?_middle_*": 0.3}
@@ -78,7 +78,7 @@ class Trial:
         self.plant.exempt = MARKER
         self._planned = Model(robot(), planned)
         self.grasp = side_grasp(self._planned)
-        self.picker = Picker(self.plant, self.grasp)
+        self.picker = Picker(self.plant, self.grasp, WATCHED)
         self._method, self._seed = method, seed
         self.result = Result(clutter=len(self.scene.clutter))
         self._before = {name: thing.position[:2].copy() for name, thing in self.plant.things.items()}
@@ -131,8 +131,8 @@ class Trial:
             if result.lifted < LIFTED:
                 result.why = "the cup was not lifted"
                 return
-            slipped = self.picker.slipped(seen, np.append(self.eyes.cup(cup.position[:2]).place, cup.position[2]))
-            goal = self.picker.put(seen, self._goals(seen, azimuth), slipped, self._in_the_way)
+            centre = np.append(self.eyes.cup(cup.position[:2]).place, cup.position[2])
+            goal = self.picker.put(seen, self._goals(seen, azimuth), centre)
         except NoPosture as error:
             result.why = str(error)
             return
@@ -151,16 +151,6 @@ class Trial:
         others = [item.position[:2] for name, item in self._planned.world.objects.items() if name not in ("table", CUP)]
         clear = [place for place in places if all(np.linalg.norm(place - other) > 0.09 for other in others)]
         return [place for place in clear if -0.45 < place[0] < -0.24 and -0.08 < place[1] < 0.24]
-
-    def _in_the_way(self, path: Array) -> bool:
-        """Return whether the cup in the hand would touch something, but the table when it is put down, on a path of three postures."""
-        held = Model(robot(), World())
-        for name, item in self._planned.world.objects.items():
-            if name not in (CUP, "table"):
-                held.world.add(name, Geometry(item.kind, item.size), position=item.position, rotation=item.rotation)
-        held.world.add(CUP, cylinder(RADIUS, HEIGHT).grown(INFLATED), position=self.plant.things[CUP].position)
-        held.attach(CUP, robot().links[robot().marker(MARKER).link], path[0])
-        return touches(held, path[:2])
 
 
 def leans(thing: WorldObject) -> float:

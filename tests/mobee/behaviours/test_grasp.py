@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mobee
-from mobee import Model
+from mobee import Controller, Model
 from mobee.behaviours.bump import START, THRESHOLD, TICKS, BumpWatch
 from mobee.behaviours.grasp import Grip, SideGrasp, palm_beside
 from mobee.behaviours.pick import Upright, is_free, places_near, pre_grasps
 from mobee.behaviours.pre_grasp import MARKER, MOTORS, WATCHED, MapPlanner, aside, icub_starts, is_around, pre_grasp_map
+from mobee.control.gains import Gains
 from mobee.model.masses import gravity_torque
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Robot
 
 GROUND, RADIUS = -0.1, 0.028
@@ -71,6 +73,36 @@ def test_a_thing_fits_into_the_open_hand_which_touches_it_from_both_sides_as_it_
     assert any("index" in name or "middle" in name for name in touching)
     fingers = hand.squeezed(hand.opened(inner))
     assert np.abs(fingers - hand.opened(inner)[hand.hand.motors]).max() == pytest.approx(Grip().squeeze)
+
+
+def test_the_law_holds_postures_against_its_forces_with_the_attractors_of_a_grasp() -> None:
+    hand, near = grasp(), Upright(np.array([-0.3, 0.05]), RADIUS, 0.13, GROUND)  # near to the body, whose fields push the forearm
+    azimuth, _, q = next(pre_grasps(hand, near))
+    inner = hand.posture(palm_beside(near.place, RADIUS, azimuth, Grip().gap, GROUND, Grip()), q[None])
+    assert inner is not None
+    assert 1.0 < hand.push(inner) < 6.0
+    law = Controller(hand.model)
+    moved = np.abs(hand.forces(inner)) > 0.0
+    drifts = []
+    for attractor in (hand.attractor(inner), inner):
+        law.reset(inner)
+        law.attractor = attractor
+        here = inner.copy()
+        for _ in range(200):
+            here = here + DT * law.step(here, DT, pose=hand.model.evaluate(here, reaching=MARKER)).velocity
+        drifts.append(float(np.abs(here - inner)[moved].max()))
+    assert drifts[0] < np.deg2rad(0.01)
+    assert drifts[1] > np.deg2rad(1.0)
+
+
+def test_pre_grasps_keep_out_of_the_zones_of_the_clauses() -> None:
+    gains, units = Gains.default(), motor_units(robot())
+    for cup in (CUP, Upright(np.array([-0.3, 0.05]), RADIUS, 0.13, GROUND)):
+        _, _, q = next(pre_grasps(grasp(), cup))
+        for clause in robot().clauses:
+            if clause.part in ("torso", "right_arm"):
+                zones = gains.constraint_width * np.linalg.norm(clause.a * units, axis=1)
+                assert (clause.a @ q + clause.b >= zones - 1e-9).any()
 
 
 def test_there_is_no_pre_grasp_where_things_fill_the_room_of_the_hand() -> None:

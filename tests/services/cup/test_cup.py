@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import mobee
 from bus_schema.messages import Event, Geometry, WorldObject
 from mobee import load_robot
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, UnknownName
 from services.cup.config import Config
 from tests.services.fake_controller import FakeController
 from tests.services.harness import Rig, rig, wait_for
@@ -52,3 +53,23 @@ def test_it_takes_no_part_for_a_cup_that_is_not_seen_or_no_longer(made: Rig) -> 
 def test_a_robot_without_fingers_is_refused() -> None:
     with pytest.raises(InvalidValue, match="has no fingers"):
         Config(marker="head").check_robot(ROBOT)
+
+
+def test_it_finds_the_table_on_which_the_thing_stands(tmp_path: Path) -> None:
+    assert Config(world="cup").ground() == pytest.approx(-0.1)
+    higher = tmp_path / "higher.xml"
+    text = (Path(mobee.__file__).parent / "robot" / "worlds" / "cup.xml").read_text(encoding="utf-8")
+    higher.write_text(text.replace('<box name="table"', '<box name="floor"'), encoding="utf-8")
+    assert Config(world=str(higher)).ground() == pytest.approx(-0.1)
+
+
+def test_a_thing_that_stands_on_nothing_is_refused(tmp_path: Path) -> None:
+    alone = tmp_path / "alone.xml"
+    alone.write_text(
+        '<world><sphere name="ball" radius="0.03" role="target"/><cylinder name="cup" radius="0.028" height="0.13" role="target"/></world>',
+        encoding="utf-8",
+    )
+    with pytest.raises(InvalidValue, match="cup stands on nothing"):
+        Config(world=str(alone)).check_robot(ROBOT)
+    with pytest.raises(UnknownName, match="mug.*Valid: ball, cup"):
+        Config(world=str(alone), target="mug").check_robot(ROBOT)
