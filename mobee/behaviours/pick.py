@@ -6,7 +6,7 @@ Each step is a motion of a `Body`, which is a plant in one process or the robot 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,7 +27,7 @@ CLOSING, SQUEEZING = 2.0, 0.5  # s
 LIFT = 0.08  # m: higher, the forearm comes nearer to the body
 ABOVE = 0.004  # m above the height of the grasp at which the hand opens
 STAND_OFFS = (0.11, 0.0), (0.095, 0.0), (0.05, 0.1)
-"""m between thing and palm, and above the pre-grasp, from where the hand moves straight to the pre-grasp: the first that works."""
+"""m between thing and palm, and above the pre-grasp, from where the hand moves straight to the pre-grasp."""
 PUTS = 3  # places at which it tries to put a thing down
 NEAR = 0.7  # share of the motion down on which bumps are noticed: after it the thing may touch what it will stand on
 BUMPED = 0.06  # m around a place with a bump, in which no other is tried
@@ -108,32 +108,41 @@ def beside(grasp: SideGrasp, thing: Upright, azimuth: float, gap: float, above: 
     return grasp.posture(palm_beside(thing.place, thing.radius, azimuth, gap, thing.ground + above, grasp.grip), starts)
 
 
-def pre_grasps(grasp: SideGrasp, thing: Upright) -> Iterator[tuple[float, Array, Array]]:
-    """Yield azimuths [rad] and postures (n,) rad before and at pre-grasps from which the hand can move to the thing, the best first.
+@dataclass(frozen=True, slots=True, eq=False)
+class PreGrasp:
+    """A posture (n,) rad with the palm beside a thing, and the one before it, `away` (n,) rad, from where the hand moves straight to it.
 
-    In the first posture the whole hand is beside the thing: between it and the pre-grasp thumb and fingers are near the thing.
+    `azimuth`: rad, that the palm faces.  `above`: whether the hand comes from above, else from the side.
+    """
+
+    azimuth: float
+    away: Array
+    posture: Array
+    above: bool
+
+
+def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
+    """Return the pre-grasps from which the hand can move to the thing, the best first; those from above are last.
+
     The best are those in which the law pushes little until the thing is lifted: what it pushes keeps the palm from its pose.
     """
-    found = []
+    found: list[tuple[float, PreGrasp]] = []
     for turn in TURNS:
         azimuth = azimuth_beside(thing.place) + turn
         if not AZIMUTHS[0] <= azimuth <= AZIMUTHS[1]:
             continue
         inner = beside(grasp, thing, azimuth, grasp.grip.gap, 0.0, None)
         up = None if inner is None else beside(grasp, thing, azimuth, grasp.grip.gap, LIFT, inner[None])
-        if inner is None or up is None:
+        outer = None if inner is None else beside(grasp, thing, azimuth, grasp.grip.before, 0.0, inner[None])
+        if inner is None or up is None or outer is None:
             continue
-        outer = beside(grasp, thing, azimuth, grasp.grip.before, 0.0, inner[None])
-        if outer is None:
-            continue
+        push = max(LITTLE_PUSH, *(grasp.push(q) for q in (outer, inner, up)))
         for gap, above in STAND_OFFS:
             away = beside(grasp, thing, azimuth, gap, above, outer[None])
             path = None if away is None else np.stack([away, outer, inner])
             if away is not None and path is not None and np.abs(np.diff(path, axis=0)).max() <= FARTHEST and is_free(grasp.model, path):
-                found.append((max(LITTLE_PUSH, *(grasp.push(q) for q in (outer, inner, up))), azimuth, away, outer))
-                break
-    for _, *one in sorted(found, key=lambda one: one[0]):
-        yield one[0], one[1], one[2]
+                found.append((push, PreGrasp(azimuth, away, outer, above > 0.0)))
+    return [one for _, one in sorted(found, key=lambda each: (each[1].above, each[0]))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,12 +189,14 @@ class Picker:
         """Move along a path (K, n) rad, the attractor making up for the law's forces; return whether something was bumped into."""
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
-    def arrive(self, away: Array, pre_grasp: Array) -> None:
-        """Move the hand, which is at `away` (n,) rad, straight to the pre-grasp (n,) rad."""
-        self.stand(away)
-        self.move(np.stack([away, pre_grasp]), SLOW)
-        self.stand(pre_grasp)
-        self._there = pre_grasp
+    def arrive(self, goal: PreGrasp, watch: BumpWatch | None = None) -> bool:
+        """Move the hand, which is away from the thing, straight to the pre-grasp; return whether it bumped into something then."""
+        self.stand(goal.away)
+        if self.move(np.stack([goal.away, goal.posture]), SLOW, watch):
+            return True
+        self.stand(goal.posture)
+        self._there = goal.posture
+        return False
 
     def close(self, thing: Upright, azimuth: float) -> None:
         """Move the palm from the pre-grasp to the thing, and close the hand; raises NoPosture."""

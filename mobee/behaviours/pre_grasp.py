@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array
 from mobee.behaviours.bump import BumpWatch
 from mobee.behaviours.grasp import UP, Grip, SideGrasp
-from mobee.behaviours.pick import FAST, Body, Picker, Upright, is_free, pre_grasps
+from mobee.behaviours.pick import FAST, Body, Picker, PreGrasp, Upright, is_free, pre_grasps
 from mobee.errors import MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.building import tasks
@@ -36,7 +36,7 @@ FACES = (0.0, float(np.deg2rad(60.0)))  # rad, azimuths
 SPACING = (0.03, 0.03, 0.05, float(np.deg2rad(20.0)))  # m and rad
 NEIGHBOURS, LONGEST, MARGIN = 16, 0.5, float(np.deg2rad(10.0))
 ASIDE = (-0.24, 0.38, 0.0, float(np.deg2rad(30.0)))  # of a pose with the hand at the side of the table
-PLANS = 6
+PLANS = 8
 AROUND, OVER = 0.05, 0.065
 """m, beside and above the place of the palm at a bump, to which it does not return: what is there stands on the table."""
 _LEFT = {"shoulder_pitch": -40.0, "shoulder_roll": 40.0, "shoulder_yaw": -30.0, "elbow": 100.0}  # degrees, the left arm aside
@@ -141,38 +141,39 @@ class Approach:
 
 
 def approach(body: Body, picker: Picker, thing: Upright, plan: Planner) -> Approach:
-    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm."""
+    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm.
+
+    After a bump the hand comes from above if it can, since what it has bumped into is beside the thing.
+    """
     found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
     watch = BumpWatch(model.robot, picker.watched)
-    bumped: list[float] = []  # azimuths, rad, on the motions to which it has bumped into something
-    while found.plans < PLANS:
+    goals = pre_grasps(picker.grasp, thing)
+    while found.plans < PLANS and goals:
         begun = time.process_time()
-        grasps = sorted(pre_grasps(picker.grasp, thing), key=lambda one: bumped.count(one[0]))
-        chosen = _planned(grasps, plan, body.q, blocked)
+        chosen = _planned(goals, plan, body.q, blocked)
         if chosen is None and len(blocked):  # nothing leads around: perhaps there was nothing
             blocked = blocked[:0]
-            chosen = _planned(grasps, plan, body.q, blocked)
+            chosen = _planned(goals, plan, body.q, blocked)
         found.planning, found.plans = found.planning + time.process_time() - begun, found.plans + 1
         if chosen is None:
             return found
-        azimuth, path, goal = chosen
+        path, goal = chosen
         ended = body.follow_path(path, FAST, watch)
-        if not ended.bumped:
-            picker.arrive(path[-1], goal)
-            found.azimuth = azimuth
+        if not ended.bumped and not picker.arrive(goal, watch):
+            found.azimuth = goal.azimuth
             return found
         found.bumps += 1
-        bumped.append(azimuth)
-        blocked = np.concatenate([blocked, model.evaluate(ended.q).position(picker.grasp.marker)[None]])
+        goals = sorted((one for one in goals if one is not goal), key=lambda one: not one.above)  # it is stable
+        blocked = np.concatenate([blocked, model.evaluate(ended.q if ended.bumped else body.q).position(picker.grasp.marker)[None]])
     return found
 
 
-def _planned(grasps: Sequence[tuple[float, Array, Array]], plan: Planner, here: Array, blocked: Array) -> tuple[float, Array, Array] | None:
-    """Return the azimuth [rad], a path (K, n) rad to beside the thing, and the pre-grasp (n,) rad; None if there is no free path."""
-    for azimuth, away, goal in grasps:
-        path = plan.path(here, away, azimuth, blocked)
+def _planned(goals: Sequence[PreGrasp], plan: Planner, here: Array, blocked: Array) -> tuple[Array, PreGrasp] | None:
+    """Return a path (K, n) rad to beside the thing, and the pre-grasp; None if there is no free path."""
+    for goal in goals:
+        path = plan.path(here, goal.away, goal.azimuth, blocked)
         if path is not None:
-            return azimuth, path, goal
+            return path, goal
     return None
 
 

@@ -52,7 +52,7 @@ def roomy_placement(seed: int) -> Placement:
         for name, piece in scene.clutter.items():
             world.add(name, piece.shape, position=standing(piece.place, piece.height))
         grasp = side_grasp(Model(robot(), world))
-        if not grasp.model.evaluate(ready()).count and next(pre_grasps(grasp, Upright(scene.cup, RADIUS, HEIGHT, TOP)), None) is not None:
+        if not grasp.model.evaluate(ready()).count and pre_grasps(grasp, Upright(scene.cup, RADIUS, HEIGHT, TOP)):
             return scene
 
 

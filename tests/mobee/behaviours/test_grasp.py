@@ -48,7 +48,8 @@ def test_a_palm_beside_a_thing_faces_its_axis_with_the_thumb_up(x: float, y: flo
 
 
 def test_pre_grasps_are_where_they_should_be_and_touch_nothing() -> None:
-    azimuth, _, q = next(pre_grasps(grasp(), CUP))
+    goal = pre_grasps(grasp(), CUP)[0]
+    azimuth, q = goal.azimuth, goal.posture
     pose, wanted = grasp().model.evaluate(q), palm_beside(CUP.place, RADIUS, azimuth, Grip().before, GROUND, Grip())
     np.testing.assert_allclose(pose.position(MARKER), wanted.position, atol=5e-3)
     assert np.arccos(np.trace(pose.rotation(MARKER).T @ wanted.rotation) / 2.0 - 0.5) < np.deg2rad(5.0)
@@ -62,7 +63,8 @@ def test_a_thing_fits_into_the_open_hand_which_touches_it_from_both_sides_as_it_
     world = mobee.load_world("table")
     world.remove("ball")
     hand = SideGrasp(Model(robot(), world), MARKER, MOTORS, icub_starts(robot()))
-    azimuth, _, outer = next(pre_grasps(hand, CUP))
+    goal = pre_grasps(hand, CUP)[0]
+    azimuth, outer = goal.azimuth, goal.posture
     inner = hand.posture(palm_beside(CUP.place, RADIUS, azimuth, Grip().gap, GROUND, Grip()), outer[None])
     assert inner is not None
     world.add("cup", mobee.cylinder(RADIUS, 0.13), position=(*CUP.place, GROUND + 0.066))
@@ -77,7 +79,8 @@ def test_a_thing_fits_into_the_open_hand_which_touches_it_from_both_sides_as_it_
 
 def test_the_law_holds_postures_against_its_forces_with_the_attractors_of_a_grasp() -> None:
     hand, near = grasp(), Upright(np.array([-0.3, 0.05]), RADIUS, 0.13, GROUND)  # near to the body, whose fields push the forearm
-    azimuth, _, q = next(pre_grasps(hand, near))
+    goal = pre_grasps(hand, near)[0]
+    azimuth, q = goal.azimuth, goal.posture
     inner = hand.posture(palm_beside(near.place, RADIUS, azimuth, Grip().gap, GROUND, Grip()), q[None])
     assert inner is not None
     assert 1.0 < hand.push(inner) < 6.0
@@ -98,7 +101,7 @@ def test_the_law_holds_postures_against_its_forces_with_the_attractors_of_a_gras
 def test_pre_grasps_keep_out_of_the_zones_of_the_clauses() -> None:
     gains, units = Gains.default(), motor_units(robot())
     for cup in (CUP, Upright(np.array([-0.3, 0.05]), RADIUS, 0.13, GROUND)):
-        _, _, q = next(pre_grasps(grasp(), cup))
+        q = pre_grasps(grasp(), cup)[0].posture
         for clause in robot().clauses:
             if clause.part in ("torso", "right_arm"):
                 zones = gains.constraint_width * np.linalg.norm(clause.a * units, axis=1)
@@ -109,7 +112,7 @@ def test_there_is_no_pre_grasp_where_things_fill_the_room_of_the_hand() -> None:
     world = mobee.load_world("table")
     world.remove("ball")
     world.add("wall", mobee.box(0.3, 0.02, 0.2), position=(-0.3, 0.16, 0.0))
-    assert next(pre_grasps(SideGrasp(Model(robot(), world), MARKER, MOTORS, icub_starts(robot())), CUP), None) is None
+    assert not pre_grasps(SideGrasp(Model(robot(), world), MARKER, MOTORS, icub_starts(robot())), CUP)
 
 
 def test_places_where_the_hand_came_from_are_first() -> None:
@@ -150,7 +153,8 @@ def test_torques_that_change_slowly_or_at_the_start_are_no_bump() -> None:
 def test_a_map_leads_around_places_where_the_arm_bumped_into_something() -> None:
     trm = pre_grasp_map(grasp(), GROUND)
     planner, start = MapPlanner(trm, grasp().model, MARKER), aside(trm, GROUND, Grip())
-    azimuth, goal, _ = next(pre_grasps(grasp(), CUP))
+    first = pre_grasps(grasp(), CUP)[0]
+    azimuth, goal = first.azimuth, first.away
     path = planner.path(start, goal, azimuth, np.empty((0, 3)))
     assert path is not None
     bump = grasp().model.evaluate(path[2]).position(MARKER)
