@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
 
 from experiments.kit.statistics import interquartile_mean, interval
 from mobee.arrays import Array
@@ -48,8 +47,10 @@ def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
 
 def finish_normalised(axes: Any) -> None:
     """Add to distributions of normalised squared errors in 3-D that of an honest covariance, labels and a legend."""
+    from scipy.special import chdtr
+
     grid = np.linspace(0.0, 12.0, 300)
-    axes.plot(grid, chi2.cdf(grid, 3), color="black", linestyle="--", linewidth=1.0, label="chi-squared, 3 degrees of freedom")
+    axes.plot(grid, chdtr(3, grid), color="black", linestyle="--", linewidth=1.0, label="chi-squared, 3 degrees of freedom")
     finish(axes, xlabel="normalised squared error", ylabel="share of the places", xlim=(0.0, 12.0))
     axes.legend(fontsize=7, loc="lower right")
 

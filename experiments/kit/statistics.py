@@ -14,7 +14,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import binomtest
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
@@ -192,8 +191,17 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
     return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), labels, level=level)
 
 
+def chi_squared(share: float, freedom: int) -> float:
+    """Return the quantile of the chi-squared distribution: below it is that share of the squared norms of `freedom` normal numbers."""
+    from scipy.special import gammaincinv
+
+    return float(2.0 * gammaincinv(0.5 * freedom, share))
+
+
 def share_interval(successes: int, tries: int, level: float | None = None) -> tuple[float, float]:
     """Return the interval of a share of successes (Wilson 1927); `level`: as in `interval`.  Tries must be independent."""
+    from scipy.stats import binomtest  # a second, and only shares need it
+
     given = binomtest(successes, tries).proportion_ci(decision_level() if level is None else level, method="wilson")
     return float(given.low), float(given.high)
 

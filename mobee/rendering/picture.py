@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from mobee.arrays import Array
 from mobee.rendering.camera import NOTHING, Camera, Floats, Raster, framing, pixel_middles, places
@@ -103,6 +102,8 @@ def _floor(camera: Camera, lamp: _Lamp, height: float | None, ground: Color) -> 
     steep = float(camera.axes[2][2])
     if height is None or steep > -0.05:
         return picture
+    from scipy.ndimage import gaussian_filter
+
     up = pixel_middles(camera)[1]
     depth = np.broadcast_to(((height - up * camera.axes[1][2]) / steep).astype(np.float32)[:, None], picture.shape[:2])
     shade = lamp.shade(places(camera, depth, np.ones(depth.shape, bool))).reshape(depth.shape)
@@ -126,6 +127,8 @@ def _outlines(seen: Raster) -> Floats:
 
 def _hollows(seen: Raster, camera: Camera, times: int) -> Floats:
     """Return how far each surface is behind its surroundings, in 0..1, (H, W) of the coarse picture; used to darken hollows."""
+    from scipy.ndimage import gaussian_filter  # 0.3 s, and only pictures with shadows need it
+
     something = np.isfinite(seen.depth)
     weight = _coarse(something.astype(np.float32), times)
     depth = _coarse(np.where(something, seen.depth, np.float32(0.0)), times)

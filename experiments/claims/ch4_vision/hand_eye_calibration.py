@@ -21,13 +21,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from experiments.kit.command_line import positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, claim, judged
 from experiments.kit.plots import finish, finish_normalised, new_figure
 from experiments.kit.rules import all_hold, decides
-from experiments.kit.statistics import estimate, interval
+from experiments.kit.statistics import chi_squared, estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
@@ -206,7 +205,7 @@ def accuracy(groups: Groups) -> Measured:
     "90 to 98 %",
 )
 def honest(groups: Groups) -> Measured:
-    band = chi2.ppf(0.95, 3)
+    band = chi_squared(0.95, 3)
     shares = [float(np.mean(np.asarray(run["normalised"]) <= band)) for run in groups["hand"]]
     return f"share {estimate(shares, 3)}", decides(interval(shares), *HONEST)
 
@@ -217,7 +216,7 @@ CLAIMS = (accuracy, honest)
 def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each robot, and the claims."""
     groups = grouped(found, "calibration", ("hand",))
-    band = chi2.ppf(0.95, 3)
+    band = chi_squared(0.95, 3)
     rows = {
         name: {
             "places": len(cell.values["after"]),

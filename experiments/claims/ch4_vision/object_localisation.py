@@ -21,7 +21,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from experiments.claims.ch4_vision.hand_eye_calibration import (
     ENCODER,
@@ -38,7 +37,7 @@ from experiments.kit.command_line import positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, claim, judged
 from experiments.kit.plots import finish, finish_normalised, new_figure
 from experiments.kit.rules import all_hold, decides
-from experiments.kit.statistics import estimate, interval
+from experiments.kit.statistics import chi_squared, estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee.arrays import Array
 from mobee.model.model import Model
@@ -209,7 +208,7 @@ def accuracy(groups: Groups) -> Measured:
     "90 to 98 %",
 )
 def honest(groups: Groups) -> Measured:
-    band = chi2.ppf(0.95, 3)
+    band = chi_squared(0.95, 3)
     shares = [float(np.mean(np.concatenate([run[f"{name}_normalised"] for name in KINDS]) <= band)) for run in groups["things"]]
     return f"share {estimate(shares, 3)}", decides(interval(shares), *HONEST)
 
@@ -232,7 +231,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _row(run: Mapping[str, Any]) -> dict[str, Any]:
-    band = chi2.ppf(0.95, 3)
+    band = chi_squared(0.95, 3)
     each: list[tuple[str, Callable[[str], float]]] = [
         ("found, share", lambda name: len(run[f"{name}_error"]) / run["shown"]),
         ("median mm", lambda name: 1e3 * float(np.median(run[f"{name}_error"]))),

@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from experiments.kit.cells import CellResult
 from experiments.kit.experiment import Claim, Envelope, Experiment, Measured, judged
@@ -294,6 +293,8 @@ peaks = _law_claim(
 
 
 def _degree(grouped: Groups) -> Measured:
+    from scipy.stats import spearmanr  # a second
+
     goals = arm_space().goals
     actions = np.bincount(goals[goals >= 0], minlength=len(goals))
     correlations = [float(spearmanr(actions, run.visits).statistic) for run in _every(grouped)]

@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from experiments.kit.cells import CellResult
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, LEFT, RANK3, RIGHT, TORSO, arm_space, robot, table_world, torso_space
@@ -270,6 +269,8 @@ def by_goal(ratios: Array) -> Array:
 
 def agreement(pair: Array) -> float:
     """Return the rank correlation of the two arms."""
+    from scipy.stats import spearmanr  # a second
+
     return float(spearmanr(pair[0].ravel(), pair[1].ravel()).statistic)
 
 

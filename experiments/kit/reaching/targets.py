@@ -19,7 +19,6 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
 
 from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, PART, arm_belief, laws
@@ -69,6 +68,8 @@ def nearest_pose(
     It uses kinematics only.  The named motors move within their limits, the others are at home; unlike in
     `mobee.roadmap.reachable`, the clauses of their part hold.
     """
+    from scipy.optimize import minimize  # 0.3 s, and only this needs it
+
     robot = model.robot
     columns = np.array([robot.motor_index(name) for name in joints])
     low, high = robot.limits[columns].T
