@@ -5,17 +5,18 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.robot.mjcf.compiled import is_mjcf
 from mobee.robot.mjcf.menagerie import menagerie_file, menagerie_names
-from mobee.robot.mjcf.read import read_mjcf
 from mobee.robot.robot import Robot
-from mobee.robot.urdf.hull import CORNERS, Corners
-from mobee.robot.urdf.read import UrdfOptions, read_urdf
-from mobee.robot.urdf.shapes import Meshes
 from mobee.robot.xml.file import is_file
 from mobee.robot.xml.read import read_robot
+
+if TYPE_CHECKING:
+    from mobee.robot.urdf.hull import Corners
+    from mobee.robot.urdf.shapes import Meshes
 
 ROBOTS = Path(__file__).parent / "robots"
 
@@ -46,8 +47,13 @@ def load_robot(
         NotInstalled: an MJCF file without the package mujoco.
     """
     path = find_file(name_or_path, ROBOTS, "robot")
-    reader = read_urdf if path.suffix.lower() == ".urdf" else read_mjcf if is_mjcf(path) else None
-    if reader is not None:
+    is_urdf = path.suffix.lower() == ".urdf"
+    if is_urdf or is_mjcf(path):
+        from mobee.robot.mjcf.read import read_mjcf  # 0.05 s for these readers, and no shipped robot needs them
+        from mobee.robot.urdf.hull import CORNERS
+        from mobee.robot.urdf.read import UrdfOptions, read_urdf
+
+        reader = read_urdf if is_urdf else read_mjcf
         return reader(path, UrdfOptions(field, meshes or "hull", CORNERS if corners is None else corners, srdf, home))
     options = {"field": field, "meshes": meshes, "corners": corners, "srdf": srdf, "home": home}
     given = [name for name, value in options.items() if value is not None]

@@ -19,7 +19,6 @@ from mobee.robot.join import Placed, join_placed
 from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
 from mobee.robot.pairs_2014 import Rule, published_pairs, published_untested
 from mobee.robot.robot import Joint, LinkPair, Part, Robot
-from mobee.robot.urdf.read import read_urdf
 from mobee.robot.xml.body import CONVEX_ATTRIBUTES, MASS_ATTRIBUTES, MOST_SHAPES, read_marker, read_mass, read_shape, read_skeleton
 from mobee.robot.xml.draft import Draft, Place, enter
 from mobee.robot.xml.file import is_file
@@ -332,6 +331,8 @@ def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot])
     axis = direction(node, AXIS, (0.0, 0.0, 1.0))
     rotation = turn_about(axis, np.deg2rad(node.number("angle", 0.0))) @ align(Z, axis)
     if path.suffix.lower() == ".urdf":
+        from mobee.robot.urdf.read import read_urdf  # its modules are many, and few robots include a URDF
+
         trail.into(path)
         robot = read_urdf(path)
     else:

@@ -9,7 +9,7 @@ import pytest
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Robot
-from mobee.robot.urdf import read_urdf
+from mobee.robot.urdf.read import read_urdf
 from tests.mobee.robot.urdf_files import ARM, urdf_file
 
 LINKS = "".join(f'<link name="l{k}"/>' for k in range(4))

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mobee.arrays import Array
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
-from mobee.robot.urdf import UrdfOptions, read_urdf
 from mobee.robot.urdf.pairs import segment_distances
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from tests.mobee.robot.urdf_files import foreign, srdf_file, urdf_file
 
 BODY = '<link name="{0}"><collision><geometry>{1}</geometry></collision></link>'

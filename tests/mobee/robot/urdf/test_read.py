@@ -17,7 +17,7 @@ from mobee.errors import InvalidValue, RobotFileError
 from mobee.model.kinematics import link_transforms, point_jacobian
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.robot.urdf import UrdfOptions, read_urdf
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.urdf.write import write_urdf
 from tests.mobee.robot.urdf_files import ARM, foreign, urdf_file
 

@@ -8,7 +8,7 @@ import pytest
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Shape
-from mobee.robot.urdf import UrdfOptions, read_urdf
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from mobee.robot.urdf.shapes import grown
 from tests.mobee.robot.urdf_files import ARM, arm_with, tetrahedron, urdf_file, write_stl
 

@@ -7,7 +7,7 @@ import pytest
 
 from mobee.errors import RobotFileError
 from mobee.robot.robot import Robot
-from mobee.robot.urdf import UrdfOptions, read_urdf
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from tests.mobee.robot.urdf_files import srdf_file, urdf_file
 
 BODY = '<link name="{0}"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>'

@@ -9,7 +9,7 @@ import pytest
 
 from mobee.errors import RobotFileError, UnknownName
 from mobee.robot.robot import Robot
-from mobee.robot.urdf import UrdfOptions, read_urdf
+from mobee.robot.urdf.read import UrdfOptions, read_urdf
 from tests.mobee.robot.urdf_files import ARM, srdf_file, urdf_file
 
 WRIST = '<link name="hand"/><joint name="wrist" type="continuous"><parent link="lower"/><child link="hand"/></joint>'

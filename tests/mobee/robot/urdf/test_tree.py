@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import RobotFileError
-from mobee.robot.urdf import read_urdf
+from mobee.robot.urdf.read import read_urdf
 from tests.mobee.robot.urdf_files import ARM, LINKS, urdf_file
 
 PLAIN = '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/>{4}</joint>'
