@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every contact against Pinocchio and coal: random poses of the benchmark's robot, 500 alone and 150 among 100 boxes."""
+"""Every contact against Pinocchio and coal: random poses of the benchmark's robot, 450 alone and 60 among 100 boxes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mobee.model.contact import ContactTable
 
 coal = pytest.importorskip("coal")
 
-POSES = {0: 500, 100: 150}  # by the number of boxes
+POSES = {0: 450, 100: 60}  # by the number of boxes
 GRAZE = 1e-6  # m; a pair that overlaps by less may be a contact for one of the two only
 CLEAR = 1e-7  # m, beyond the depth
 

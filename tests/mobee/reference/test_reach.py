@@ -71,7 +71,7 @@ def agree(robot: Robot, gains: Gains, part: str | None, marker: str, rng: Rng, t
 
 
 @BOTH
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(seed=SEEDS)
 def test_a_humanoids_reach_is_this(gains: Gains, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -80,7 +80,7 @@ def test_a_humanoids_reach_is_this(gains: Gains, seed: int) -> None:
 
 
 @BOTH
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(seed=SEEDS)
 def test_the_reach_of_any_tree_is_this(gains: Gains, seed: int) -> None:
     """With joints that slide, joints that two motors drive, and motors that drive two joints."""
@@ -88,6 +88,7 @@ def test_the_reach_of_any_tree_is_this(gains: Gains, seed: int) -> None:
     agree(tree(int(rng.integers(10_000))), gains, "body", f"marker{rng.integers(1, 13)}", rng)
 
 
+@settings(max_examples=25)
 @given(SEEDS)
 def test_the_reach_of_a_planar_arm_is_this_also_where_it_is_stretched(seed: int) -> None:
     agree(planar_arm(), Gains.default(), "arm", "tip", np.random.default_rng(seed))

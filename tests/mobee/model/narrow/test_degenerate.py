@@ -41,7 +41,7 @@ def solids(draw, kind) -> Solid:
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_there_is_always_a_finite_smallest_separation(first, second, data):
     a, b = data.draw(solids(first)), data.draw(solids(second))

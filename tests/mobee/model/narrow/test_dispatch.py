@@ -33,7 +33,7 @@ def pair(seed, first, second, spread=0.08):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(seed=SEEDS)
 def test_the_separation_just_separates(first, second, seed):
     a, b, _ = pair(seed, first, second)
@@ -46,7 +46,7 @@ def test_the_separation_just_separates(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), SORTED)
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(seed=SEEDS)
 def test_no_direction_separates_sooner(first, second, seed):
     a, b, rng = pair(seed, first, second)
@@ -57,7 +57,7 @@ def test_no_direction_separates_sooner(first, second, seed):
 
 
 @pytest.mark.parametrize("second", ["capsule", "cylinder", "box"])
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_no_direction_separates_plates_and_rods_sooner(second, seed):
     rng = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def test_newton_steps_that_cycle_about_a_separation_end():
 
 
 @pytest.mark.parametrize(("first", "second"), SORTED)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(seed=SEEDS)
 def test_contacts_and_distances_agree_with_coal(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.2)
@@ -90,7 +90,7 @@ def test_contacts_and_distances_agree_with_coal(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(seed=SEEDS)
 def test_separate_volumes_get_a_lower_bound_of_their_distance(first, second, seed):
     a, b, _ = pair(seed, first, second, spread=0.3)
@@ -103,7 +103,7 @@ def test_separate_volumes_get_a_lower_bound_of_their_distance(first, second, see
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(seed=SEEDS)
 def test_changing_places_turns_the_normal(first, second, seed):
     a, b, _ = pair(seed, first, second)
@@ -117,7 +117,7 @@ def test_changing_places_turns_the_normal(first, second, seed):
 
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(seed=SEEDS)
 def test_a_rigid_motion_of_both_moves_the_answer_with_them(first, second, seed):
     a, b, rng = pair(seed, first, second)

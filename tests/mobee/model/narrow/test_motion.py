@@ -38,7 +38,7 @@ def moved(rng, item, h):
 
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 @pytest.mark.parametrize("h", [1e-3, 1e-6])
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_the_depth_changes_by_no_more_than_the_motion(first, second, h, seed):
     rng = np.random.default_rng(seed)
@@ -50,7 +50,7 @@ def test_the_depth_changes_by_no_more_than_the_motion(first, second, h, seed):
 
 @pytest.mark.parametrize(("first", "second"), ROUNDED)
 @pytest.mark.parametrize("h", [1e-4, 1e-9])
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_the_force_follows_the_motion_while_the_core_is_outside(first, second, h, seed):
     rng = np.random.default_rng(seed)
