@@ -49,7 +49,7 @@ def load_robot(
     path = find_file(name_or_path, ROBOTS, "robot")
     is_urdf = path.suffix.lower() == ".urdf"
     if is_urdf or is_mjcf(path):
-        from mobee.robot.mjcf.read import read_mjcf  # 0.05 s for these readers, and no shipped robot needs them
+        from mobee.robot.mjcf.read import read_mjcf  # fourteen modules, and no shipped robot needs them
         from mobee.robot.urdf.hull import CORNERS
         from mobee.robot.urdf.read import UrdfOptions, read_urdf
 

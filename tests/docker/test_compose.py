@@ -4,6 +4,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import subprocess
+from functools import cache
 
 import pytest
 
@@ -70,11 +71,18 @@ def test_the_module_of_a_command_can_be_run(name: str) -> None:
     assert module_exists(name)
 
 
+@cache
+def usage(*program: str) -> str:
+    """What the program prints with --help."""
+    done = subprocess.run([*program, "--help"], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 @pytest.mark.parametrize("name", compose_commands())
 def test_a_command_uses_options_that_its_program_has(name: str) -> None:
     argv = as_processes(7999)[name]
     first_option = next(i for i, word in enumerate(argv) if word.startswith("--"))
-    usage = subprocess.run([*argv[:first_option], "--help"], capture_output=True, text=True, timeout=60)
-    assert usage.returncode == 0, usage.stderr
+    known = usage(*argv[:first_option])
     for option in (word for word in argv if word.startswith("--")):
-        assert re.search(rf"(?<![\w-]){option}(?![\w-])", usage.stdout), option
+        assert re.search(rf"(?<![\w-]){option}(?![\w-])", known), option
