@@ -30,7 +30,7 @@ rate = 50
 joints = ["joint_0", "joint_1", "joint_2"]
 neighbours = 6
 """
-TICKS = 1000
+TICKS = 600
 
 
 def test_a_urdf_learns_with_physics_and_the_same_seed_makes_the_same_run(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from services.recorder.reader import Recording
 from tests.system.live import launch, until
 
 pytestmark = [pytest.mark.system, pytest.mark.untimed]
-TICKS = 600  # 12 s of the robot: all parts move
+TICKS = 300  # 6 s of the robot: all parts move
 
 
 @pytest.fixture(scope="module")
