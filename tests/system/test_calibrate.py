@@ -23,7 +23,7 @@ pytest.importorskip("pybullet")
 
 def test_the_running_robot_finds_its_cameras(tmp_path: Path) -> None:
     file, robot = tmp_path / "eyes.json", load_robot("icub")
-    options = ["--live", "--postures", "5", "--save", str(file), "--json"]
+    options = ["--live", "--postures", "3", "--save", str(file), "--json"]
     with running(tmp_path, "eyes") as (launched, _):
         command = [sys.executable, "-m", "mobee_cli", "calibrate", *options, "--endpoint", launched.endpoint]
         done = subprocess.run(command, capture_output=True, text=True, timeout=200.0)

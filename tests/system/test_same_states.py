@@ -12,7 +12,7 @@ from tests.system.live import running, transitions, until
 
 pytestmark = pytest.mark.system
 
-ACTIONS = 4
+ACTIONS = 3
 SEED = 4
 GAINS = "default"
 ATTEMPTS = 5
