@@ -30,6 +30,7 @@ VERBS = {
     "plan": "plan a path by what an agent has learned",
     "reach": "move a hand to a place, on the running robot or offline",
     "calibrate": "find where cameras are, by looking at the robot's own hand",
+    "detector": "train a detector of known things on rendered pictures",
     "roadmap": "build, show, query and play roadmaps of whole-body motions",
     "export": "write the transitions of a run as one table",
     "experiment": "measure the claims of the papers: list, run, figure",

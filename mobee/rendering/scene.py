@@ -101,12 +101,23 @@ class Scene:
 
     def light(self, view: View, hidden: frozenset[int], pixels: Pixels, brightness: Floats) -> None:
         """Add to the brightness (K, 3) of red, green and blue, 0 to 255, that of pixels of a view, without the `hidden` links."""
-        if hidden not in self._shown:
-            self._shown[hidden] = _Shown([one for one in self._link_solids if one.link not in hidden], self._objects, self._around)
-        shown = self._shown[hidden]
+        shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)
         _, which, normal = cast(packs.volumes, packs.surfaces, view.rays(), pixels.chosen)
         shade(which, normal, pixels.rays, shown.colors, LAMP, brightness)
+
+    def objects_at(self, view: View, hidden: frozenset[int], pixels: Pixels) -> Ints:
+        """Return which object of the world pixels of a view show, by its number in the order of the world (K,); -1: anything else."""
+        shown = self._packed(hidden)
+        packs = shown.at(self._transforms, self._objects)
+        which = cast(packs.volumes, packs.surfaces, view.rays(), pixels.chosen)[1]
+        found: Ints = shown.objects[which.ravel()[pixels.rays]]
+        return found
+
+    def _packed(self, hidden: frozenset[int]) -> _Shown:
+        if hidden not in self._shown:
+            self._shown[hidden] = _Shown([one for one in self._link_solids if one.link not in hidden], self._objects, self._around)
+        return self._shown[hidden]
 
     def _view(self, name: str) -> View:
         camera = self.cameras[name]
@@ -126,6 +137,9 @@ class _Shown:
         self._links = np.array([one.link for one in worn], dtype=np.intp)
         self._positions = np.array([one.solid.position for one in worn]).reshape(-1, 3, 1)
         self._rotations = np.array([one.solid.rotation for one in worn]).reshape(-1, 3, 3)
+        of_world = numbers - len(worn)
+        is_object = (of_world >= 0) & (of_world < len(objects))
+        self.objects = np.append(np.where(is_object, of_world, -1), -1)  # the number of each; the last is nothing
         self.colors = (np.float32(255.0) * np.array([solids[number].color for number in numbers], np.float32)).reshape(-1, 3)
 
     def at(self, transforms: Array, objects: Mapping[str, Solid]) -> Packed:

@@ -109,6 +109,18 @@ class Cameras:
             scene.light(self._sensor.view(sample, *frame), camera.hidden, self._sensor.pixels(sample), light)
         return self._sensor.develop(light, self._rng)
 
+    def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
+        """Return how much of each pixel shows each of the first `objects` of the world (height, width, objects), as `expose` draws them."""
+        camera, scene = self._scene.cameras[name], self._scene
+        found = np.zeros((self.settings.height * self.settings.width, objects), np.float32)
+        for sample, q in enumerate(postures):
+            scene.pose(q + self.errors.encoders)
+            frame = camera_frames(camera, scene.transforms, self.errors.mounts[name])
+            which = scene.objects_at(self._sensor.view(sample, *frame), camera.hidden, self._sensor.pixels(sample))
+            for number in range(objects):
+                found[:, number] += which == number
+        return found.reshape(self.settings.height, self.settings.width, objects) / np.float32(self.settings.samples)
+
 
 def _spread(count: int) -> Array:
     """Return places (count, 2) within a pixel, from its middle, evenly spread (a Kronecker sequence)."""

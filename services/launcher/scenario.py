@@ -122,7 +122,7 @@ def read_scenario(
     return Scenario(path.stem, file.title, file.shared, tuple(sorted(kept, key=lambda part: part.entry.stage)), where)
 
 
-FILES = ("robot", "world", "continues", "calibration")  # settings that may name a file
+FILES = ("robot", "world", "continues", "calibration", "detector")  # settings that may name a file
 
 
 def _place_files(data: dict[str, Any], folder: Path) -> None:

@@ -10,9 +10,8 @@ from msgspec import Meta
 from mobee.errors import InvalidValue
 from mobee.model.world import World
 from mobee.robot.robot import Robot
-from mobee.settings import require_name
 from mobee.vision.calibration.calibration import load_calibration
-from mobee.vision.objects.detectors import DETECTORS
+from mobee.vision.objects.detectors import require_detector
 from mobee.vision.objects.thing import KINDS, Thing, things_in
 from services.common.cameras import STEREO, CameraConfig, require_cameras
 from services.common.worlds import world_around
@@ -24,7 +23,7 @@ class Config(CameraConfig, frozen=True, kw_only=True):
     world: str = ""
     """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
     detector: str = "color"
-    """What finds things in a picture: color, or module:name of a function that returns a detector."""
+    """What finds things in a picture: color, a file of `mobee detector train`, or module:name of a function that returns a detector."""
     most: Annotated[int, Meta(ge=1, le=100)] = 1
     """Objects of each thing that get a name: NAME, NAME_2, ..."""
     calibration: str = ""
@@ -56,7 +55,6 @@ class Config(CameraConfig, frozen=True, kw_only=True):
         """Check also that the robot has two cameras, and that there is something to look for; raises MobeeError."""
         super().check_robot(robot)
         require_cameras(robot, self.cameras_on(robot), STEREO)
-        require_name("detector", self.detector, DETECTORS)
-        self.things()
+        require_detector(self.detector, self.things())
         if self.calibration:
             load_calibration(self.calibration).rig(robot, self.cameras_on(robot))

@@ -33,6 +33,7 @@ ACTIONS = {
     "roadmap": tuple(roadmap.ACTIONS),
     "experiment": ("list", "run", "figure", "claims"),
     "bench": tuple(bench.BENCHES),
+    "detector": ("train",),
 }
 
 

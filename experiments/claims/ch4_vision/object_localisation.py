@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -65,26 +66,36 @@ AWAY = np.array([3.0, 0.0, 3.0])  # m: behind the robot
 APART, ASIDE = 0.09, 0.12  # m between the middles of two things, at least; and from the middle of the gaze, at most
 FALSE = 0.05  # m: a thing that is placed farther from where it is was taken for something else
 KINDS = ("ball", "cup", "box")
+COLOR = "color"
+DETECTOR_FIELDS = {  # which records of older runs do not have
+    "false_regions": "regions detected in a picture without things",
+    "detector_ms": "processor time of the detector, ms a picture",
+}
 
 Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the numbers of gazes and of looks."""
+    """Add the numbers of gazes and of looks, and the detector."""
     parser.add_argument("--gazes", type=positive_whole, default=GAZES, metavar="N", help="gazes at the things (default: %(default)s)")
     parser.add_argument("--looks", type=positive_whole, default=LOOKS, metavar="N", help="pictures without things (default: %(default)s)")
+    text = f"detector: {COLOR}, or a file of `mobee detector train` (default: %(default)s)"
+    parser.add_argument("--detector", default=COLOR, metavar="FILE", help=text)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the only condition of the sweep."""
     numbers = (QUICK_POSTURES, QUICK_GAZES, QUICK_LOOKS) if arguments.quick else (POSTURES, arguments.gazes, arguments.looks)
-    return [Condition("things", {"world": "things", "postures": numbers[0], "gazes": numbers[1], "looks": numbers[2]})]
+    settings = {"world": "things", "postures": numbers[0], "gazes": numbers[1], "looks": numbers[2]}
+    if arguments.detector != COLOR:  # records from before there was a choice do not name it
+        settings["detector"] = arguments.detector
+    return [Condition("things", settings)]
 
 
 class Robot:
     """A calibrated robot before its table, which looks at things."""
 
-    def __init__(self, world: str, postures: int, seed: int) -> None:
+    def __init__(self, world: str, postures: int, seed: int, detector: str = COLOR) -> None:
         self._settings, model = CameraSettings(samples=2), Model(rig().robot, load_world("table"))
         errors = camera_errors(self._settings, rig().robot, list(rig().cameras), seed)
         chosen = choose_postures(rig(), model, self._settings, "left_arm", postures, seed)
@@ -92,7 +103,8 @@ class Robot:
         self._found: Calibration = calibrate(rig(), hand, self._settings)
         self._world, self._rng = load_world(world), np.random.default_rng([seed, 0x7468696E67])
         self.things = things_in(self._world)
-        self._detect = detector_of("color", self.things)
+        self._detect = detector_of(detector, self.things)
+        self.pictures, self.regions, self.seconds = 0, 0, 0.0  # seen; detected in them; processor time of the detector
         self._solids = [item for item in self._world.objects.values() if item.role == "obstacle"]
         self._scene, self._cameras = self._drawn(errors, seed)
 
@@ -130,12 +142,17 @@ class Robot:
         moment = Moment(q + noise * self._rng.standard_normal(len(q)), np.zeros(len(q)), np.full(len(q), noise**2))
         eyes = eyes_at(rig(), self._found.x, moment, self._found.covariance, self._settings.jitter)
         pictures = {name: self._cameras.expose(name, [q] * self._settings.samples) for name in rig().cameras}
-        return eyes, locate_all(self.things, {name: self._detect(one) for name, one in pictures.items()}, eyes, self._solids)
+        begin = process_time()
+        detections = {name: self._detect(one) for name, one in pictures.items()}
+        self.seconds += process_time() - begin
+        self.pictures += len(pictures)
+        self.regions += sum(map(len, detections.values()))
+        return eyes, locate_all(self.things, detections, eyes, self._solids)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Calibrate one robot, and show it things, and then none; returns errors and counts."""
-    robot = Robot(settings["world"], settings["postures"], seed)
+    robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}
 
 
@@ -172,6 +189,7 @@ def _without(robot: Robot, looks: int) -> dict[str, Any]:
     for thing in robot.things:
         robot.put(thing.name, AWAY, 0.0)
     tracker, names, single = Tracker(robot.things), set[str](), 0
+    pictures, regions = robot.pictures, robot.regions
     gaze: Array | None = None
     q = robot.gaze()[0]
     for look in range(looks):
@@ -183,7 +201,13 @@ def _without(robot: Robot, looks: int) -> dict[str, Any]:
         gaze = eyes.eyes[0].rotation
         tracker.update((look + 1) / RATE, found, turned)
         names |= {f"{track.name} {track.born:.3f}" for track in tracker.tracks}
-    return {"looks": looks, "false_objects": len(names), "false_places": single}
+    return {
+        "looks": looks,
+        "false_objects": len(names),
+        "false_places": single,
+        "false_regions": (robot.regions - regions) / (robot.pictures - pictures),
+        "detector_ms": 1e3 * robot.seconds / robot.pictures,
+    }
 
 
 def _quantiles(groups: Groups, share: float) -> list[float]:
@@ -248,6 +272,7 @@ def _row(run: Mapping[str, Any]) -> dict[str, Any]:
         "false objects": run["false_objects"],
         "false places": run["false_places"],
         "pairs of pictures without things": run["looks"],
+        **{label: round(float(run[field]), 2) for field, label in DETECTOR_FIELDS.items() if field in run},
     }
 
 

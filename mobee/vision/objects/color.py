@@ -8,20 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.regions import regions
 from mobee.rendering.scene import Picture
 from mobee.rendering.solid import Color
 from mobee.vision.objects.detection import Detection, Detector
+from mobee.vision.objects.outlining import outlined
 from mobee.vision.objects.thing import Thing
 
 HUE = float(np.tan(np.deg2rad(20.0)))  # of the largest angle from the thing's hue
 PALE = 0.35  # share of the thing's saturation below which a pixel is not of its colour
 LEAST = 30  # of 255: brightness of colour below which there is only noise
-AREA = 40.0  # px: smaller regions are ignored
-AROUND = 5  # px: side of the square in which the colour of a whole pixel is looked up
-FEWEST = 16  # points of an outline
-MOST = 100  # points of an outline that are kept
-SOLID = 0.6  # share of its convex hull that a region must fill: the things are convex
 
 
 def by_color(things: Sequence[Thing]) -> Detector:
@@ -36,7 +31,7 @@ def by_color(things: Sequence[Thing]) -> Detector:
         for thing in things:
             likeness = np.zeros(picture.shape[:2], np.float32)
             likeness.flat[colored] = _likeness(pixels, thing.color)
-            found += _regions(thing.name, likeness)
+            found += outlined(thing.name, likeness)
         return found
 
     return detect
@@ -55,17 +50,3 @@ def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
     across = ((chosen - chosen.mean(axis=0)) ** 2).sum(axis=0) - along[some] ** 2
     along[some[across > (HUE * along[some]) ** 2]] = 0.0
     return along
-
-
-def _regions(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
-    """Return the regions with a likeness, as detections."""
-    height, width = likeness.shape
-    found = []
-    for region in regions(likeness, AREA, AROUND):
-        outline, filled = region.outline, min(1.0, region.area / max(region.hull, 1e-9))
-        within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
-        if within.sum() < FEWEST or filled < SOLID:
-            continue
-        every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
-        found.append(Detection(name, outline[within][every], float(region.area), filled * float(within.mean())))
-    return found

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The network of a learned detector: three convolutions, kept as ONNX with the things that it was trained for, and run by OpenCV.
+
+The first convolution sees a pixel's surroundings twice: 5 x 5 pixels beside each other, which hold the edge, and 5 x 5 pixels that are
+`APART` from each other, which hold what is around it.  The others combine its numbers in each pixel.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mobee.errors import InvalidValue, NotInstalled
+from mobee.rendering.camera import Floats
+from mobee.rendering.scene import Picture
+from mobee.robot.writing import write_whole
+from mobee.vision.objects.thing import Thing
+
+FORMAT = "mobee detector 1"
+KEY = "mobee"  # of the metadata
+SUFFIX = ".onnx"
+SIDE, APART = 5, 5  # pixels
+MIDDLE = 127.5  # of 255: the brightness that is 0 for the network, and that of what is beyond the border
+OPSET, IR = 13, 8  # of ONNX
+TRAIN = "mobee detector train"
+
+Layer = tuple[Floats, Floats]  # weights (inputs, outputs), bias (outputs,)
+Shares = Callable[[Picture], Floats]
+"""A function of a picture (H, W, 3) that returns the share of each thing in each pixel (N, H, W), 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """The things for which a network was trained, in the order of its outputs, and the network as ONNX."""
+
+    things: tuple[Thing, ...]
+    model: bytes
+
+    def save(self, path: Path) -> Path:
+        """Write the file whole or not at all, and return its path; raises OSError."""
+        return write_whole(path, self.model)
+
+    def require(self, things: Sequence[Thing], path: str) -> None:
+        """Raise InvalidValue unless the network was trained for these things: names, kinds, sizes and colours."""
+        own, given = {_looks(one) for one in self.things}, {_looks(one) for one in things}
+        if own != given:
+            trained, asked = ("; ".join(sorted(_text(one) for one in some)) for some in (own - given, given - own))
+            raise InvalidValue(
+                f"{path}: trained for other things than those of this world. Only the file has: {trained or 'none'}. Only the world has: "
+                f"{asked or 'none'}. Train a detector for this world: {TRAIN} FILE --world WORLD"
+            )
+
+    def shares(self) -> Shares:
+        """Return the network as a function of a picture; raises InvalidValue if OpenCV cannot run it, NotInstalled without OpenCV."""
+        cv2 = _imported("cv2")
+        try:
+            net = cv2.dnn.readNetFromONNX(np.frombuffer(self.model, np.uint8))
+        except cv2.error as error:
+            raise InvalidValue(f"OpenCV cannot read the network: {error.err}") from None
+
+        def run(picture: Picture) -> Floats:
+            net.setInput(picture.transpose(2, 0, 1)[None] / np.float32(MIDDLE) - np.float32(1.0))
+            try:
+                found: Floats = np.clip(net.forward()[0], 0.0, 1.0)
+            except cv2.error as error:
+                raise InvalidValue(f"OpenCV cannot run the network: {error.err}") from None
+            return found
+
+        return run
+
+
+def network_of(things: Sequence[Thing], first: Layer, second: Layer, third: Layer) -> Network:
+    """Return the network with these layers.
+
+    The inputs of the first one are red, green and blue of the near pixels and then of the far ones, each 5 x 5, row by row: (2, 3, 5, 5).
+    """
+    onnx = _imported("onnx")
+    helper, arrays = onnx.helper, onnx.numpy_helper
+    near, far = first[0].T.reshape(-1, 2, 3, SIDE, SIDE).transpose(1, 0, 2, 3, 4)
+    weights = {"near": near, "far": far, "first": first[1]}
+    weights |= {
+        "second": second[0].T[..., None, None],
+        "second_bias": second[1],
+        "third": third[0].T[..., None, None],
+        "third_bias": third[1],
+    }
+    half = SIDE // 2
+    nodes = [
+        helper.make_node("Conv", ["picture", "near", "first"], ["edge"], kernel_shape=[SIDE, SIDE], pads=[half] * 4),
+        helper.make_node("Conv", ["picture", "far"], ["around"], kernel_shape=[SIDE, SIDE], dilations=[APART] * 2, pads=[half * APART] * 4),
+        helper.make_node("Add", ["edge", "around"], ["a"]),
+        helper.make_node("Relu", ["a"], ["b"]),
+        helper.make_node("Conv", ["b", "second", "second_bias"], ["c"], kernel_shape=[1, 1]),
+        helper.make_node("Relu", ["c"], ["d"]),
+        helper.make_node("Conv", ["d", "third", "third_bias"], ["shares"], kernel_shape=[1, 1]),
+    ]
+    put, out = (
+        helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, channels, "height", "width"])
+        for name, channels in (("picture", 3), ("shares", len(things)))
+    )
+    constants = [arrays.from_array(np.ascontiguousarray(one, np.float32), name) for name, one in weights.items()]
+    graph = helper.make_graph(nodes, "mobee", [put], [out], constants)
+    model = helper.make_model(graph, producer_name="mobee", ir_version=IR, opset_imports=[helper.make_opsetid("", OPSET)])
+    helper.set_model_props(model, {KEY: json.dumps({"format": FORMAT, "things": [asdict(one) for one in things]})})
+    onnx.checker.check_model(model)
+    return Network(tuple(things), model.SerializeToString())
+
+
+def load_network(path: str | Path) -> Network:
+    """Read the file of a network; raises InvalidValue for one that is none, NotInstalled without ONNX."""
+    onnx = _imported("onnx")
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidValue(f"{path}: cannot be read ({error.strerror}). `{TRAIN} FILE` writes such a file") from None
+    try:
+        model = onnx.load_model_from_string(content)
+        onnx.checker.check_model(model)
+    except Exception as error:  # the reader and the checker have no common base of their errors
+        raise InvalidValue(f"{path}: not an ONNX file, or a damaged one ({type(error).__name__}). Make it again: {TRAIN} FILE") from None
+    known = {one.key: one.value for one in model.metadata_props}
+    try:
+        plain: dict[str, Any] = json.loads(known[KEY])
+        if plain["format"] != FORMAT:
+            raise ValueError
+        things = tuple(
+            Thing(**{name: tuple(value) if isinstance(value, list) else value for name, value in one.items()}) for one in plain["things"]
+        )
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise InvalidValue(f"{path}: not a file of `{TRAIN}`: its metadata must have {KEY!r} with the format {FORMAT!r}") from None
+    network = Network(things, content)
+    try:
+        shape = network.shares()(np.zeros((2 * SIDE, 3 * SIDE, 3), np.uint8)).shape
+    except InvalidValue as error:
+        raise InvalidValue(f"{path}: {error}") from None
+    if shape != (len(things), 2 * SIDE, 3 * SIDE):
+        raise InvalidValue(f"{path}: the network's output has the shape {shape}, which does not fit its {len(things)} things")
+    return network
+
+
+def _looks(thing: Thing) -> tuple[str, str, tuple[float, ...], tuple[float, ...]]:
+    return thing.name, thing.kind, tuple(thing.size), tuple(thing.color)
+
+
+def _text(looks: tuple[str, str, tuple[float, ...], tuple[float, ...]]) -> str:
+    name, kind, size, color = looks
+    return f"{name} ({kind}, {' x '.join(f'{one:g}' for one in size)} m, colour {' '.join(f'{one:g}' for one in color)})"
+
+
+def _imported(name: str) -> Any:
+    """Import OpenCV or ONNX when it is needed."""
+    try:
+        if name == "cv2":
+            import cv2
+
+            return cv2
+        import onnx
+
+        return onnx
+    except ImportError:
+        raise NotInstalled(f'a learned detector needs {name}, which is not installed: pip install "mobee[vision]"') from None

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rendered pictures of things at random places before a robot's cameras, with the share of each thing in each pixel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mobee.arrays import Array
+from mobee.errors import InvalidValue
+from mobee.model.kinematics import link_transforms
+from mobee.model.world import World
+from mobee.rendering.camera import Floats
+from mobee.rendering.room import clutter, room
+from mobee.rendering.scene import Picture, Scene
+from mobee.robot.cameras import cameras_of
+from mobee.robot.robot import Robot
+from mobee.vision.exposure import Cameras
+from mobee.vision.imperfections import HEAD, CameraErrors, CameraSettings
+from mobee.vision.mount import camera_frames
+from mobee.vision.objects.thing import Thing
+
+_STREAM = 0x6C6561726E  # of random numbers
+LOOKS = 4  # pictures in each room
+SAMPLES = 2  # moments of the exposure
+DISTANCES = (0.22, 0.65)  # m from a camera, along its axis
+ASIDE = np.array([0.6, 0.45])  # largest slope of the ray to a thing, to the right and down
+MOVED = 0.15  # share of its range by which each motor but those of the head is away from home, at most
+BRIGHTNESS = (0.6, 1.1)  # factor on the picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labelled:
+    """A picture (H, W, 3), and the share of each thing in each of its pixels (H, W, N)."""
+
+    picture: Picture
+    shares: Floats
+
+
+def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count: int, seed: int) -> Iterator[Labelled]:
+    """Yield `count` pictures of imperfect cameras, of random postures, places of the things, rooms, clutter and brightness.
+
+    A quarter of what is in the room, and of the paper on the world's boxes, has the colours of the things.  Raises InvalidValue if the
+    robot has no camera.
+    """
+    cameras = cameras_of(robot)
+    if not cameras:
+        raise InvalidValue(f"{robot.name} has no camera: a detector is trained on pictures of the robot's cameras")
+    rng = np.random.default_rng([seed, _STREAM])
+    settings, colors = CameraSettings(samples=SAMPLES), tuple(thing.color for thing in things)
+    numbers = [list(world.objects).index(thing.name) for thing in things]
+    for number in range(count):
+        if number % LOOKS == 0:
+            drawn = int(rng.integers(2**31))
+            around = [*room(drawn, colors), *clutter(world.objects.values(), drawn, colors)]
+            scene = Scene(robot, world, cameras, around=around)
+            eyes = Cameras(scene, settings, CameraErrors.none(robot, list(cameras)), drawn)
+        name = list(cameras)[int(rng.integers(len(cameras)))]
+        q = _posture(robot, rng)
+        frame = camera_frames(cameras[name], link_transforms(robot, q), np.zeros(6))
+        for thing, at in _places(world, things, frame, rng).items():
+            yaw = rng.uniform(-np.pi, np.pi)
+            scene.place(thing, at, np.array([np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]))
+        postures = [q] * SAMPLES
+        brightness = rng.uniform(*BRIGHTNESS)
+        picture = np.clip(brightness * eyes.expose(name, postures) + 0.5, 0.0, 255.0).astype(np.uint8)
+        yield Labelled(picture, eyes.shares(name, postures, len(world.objects))[..., numbers])
+
+
+def _posture(robot: Robot, rng: np.random.Generator) -> Array:
+    """Return a posture (n,) rad: the head anywhere, the other motors near home."""
+    low, high = robot.limits.T
+    q = robot.home + MOVED * (high - low) * rng.uniform(-1.0, 1.0, len(low))
+    if HEAD in robot.parts:
+        where = robot.parts[HEAD].slice
+        q[where] = rng.uniform(low[where], high[where])
+    return np.clip(q, low, high)
+
+
+def _places(world: World, things: Sequence[Thing], frame: tuple[Array, Array], rng: np.random.Generator) -> Mapping[str, Array]:
+    """Return a place (3,) m of each thing ahead of a camera, on the top of a box of the world if it would be below."""
+    position, rotation = frame
+    found = {}
+    for thing in things:
+        slopes = ASIDE * rng.uniform(-1.0, 1.0, 2)
+        at = position + rng.uniform(*DISTANCES) * rotation @ np.array([*slopes, 1.0])
+        half = thing.size[0] if thing.kind == "sphere" else 0.5 * thing.size[-1]
+        for item in world.objects.values():
+            if item.kind == "box" and item.role == "obstacle":
+                local, sides = item.rotation.T @ (at - item.position), 0.5 * np.array(item.size)
+                if (np.abs(local[:2]) < sides[:2]).all() and local[2] < sides[2] + half:
+                    at = item.position + item.rotation @ np.array([*local[:2], sides[2] + half])
+        found[thing.name] = at
+    return found

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Regions of a thing in a picture, and their outlines, as detections."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core.regions import regions
+from mobee.vision.objects.detection import Detection
+
+AREA = 40.0  # px: smaller regions are ignored
+AROUND = 5  # px: side of the square in which the likeness of a whole pixel is looked up
+FEWEST = 16  # points of an outline
+MOST = 100  # points of an outline that are kept
+SOLID = 0.6  # share of its convex hull that a region must fill: the things are convex
+
+
+def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
+    """Return the regions of a thing as detections.
+
+    `likeness` (H, W): linear in the share of the pixel that shows the thing, 0 for none.  The likeness of a whole pixel is the largest one
+    nearby, and at least 1: values up to 1 are shares.
+    """
+    height, width = likeness.shape
+    found = []
+    for region in regions(likeness, AREA, AROUND):
+        outline, filled = region.outline, min(1.0, region.area / max(region.hull, 1e-9))
+        within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
+        if within.sum() < FEWEST or filled < SOLID:
+            continue
+        every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
+        found.append(Detection(name, outline[within][every], float(region.area), filled * float(within.mean())))
+    return found
