@@ -19,7 +19,7 @@ from mobee.errors import InvalidValue, NotInstalled
 from mobee.rendering.camera import Floats
 from mobee.rendering.scene import Picture
 from mobee.robot.writing import write_whole
-from mobee.vision.objects.thing import Thing
+from mobee.vision.objects.thing import KINDS, Thing
 
 FORMAT = "mobee detector 1"
 KEY = "mobee"  # of the metadata
@@ -128,9 +128,7 @@ def load_network(path: str | Path) -> Network:
         plain: dict[str, Any] = json.loads(known[KEY])
         if plain["format"] != FORMAT:
             raise ValueError
-        things = tuple(
-            Thing(**{name: tuple(value) if isinstance(value, list) else value for name, value in one.items()}) for one in plain["things"]
-        )
+        things = tuple(_thing(one) for one in plain["things"])
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InvalidValue(f"{path}: not a file of `{TRAIN}`: its metadata must have {KEY!r} with the format {FORMAT!r}") from None
     network = Network(things, content)
@@ -141,6 +139,14 @@ def load_network(path: str | Path) -> Network:
     if shape != (len(things), 2 * SIDE, 3 * SIDE):
         raise InvalidValue(f"{path}: the network's output has the shape {shape}, which does not fit its {len(things)} things")
     return network
+
+
+def _thing(plain: dict[str, Any]) -> Thing:
+    """Return a thing as the metadata have it; raises KeyError, TypeError, ValueError."""
+    if plain["kind"] not in KINDS:
+        raise ValueError(plain["kind"])
+    red, green, blue = map(float, plain["color"])
+    return Thing(str(plain["name"]), plain["kind"], tuple(map(float, plain["size"])), (red, green, blue), float(plain["tolerance"]))
 
 
 def _looks(thing: Thing) -> tuple[str, str, tuple[float, ...], tuple[float, ...]]:

@@ -27,6 +27,7 @@ LOOKS = 4  # pictures in each room
 SAMPLES = 2  # moments of the exposure
 DISTANCES = (0.22, 0.65)  # m from a camera, along its axis
 ASIDE = np.array([0.6, 0.45])  # largest slope of the ray to a thing, to the right and down
+ON_BOX, TRIES = 0.6, 40  # share of the pictures in which all things stand on boxes of the world; postures that are tried for one
 MOVED = 0.15  # share of its range by which each motor but those of the head is away from home, at most
 BRIGHTNESS = (0.6, 1.1)  # factor on the picture
 
@@ -58,9 +59,14 @@ def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count
             scene = Scene(robot, world, cameras, around=around)
             eyes = Cameras(scene, settings, CameraErrors.none(robot, list(cameras)), drawn)
         name = list(cameras)[int(rng.integers(len(cameras)))]
-        q = _posture(robot, rng)
-        frame = camera_frames(cameras[name], link_transforms(robot, q), np.zeros(6))
-        for thing, at in _places(world, things, frame, rng).items():
+        on_box = rng.uniform() < ON_BOX
+        for _ in range(TRIES):
+            q = _posture(robot, rng)
+            frame = camera_frames(cameras[name], link_transforms(robot, q), np.zeros(6))
+            places = _places(world, things, frame, rng)
+            if all(lifted for _, lifted in places.values()) or not on_box:
+                break
+        for thing, (at, _) in places.items():
             yaw = rng.uniform(-np.pi, np.pi)
             scene.place(thing, at, np.array([np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]))
         postures = [q] * SAMPLES
@@ -76,14 +82,18 @@ def _posture(robot: Robot, rng: np.random.Generator) -> Array:
     if HEAD in robot.parts:
         where = robot.parts[HEAD].slice
         q[where] = rng.uniform(low[where], high[where])
-    return np.clip(q, low, high)
+    found: Array = np.clip(q, low, high)
+    return found
 
 
-def _places(world: World, things: Sequence[Thing], frame: tuple[Array, Array], rng: np.random.Generator) -> Mapping[str, Array]:
-    """Return a place (3,) m of each thing ahead of a camera, on the top of a box of the world if it would be below."""
+def _places(
+    world: World, things: Sequence[Thing], frame: tuple[Array, Array], rng: np.random.Generator
+) -> Mapping[str, tuple[Array, bool]]:
+    """Return a place (3,) m of each thing ahead of a camera, on the top of a box of the world if it would be below, and whether it was."""
     position, rotation = frame
     found = {}
     for thing in things:
+        lifted = False
         slopes = ASIDE * rng.uniform(-1.0, 1.0, 2)
         at = position + rng.uniform(*DISTANCES) * rotation @ np.array([*slopes, 1.0])
         half = thing.size[0] if thing.kind == "sphere" else 0.5 * thing.size[-1]
@@ -92,5 +102,6 @@ def _places(world: World, things: Sequence[Thing], frame: tuple[Array, Array], r
                 local, sides = item.rotation.T @ (at - item.position), 0.5 * np.array(item.size)
                 if (np.abs(local[:2]) < sides[:2]).all() and local[2] < sides[2] + half:
                     at = item.position + item.rotation @ np.array([*local[:2], sides[2] + half])
-        found[thing.name] = at
+                    lifted = True
+        found[thing.name] = at, lifted
     return found
