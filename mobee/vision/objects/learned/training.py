@@ -121,7 +121,7 @@ def surroundings(picture: Picture, pixels: Ints) -> Floats:
 
 
 def _fit(regressor: Any, inputs: list[Floats], outputs: list[Floats], passes: int, step: float) -> None:
-    """Let a regressor go on learning, for some passes over all pixels."""
+    """Let a regressor continue learning, for some passes over all pixels."""
     regressor.set_params(max_iter=passes, learning_rate_init=step, n_iter_no_change=passes)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that it has not converged after so many passes
