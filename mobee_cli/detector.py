@@ -24,9 +24,9 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 
 WORLD = "things"
 _DESCRIPTION = "train a detector on rendered pictures of the targets of a world"
-_NOTES = """The targets of the world that have a colour are drawn at random places, in random
-rooms with paper of their colours. A small convolutional network learns how much
-of each pixel shows each of them, and is judged on pictures that it has not seen.
+_NOTES = """The targets of the world that have a colour are drawn at random places, in
+random rooms with paper of their colours. A small convolutional network learns
+how much of each pixel shows each of them, and is judged on other pictures.
 FILE holds the network and the things; the vision service uses it:
   mobee detector train things.onnx
   mobee launch eyes --set shared.world=things \\

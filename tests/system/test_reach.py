@@ -57,22 +57,17 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Launch, Wat
         yield pair
 
 
-@pytest.fixture(scope="module")
-def reached(live: tuple[Launch, Watcher]) -> dict[str, Any]:
-    """What the command prints after a reach of the running robot."""
-    return command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", live[0].endpoint)
-
-
-def test_the_command_reaches_a_place_in_the_running_system(live: tuple[Launch, Watcher], reached: dict[str, Any]) -> None:
-    _, watcher = live
+def test_the_command_reaches_a_place_in_the_running_system(live: tuple[Launch, Watcher]) -> None:
+    system, watcher = live
+    reached = command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", system.endpoint)
     assert reached["reached"] and reached["settled"]
     until(lambda: watcher.motions[PART][-1].epoch == 0, 2.0, "the goal to be released")
 
 
-@pytest.mark.usefixtures("reached")
 def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], tmp_path: Path) -> None:
     """Also just after a reach, when the torso turns back, which the reach's force had turned."""
     system, watcher = live
+    command("reach", "--target", "-0.3", "0.2", "0.1", "--endpoint", system.endpoint)
     seen: list[Playback] = []
     subscriber = watcher.session.declare_subscriber(
         Playback.stream.key(), lambda sample: seen.append(decode(Playback, sample.payload.to_bytes(), str(sample.encoding)))

@@ -14,6 +14,7 @@ from bus_schema import keys
 from bus_schema.messages import Answer, Clock, Command, Commands, Event, Order, State, StepDone
 from bus_schema.rpc import Done, Driven, Empty, Pace, Take, Taken, WithEpoch
 from mobee import load_robot
+from services.common.rpc import CallFailed
 from tests.services.harness import Rig, rig, wait_for
 
 ROBOT = load_robot("icub")
@@ -52,7 +53,7 @@ class Bench:
     def arm(self) -> None:
         self.rig.token("controller", "c1")
         self.epoch = self.rig.call(keys.drive("torso", "take"), Take, Taken, who="controller", instance="c1").epoch
-        self.rig.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch)
+        wait_for(self._is_armed, "robot_sim knows the token, and arms")
 
     def command(self, velocity: float, re_k: int) -> None:
         self.commands.put(epoch=self.epoch, re_k=re_k, mode="velocity", ref=[velocity, 0.0, 0.0], ttl=1000)
@@ -68,6 +69,14 @@ class Bench:
             return any(event.code == code and event.run == run and says in event.text for event in list(self.events))
 
         wait_for(is_heard, f"the event {code}: {says}")
+
+    def _is_armed(self) -> bool:
+        try:
+            return bool(self.rig.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch).gate == "armed")
+        except CallFailed as refused:
+            if refused.code != "no_token":  # tokens and calls come by different paths
+                raise
+            return False
 
     def stat(self) -> dict[str, float]:
         return self.rig.stat("robot_sim").numbers
