@@ -192,7 +192,7 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
 
 
 def chi_squared(share: float, freedom: int) -> float:
-    """Return the quantile of the chi-squared distribution: below it is that share of the squared norms of `freedom` normal numbers."""
+    """Return the number below which a share of the chi-squared distribution with `freedom` degrees of freedom lies."""
     from scipy.special import gammaincinv
 
     return float(2.0 * gammaincinv(0.5 * freedom, share))

@@ -75,19 +75,16 @@ class SideGrasp:
         marker: of the palm.
         motors: names of the parts and motors that move, without those of the fingers.
         starts: (S, n) rad, postures from which inverse kinematics starts, and near which it stays.
-        grip: of the hand.
-        gains: of the law: a posture keeps away from the zones before the limits; None: the default ones.
+        pushing: the robot in the world whose fields push it, if the things of `model` do not; None: `model`.
     """
 
-    def __init__(
-        self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, grip: Grip | None = None, gains: Gains | None = None
-    ) -> None:
-        self.model, self.marker, self.motors, self.grip = model, marker, tuple(motors), Grip() if grip is None else grip
-        self.hand = Hand(model.robot, marker)
-        self.gains = Gains.default() if gains is None else gains
+    def __init__(self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, pushing: Model | None = None) -> None:
+        self.model, self.marker, self.motors, self.grip = model, marker, tuple(motors), Grip()
+        self.hand, self.gains = Hand(model.robot, marker), Gains.default()
         self._moved = chosen(model.robot, motors)
         self._narrow = Model(_narrowed(model.robot, self._moved, self.gains), model.world)
-        self._controller = Controller(model, self.gains)
+        self._pushing = model if pushing is None else pushing
+        self._controller = Controller(self._pushing, self.gains)
         names = [model.robot.motors[index] for index in self.hand.motors]
         self._thumb, self._oppose, self._spread = (
             self.hand.motors[[word in name for name in names]] for word in ("thumb", "thumb_oppose", "hand_finger")
@@ -142,7 +139,7 @@ class SideGrasp:
         The hand may be near its target, whose field does not push it.
         """
         found = np.zeros(len(q))
-        found[self._moved] = self._controller.forces(self.model.evaluate(q, reaching=self.marker)).total[self._moved]
+        found[self._moved] = self._controller.forces(self._pushing.evaluate(q, reaching=self.marker)).total[self._moved]
         return found
 
     def attractor(self, q: Array) -> Array:

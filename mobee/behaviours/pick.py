@@ -26,8 +26,7 @@ AZIMUTHS = float(np.deg2rad(-20.0)), float(np.deg2rad(70.0))  # of the right han
 CLOSING, SQUEEZING = 2.0, 0.5  # s
 LIFT = 0.08  # m: higher, the forearm comes nearer to the body
 ABOVE = 0.004  # m above the height of the grasp at which the hand opens
-STAND_OFFS = (0.11, 0.0), (0.095, 0.0), (0.05, 0.1)
-"""m between thing and palm, and above the pre-grasp, from where the hand moves straight to the pre-grasp."""
+AWAY, HIGH = (0.11, 0.095), 0.1  # m between thing and palm, and m above the pre-grasp, from where the hand moves straight to it
 PUTS = 3  # places at which it tries to put a thing down
 NEAR = 0.7  # share of the motion down on which bumps are noticed: after it the thing may touch what it will stand on
 BUMPED = 0.06  # m around a place with a bump, in which no other is tried
@@ -137,10 +136,12 @@ def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
         if inner is None or up is None or outer is None:
             continue
         push = max(LITTLE_PUSH, *(grasp.push(q) for q in (outer, inner, up)))
-        for gap, above in STAND_OFFS:
+        for gap, above in (*((gap, 0.0) for gap in AWAY), (grasp.grip.before, HIGH)):
             away = beside(grasp, thing, azimuth, gap, above, outer[None])
-            path = None if away is None else np.stack([away, outer, inner])
-            if away is not None and path is not None and np.abs(np.diff(path, axis=0)).max() <= FARTHEST and is_free(grasp.model, path):
+            if away is None:
+                continue
+            path = np.stack([away, outer, inner])
+            if np.abs(np.diff(path, axis=0)).max() <= FARTHEST and is_free(grasp.model, path):
                 found.append((push, PreGrasp(azimuth, away, outer, above > 0.0)))
     return [one for _, one in sorted(found, key=lambda each: (each[1].above, each[0]))]
 
@@ -170,7 +171,7 @@ class Picker:
         self._there: Array | None = None  # (n,) rad, of the pre-grasp
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
-    def stand(self, q: Array) -> Array:
+    def settle_at(self, q: Array) -> Array:
         """Bring torso and arm to q (n,) rad; return the attractor (n,) rad that this needs.
 
         What remains after a settled motion is added to the attractor, a few times.
@@ -191,10 +192,10 @@ class Picker:
 
     def arrive(self, goal: PreGrasp, watch: BumpWatch | None = None) -> bool:
         """Move the hand, which is away from the thing, straight to the pre-grasp; return whether it bumped into something then."""
-        self.stand(goal.away)
+        self.settle_at(goal.away)
         if self.move(np.stack([goal.away, goal.posture]), SLOW, watch):
             return True
-        self.stand(goal.posture)
+        self.settle_at(goal.posture)
         self._there = goal.posture
         return False
 
@@ -203,7 +204,7 @@ class Picker:
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
         self.move(np.stack([there, here]), SLOW)
-        aim, fingers = self.stand(here), self.grasp.hand.motors
+        aim, fingers = self.settle_at(here), self.grasp.hand.motors
         # The fingers arrive before the thumb, which pushes the thing into them.
         aim[fingers] = self.grasp.closed(here)[fingers]
         self.body.press(aim, CLOSING)
@@ -227,26 +228,34 @@ class Picker:
 
         The first place at which the law pushes little is taken.  Where hand or thing bumps into something on the motion down, the hand
         goes up again, to another place.  `centre`: (3,) m, where the thing is seen; None: where the hand has gripped it.
-        Raises NoPosture.
+        Raises NoPosture if no place works; then the thing stands where it was lifted, or is still in the hand if it does not come there.
         """
         slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
         held = self._model_with(thing, slipped)
-        for _ in range(PUTS):
-            motion = self._motion_to(thing, places, slipped, held)
-            if motion is None:
-                break
-            self.move(motion.path[:2], GENTLE)
-            up, down = motion.path[1:]
-            near = up + NEAR * (down - up)
-            if not self.move(np.stack([up, near]), SLOW, BumpWatch(self.grasp.model.robot, self.watched)):
-                self.move(np.stack([near, down]), SLOW)
-                opened = self.grasp.opened(down)
-                self.move(np.stack([down, opened]), FAST)
-                self.move(np.stack([opened, motion.back]), SLOW)
+        bumps = 0
+        while bumps < PUTS and (motion := self._motion_to(thing, places, slipped, held)) is not None:
+            if self._set_down(motion):
                 return motion.place
-            self.move(np.stack([self._held(self.body.q), up]), GENTLE)
+            bumps += 1
             places = [place for place in places if np.linalg.norm(place - motion.place) > BUMPED]
-        raise NoPosture(f"none of the places on the table can be reached with the thing in the hand; {len(places)} were not tried")
+        back = self._motion_to(thing, [thing.place], slipped, held)
+        is_back = back is not None and self._set_down(back)
+        where = "it stands where it was lifted" if is_back else "it is still in the hand"
+        raise NoPosture(f"no place to put the thing down, after {bumps} bumps: {where}")
+
+    def _set_down(self, motion: _Motion) -> bool:
+        """Move the thing to a place, open the hand and retreat; return False after a bump on the motion down, with the thing in the air."""
+        self.move(motion.path[:2], GENTLE)
+        up, down = motion.path[1:]
+        near = up + NEAR * (down - up)
+        if self.move(np.stack([up, near]), SLOW, BumpWatch(self.grasp.model.robot, self.watched)):
+            self.move(np.stack([self._held(self.body.q), up]), GENTLE)
+            return False
+        self.move(np.stack([near, down]), SLOW)
+        opened = self.grasp.opened(down)
+        self.move(np.stack([down, opened]), FAST)
+        self.move(np.stack([opened, motion.back]), SLOW)
+        return True
 
     def _motion_to(self, thing: Upright, places: Sequence[Array], slipped: Array, held: Model) -> _Motion | None:
         """Return the motion to the first place at which the law pushes little, or else that with the smallest push; None without one."""

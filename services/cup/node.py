@@ -116,7 +116,9 @@ class CupNode:
                 turn = matrix_from_quaternion(np.array(item.quaternion))
                 world.add(item.name, grown, position=item.position, rotation=turn, role="target")
         self._planned = world
-        grasp = SideGrasp(Model(self._robot, world), self._config.marker, MOTORS, icub_starts(self._robot))
+        # While it fetches, the things are ghosts in the model's world: their fields do not push.
+        pushing = self._grasp.model
+        grasp = SideGrasp(Model(self._robot, world), self._config.marker, MOTORS, icub_starts(self._robot), pushing)
         return Picker(self._body, grasp, WATCHED)
 
     def _planner(self, picker: Picker) -> MapPlanner:

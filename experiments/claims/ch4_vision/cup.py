@@ -71,7 +71,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return a row for each planner, and why trials ended early; `planning`: processor time of all plans of a trial."""
     rows: dict[str, Any] = {}
     reasons: dict[str, Any] = {}
-    for name, runs in grouped(found, "method", tuple(METHODS)).items():
+    groups = grouped(found, "method", tuple(METHODS))
+    for name, runs in groups.items():
         came = [run for run in runs if run["distance"] >= 0.0]
         rows[METHODS[name]] = {
             "placements": len(runs),
@@ -86,7 +87,6 @@ def findings(found: Cells) -> dict[str, Any]:
             "robot time, s": round(float(np.median([run["seconds"] for run in runs])), 0),
         }
         reasons[METHODS[name]] = _reasons(runs)
-    groups = grouped(found, "method", tuple(METHODS))
     whole = len(groups) == len(METHODS) and min(map(len, groups.values())) >= WHOLE
     return {"planners": rows, "ended": reasons, "claims": judged(CLAIMS, groups, whole)}
 

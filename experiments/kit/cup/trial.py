@@ -85,7 +85,7 @@ class Trial:
 
     def run(self) -> Result:
         """Make the trial."""
-        self.picker.stand(ready())
+        self.picker.settle_at(ready())
         found = self._approach()
         result = self.result
         result.bumps, result.plans, result.planning = found.bumps, found.plans, found.planning

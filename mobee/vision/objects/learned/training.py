@@ -88,7 +88,7 @@ def held_out(robot: Robot, world: World, things: Sequence[Thing], pictures: int,
 
 
 def _chosen(shares: Floats, rng: np.random.Generator) -> Ints:
-    """Return pixels of a picture, row * width + column: of the edges and the inside of each thing, and of the rest."""
+    """Return the pixels of a picture from which it learns, as row * width + column: some at edges, some inside things, some outside."""
     anything = np.zeros(shares.shape[:2], np.bool_)
     found = []
     for number in range(shares.shape[2]):

@@ -67,12 +67,12 @@ class Oracle:
 
 
 @pytest.mark.parametrize("name", [*FOREIGN, *SHIPPED])
-def test_links_and_jacobians_are_those_of_pinocchio_at_50_poses(tmp_path: Path, name: str) -> None:
+def test_links_and_jacobians_are_those_of_pinocchio_at_200_poses(tmp_path: Path, name: str) -> None:
     robot = load_robot(name if name in SHIPPED else foreign(name))
     oracle = Oracle(robot, write_urdf(robot, tmp_path / "x.urdf") if name in SHIPPED else foreign(name))
     matrix, offset = robot.coupling
     rest = oracle.frames(np.zeros(len(robot.joints)))
-    for q in np.random.default_rng(8).uniform(*robot.limits.T, size=(50, len(robot.motors))):
+    for q in np.random.default_rng(8).uniform(*robot.limits.T, size=(200, len(robot.motors))):
         motion = link_transforms(robot, q)
         frames = oracle.frames(matrix @ q + offset)
         for index, link in enumerate(robot.links):
