@@ -249,8 +249,8 @@ CLAIMS = (accuracy, honest, nothing_false)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each robot, and the claims."""
-    groups = grouped(found, "world", ("things",))
+    """Return a row for each robot, and the claims, which are those of the detector by colour."""
+    groups = grouped({name: cell for name, cell in found.items() if "detector" not in cell.cell.settings}, "world", ("things",))
     return {"runs": {name: _row(cell.values) for name, cell in found.items()}, "claims": judged(CLAIMS, groups, bool(groups))}
 
 
