@@ -37,6 +37,7 @@ from mobee.roadmap.ompl import require_ompl
 
 MAP = "map"
 ENOUGH = {"pre_grasp": 0.9, "done": 0.75}  # shares of the placements
+QUICK = 2  # placements of a short version
 WHOLE = 100  # placements of each planner, with which the claims are judged
 METHODS = {MAP: "pre-grasp map", "learner": "learned reacher", "rrt": "inverse kinematics and RRT-Connect"}
 
@@ -45,7 +46,8 @@ Runs = Sequence[Mapping[str, Any]]
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return a condition for each planner."""
-    return [Condition(name, {"method": name}) for name in METHODS]
+    seeds = tuple(range(arguments.seed, arguments.seed + QUICK)) if arguments.quick else ()
+    return [Condition(name, {"method": name}, seeds=seeds) for name in METHODS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
