@@ -169,6 +169,7 @@ class Picker:
         robot = grasp.model.robot
         self.motors: Ints = chosen(robot, grasp.motors)
         self._there: Array | None = None  # (n,) rad, of the pre-grasp
+        self._passed: list[Array] = []  # (n,) rad, beside the thing, at it, and above with it
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
     def settle_at(self, q: Array) -> Array:
@@ -204,6 +205,7 @@ class Picker:
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
         self.move(np.stack([there, here]), SLOW)
+        self._passed = [there, here]
         aim, fingers = self.settle_at(here), self.grasp.hand.motors
         # The fingers arrive before the thumb, which pushes the thing into them.
         aim[fingers] = self.grasp.closed(here)[fingers]
@@ -216,6 +218,7 @@ class Picker:
         """Lift the thing straight up; raises NoPosture."""
         up = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT))
         self.move(np.stack([self._held(self.body.q), up]), GENTLE)
+        self._passed.append(up)
 
     def slipped(self, thing: Upright, centre: Array) -> Array:
         """Return how far a thing whose centre is seen at (3,) m has slipped in the hand, (3,) m in the frame of the palm."""
@@ -228,7 +231,7 @@ class Picker:
 
         The first place at which the law pushes little is taken.  Where hand or thing bumps into something on the motion down, the hand
         goes up again, to another place.  `centre`: (3,) m, where the thing is seen; None: where the hand has gripped it.
-        Raises NoPosture if no place works; then the thing stands where it was lifted, or is still in the hand if it does not come there.
+        Raises NoPosture if no place works; then the hand has moved back, and the thing stands where it was lifted, unless it bumped again.
         """
         slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
         held = self._model_with(thing, slipped)
@@ -238,8 +241,8 @@ class Picker:
                 return motion.place
             bumps += 1
             places = [place for place in places if np.linalg.norm(place - motion.place) > BUMPED]
-        back = self._motion_to(thing, [thing.place], slipped, held)
-        is_back = back is not None and self._set_down(back)
+        before, there, up = self._passed
+        is_back = self._set_down(_Motion(thing.place, np.stack([self._held(self.body.q), up, self._held(there)]), before))
         where = "it stands where it was lifted" if is_back else "it is still in the hand"
         raise NoPosture(f"no place to put the thing down, after {bumps} bumps: {where}")
 
