@@ -132,7 +132,7 @@ def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
 
 @dataclass(slots=True)
 class Approach:
-    """How an approach went: azimuth [rad] of the pre-grasp, None if it gave up; bumps, plans, processor time of the plans [s]."""
+    """How an approach went: azimuth [rad] of the pre-grasp, None if it gave up; bumps, plans, processor time of their paths [s]."""
 
     azimuth: float | None = None
     bumps: int = 0

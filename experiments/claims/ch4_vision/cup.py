@@ -29,7 +29,7 @@ import numpy as np
 
 from experiments.kit.cup.trial import ANGLE, LIFTED, NEAR, run_trial
 from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, judged
-from experiments.kit.plots import draw_points, finish, new_figure
+from experiments.kit.plots import finish, new_figure
 from experiments.kit.rules import decides
 from experiments.kit.statistics import share_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -55,10 +55,15 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     return run_trial(settings["method"], seed)
 
 
-def _share(runs: Runs, name: str) -> str:
+def _share(runs: Runs, name: str) -> tuple[float, float, float]:
+    """Return the share of the trials in which something was so, and its interval."""
     count = sum(bool(run[name]) for run in runs)
-    low, high = share_interval(count, len(runs))
-    return f"{count / len(runs):.2f} [{low:.2f}, {high:.2f}]"
+    return count / len(runs), *share_interval(count, len(runs))
+
+
+def _text(runs: Runs, name: str) -> str:
+    share, low, high = _share(runs, name)
+    return f"{share:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def _reasons(runs: Runs) -> dict[str, int]:
@@ -78,9 +83,9 @@ def findings(found: Cells) -> dict[str, Any]:
         came = [run for run in runs if run["distance"] >= 0.0]
         rows[METHODS[name]] = {
             "placements": len(runs),
-            "pre-grasp": _share(runs, "pre_grasp"),
-            "lifted": _share([run | {"up": run["lifted"] >= LIFTED} for run in map(dict, runs)], "up"),
-            "lifted and placed": _share(runs, "done"),
+            "pre-grasp": _text(runs, "pre_grasp"),
+            "lifted": _text([run | {"up": run["lifted"] >= LIFTED} for run in map(dict, runs)], "up"),
+            "lifted and placed": _text(runs, "done"),
             "distance, mm": round(1e3 * float(np.median([run["distance"] for run in came])), 1) if came else None,
             "angle, deg": round(float(np.rad2deg(np.median([run["angle"] for run in came]))), 1) if came else None,
             "knocked over": sum(bool(run["knocked"]) for run in runs),
@@ -102,9 +107,10 @@ def _placed(groups: Mapping[str, Runs]) -> Measured:
 
 
 def _often(groups: Mapping[str, Runs], name: str) -> Measured:
-    runs = groups[MAP]
-    span = share_interval(sum(bool(run[name]) for run in runs), len(runs))
-    return "; ".join(f"{METHODS[key]} {_share(group, name)}" for key, group in groups.items()), decides(span, least=ENOUGH[name])
+    _, *span = _share(groups[MAP], name)
+    return "; ".join(f"{METHODS[key]} {_text(group, name)}" for key, group in groups.items()), decides(
+        (span[0], span[1]), least=ENOUGH[name]
+    )
 
 
 CLAIMS = (
@@ -130,10 +136,11 @@ def plot(found: Cells) -> Any:
     drawing = new_figure(9.0, 3.4)
     left, right = drawing.subplots(1, 2)
     names = [METHODS[name].replace(" and ", "\nand ") for name in groups]
-    for key, label, color in (("pre_grasp", "pre-grasp", "C0"), ("done", "lifted and placed", "C2")):
-        draw_points(
-            left, names, [[float(run[key]) for run in runs] for runs in groups.values()], fmt="o", color=color, label=label, capsize=3
-        )
+    for aside, (key, label, color) in enumerate((("pre_grasp", "pre-grasp", "C0"), ("done", "lifted and placed", "C2"))):
+        shares, low, high = np.array([_share(runs, key) for runs in groups.values()]).T
+        at = np.arange(len(groups)) + 0.16 * aside - 0.08
+        left.errorbar(at, shares, [shares - low, high - shares], fmt="o", color=color, capsize=3, label=label)
+    left.set_xticks(range(len(names)), names)
     finish(left, legend=8.0, ylabel="share of placements", ylim=(0.0, 1.02))
     left.tick_params(axis="x", labelsize=7)
     for number, (name, runs) in enumerate(groups.items()):
