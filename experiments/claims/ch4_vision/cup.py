@@ -107,10 +107,9 @@ def _placed(groups: Mapping[str, Runs]) -> Measured:
 
 
 def _often(groups: Mapping[str, Runs], name: str) -> Measured:
-    _, *span = _share(groups[MAP], name)
-    return "; ".join(f"{METHODS[key]} {_text(group, name)}" for key, group in groups.items()), decides(
-        (span[0], span[1]), least=ENOUGH[name]
-    )
+    _, low, high = _share(groups[MAP], name)
+    text = "; ".join(f"{METHODS[key]} {_text(group, name)}" for key, group in groups.items())
+    return text, decides((low, high), least=ENOUGH[name])
 
 
 CLAIMS = (
@@ -138,8 +137,8 @@ def plot(found: Cells) -> Any:
     names = [METHODS[name].replace(" and ", "\nand ") for name in groups]
     for aside, (key, label, color) in enumerate((("pre_grasp", "pre-grasp", "C0"), ("done", "lifted and placed", "C2"))):
         shares, low, high = np.array([_share(runs, key) for runs in groups.values()]).T
-        at = np.arange(len(groups)) + 0.16 * aside - 0.08
-        left.errorbar(at, shares, [shares - low, high - shares], fmt="o", color=color, capsize=3, label=label)
+        places = np.arange(len(groups)) + 0.16 * aside - 0.08
+        left.errorbar(places, shares, [shares - low, high - shares], fmt="o", color=color, capsize=3, label=label)
     left.set_xticks(range(len(names)), names)
     finish(left, legend=8.0, ylabel="share of placements", ylim=(0.0, 1.02))
     left.tick_params(axis="x", labelsize=7)
