@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from bus_schema import VERSION, encode, encoding_of
 from bus_schema.messages import EStop
@@ -54,7 +55,8 @@ def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) ->
     def message(sets: bool, reason: str) -> bytes:
         return encode(EStop(v=VERSION, run="r", src="test", seq=0, k=0, t=0, tw=0, set=sets, source="test", reason=reason))
 
-    key, how = EStop.stream.key(), {"encoding": encoding_of(EStop)}
+    # Without blocking, Zenoh drops messages of such a burst: a real stop is repeated, this one is sent once.
+    key, how = EStop.stream.key(), {"encoding": encoding_of(EStop), "congestion_control": zenoh.CongestionControl.BLOCK}
     with open_client(bus.endpoint) as session:
         line = StopLine(session)
         wait_for(lambda: bus.session.put(key, message(True, "first"), **how) or line.take(), "the first stop")
