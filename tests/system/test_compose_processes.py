@@ -47,6 +47,7 @@ def test_the_composed_system_learns(tmp_path: Path) -> None:
         until(lambda: (tmp_path / "transitions.sqlite").exists(), 60.0, "the agents have begun")
         with Watcher(endpoint) as watcher:
             watcher.wait_until_moved(AGENTS)
+            watcher.pid("vision")  # the agents do not wait for it
             until(lambda: watcher.stat("vision").numbers["located"] > 0, 30.0, "the ball is located")
         until(lambda: any(transitions(tmp_path).values()), 60.0, "a transition is on disk")
         until(lambda: "ready as" in (tmp_path / "monitor.log").read_text(), 60.0, "the monitor can end in order")
