@@ -111,6 +111,8 @@ BENCHES = {
             "--seconds": _number("how long each lasts (default: 10)", positive_number, "S"),
             "--period": _number("mean time between two faults (default: 4)", positive_number, "S"),
             "--shrink": _number("performances to shrink a schedule that breaks a promise (default: none)"),
+            "--scenario": {"metavar": "NAME", "help": "launched without monitor (default: kinematic)"},
+            "--quiet": _number("first without faults, whose transitions are compared (default: 0)", positive_number, "S"),
         },
     ),
     "network": Bench(

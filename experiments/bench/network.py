@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,17 +25,15 @@ import msgspec
 import numpy as np
 
 from bus_schema.authority import AGENT, party_of
-from bus_schema.messages import Tick
 from experiments.bench.faults import BACK_AT_MOST, NOISE, QUIET
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import LaunchFailed, stop
 from experiments.kit.live.network import FIRST, Network, inside
-from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, violations
+from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, too_old, violations
 from experiments.kit.live.system import wait_for
 from experiments.kit.live.wire import Faults
 from mobee.robot.load import load_robot
 from services.common.identity import Identity, assume
-from services.common.observe import Received, listen
 from services.common.session import open_client
 
 ENDPOINT = f"tls/{FIRST}:7447"
@@ -45,7 +43,6 @@ LAYOUTS: Mapping[str, tuple[str, ...]] = {"agent": ("agent_left_arm", "monitor")
 """The services of the second host."""
 BEYOND = "left_arm"  # the part whose agent is on the second host
 UNDER_WAY = 0.5  # s after the beginning of a cut within which a call of the agent may still arrive
-OLDEST = 0.1  # s
 _START, _BACK, _QUIET_TIME = 120.0, 60.0, 1.0  # s
 _ALL_SERVICES = ("robot_sim", "model", "controller", "monitor", "recorder", "launcher", f"launcher_{HOST}")
 
@@ -90,27 +87,6 @@ class Settings:
 QUICK = Settings(faults=("loss 5 %", "cut", "silent cut"), seconds=3.0)
 
 
-@dataclass
-class _Ticks:
-    """When each tick was published, by robot_sim's clock."""
-
-    begun: dict[tuple[str, int], float] = field(default_factory=dict)  # run, k -> s
-
-    def note(self, received: Received) -> None:
-        tick = received.content()
-        self.begun[tick["run"], tick["k"]] = 1e-9 * tick["tw"]
-
-    def age(self, moment: Moment) -> float | None:
-        """Return the least age [s] of the command that a part obeyed in a tick; None if it held, or a tick was not received.
-
-        A tick is published after the gate has judged, and a busy machine may take long between the two: the tick before gives a bound.
-        """
-        if moment.mode == "hold" or moment.age < 1:
-            return None
-        before, asked = self.begun.get((moment.run, moment.k - 1)), self.begun.get((moment.run, moment.k - moment.age))
-        return None if before is None or asked is None else before - asked
-
-
 def measure(settings: Settings) -> dict[str, Any]:
     """Disturb the network of a system on two hosts, and return all measurements and the verdict; raises LaunchFailed."""
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
@@ -152,7 +128,7 @@ class _Hosts:
 
     def __init__(self, folder: Path, layout: str, seed: int) -> None:
         self._folder, self._layout, self._seed = folder, layout, seed
-        self._robot, self._observer, self._ticks = load_robot("icub"), Observer(), _Ticks()
+        self._robot, self._observer = load_robot("icub"), Observer()
         self._stack = ExitStack()
 
     def __enter__(self) -> _Hosts:
@@ -169,7 +145,6 @@ class _Hosts:
             assume(Identity(self._keys, "operator"))
             session = failed.enter_context(open_client(ENDPOINT))
             self._observer.attach(session)
-            listen(session, Tick.stream.key(), self._ticks.note)
             self._wait_until_back()
             self._stack = failed.pop_all()
         return self
@@ -180,8 +155,7 @@ class _Hosts:
     def disturb(self, fault: Fault, seconds: float) -> dict[str, Any]:
         """Disturb the network for a time, wait until all parts are back, and return what was measured."""
         wait_for(lambda: self._moves(BEYOND), _BACK, f"{BEYOND} moves")
-        self._observer.take_states()
-        self._ticks.begun.clear()
+        self._observer.take()
         time.sleep(_QUIET_TIME)
         begin = time.monotonic()
         self._set(fault, True)
@@ -196,12 +170,8 @@ class _Hosts:
         time.sleep(_QUIET_TIME)
         self._require_running("first")
         self._require_running("second")
-        states = self._observer.take_states()
-        ages = [age for moments in states.values() for moment in moments if (age := self._ticks.age(moment)) is not None]
-        oldest = max(ages, default=0.0)
-        if oldest > OLDEST:
-            broken.append(f"a command was obeyed {1e3 * oldest:.0f} ms after the tick that it answers began")
-        broken += violations(states, self._robot, NOISE)
+        states, ages = self._observer.take()
+        broken += [*too_old(ages), *violations(states, self._robot, NOISE)]
         stops = [found for moments in states.values() if (found := stop_after(moments, begin, healed)) is not None]
         if self._layout == "control" and fault.cuts and any(found.hold is None for found in stops):
             broken.append("a part did not hold although its controller was beyond the cut")
@@ -212,7 +182,7 @@ class _Hosts:
             "fault": fault.name,
             "seconds": seconds,
             "load": os.getloadavg()[0],
-            "oldest_ms": 1e3 * oldest,
+            "oldest_ms": 1e3 * max(ages, default=0.0),
             "commands": len(ages),
             "held": sorted(
                 part for part, moments in states.items() if any(begin < one.at <= healed and one.gate != "armed" for one in moments)

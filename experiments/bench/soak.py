@@ -2,16 +2,20 @@
 """A system that runs for hours: memory, open files and threads of its processes, and whether it becomes slower.
 
 Claim: after a warm-up of a tenth of the time no process is started again, the memory of each grows by less than 5 MB, open files and
-threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  Three agents
-learn on the motor model, in lockstep, where a robot hour takes minutes; or live, with --scenario, in real time.  The recorder runs.
+threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  The ages of the
+commands that the motors obey have the same distribution in both: the shares up to each age differ by at most .05.  Three agents learn on
+the motor model, in lockstep, where a robot hour takes minutes and a command always answers the tick before; or live, with --scenario, in
+real time.  The recorder runs.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
+import threading
 import time
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from bus_schema import decode
-from bus_schema.messages import Clock
+from bus_schema.messages import Tick
 from bus_schema.rpc import Stat
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import LaunchFailed
@@ -27,7 +31,7 @@ from experiments.kit.live.system import running, stat_of, wait_for
 from services.common.observe import Received, alive, listen
 from services.common.session import open_client
 
-MOST_GROWTH, MOST_SLOWER = 5.0, 1.2  # MB; last tenth over first tenth
+MOST_GROWTH, MOST_SLOWER, MOST_APART = 5.0, 1.2, 0.05  # MB; last tenth over first tenth; of two shares
 WARM = 0.1  # share of the robot's time before the first number counts
 SAMPLES = 200  # of the whole run
 _SHORTEST = 1.0  # s between two samples
@@ -46,31 +50,54 @@ class Settings:
 QUICK = Settings(hours=0.2)
 
 
+@dataclass(slots=True)
+class _Ticks:
+    """The robot's time, and how often the motors of a part obeyed a command of each age."""
+
+    now: int = -1  # ns
+    ages: Counter[int] = field(default_factory=Counter)  # ticks
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def note(self, received: Received) -> None:
+        tick = decode(Tick, received.payload, received.encoding)
+        with self.lock:
+            self.now = tick.t
+            self.ages.update(part.cmd_age for part in tick.parts.values() if part.mode != "hold")
+
+    def take_ages(self) -> Counter[int]:
+        """Return the ages since the last call."""
+        with self.lock:
+            taken, self.ages = self.ages, Counter()
+        return taken
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    passed: float  # s of this machine
+    at: float  # s of the robot
+    stats: dict[str, Stat]
+    ages: Counter[int]  # since the sample before
+
+
 def measure(settings: Settings) -> dict[str, Any]:
     """Run the system and read the status of its processes; raises LaunchFailed."""
-    clock: list[int] = []
-
-    def note(received: Received) -> None:
-        clock[:] = [decode(Clock, received.payload, received.encoding).t]
-
-    end = settings.hours * 3600e9
-    rows: list[tuple[float, float, dict[str, Stat]]] = []  # s of this machine, s of the robot, status
+    ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:
         with open_client(system.endpoint) as session:
-            listen(session, Clock.stream.key(), note)
+            listen(session, Tick.stream.key(), ticks.note)
             names = sorted({*alive(session)} - {"router"})
-            wait_for(lambda: bool(clock), _PATIENCE, "the robot's clock")
-            begun, first = time.monotonic(), clock[0]
+            wait_for(lambda: ticks.now >= 0, _PATIENCE, "the robot's clock")
+            begun, first = time.monotonic(), ticks.now
             while True:
+                passed, at = time.monotonic() - begun, 1e-9 * (ticks.now - first)
                 if system.process.poll() is not None:
-                    raise LaunchFailed(f"the system has ended after {1e-9 * (clock[0] - first):.0f} s of the robot")
-                now, at = time.monotonic(), clock[0]
-                rows.append((now - begun, 1e-9 * (at - first), _stats(session, names)))
-                progress.show(min(1.0, (at - first) / end), f"{(at - first) / 3600e9:.2f} h of the robot")
-                if at - first >= end:
+                    raise LaunchFailed(f"the system has ended after {at:.0f} s of the robot")
+                samples.append(_Sample(passed, at, _stats(session, names), ticks.take_ages()))
+                progress.show(min(1.0, at / end), f"{at / 3600.0:.2f} h of the robot")
+                if at >= end:
                     break
-                time.sleep(_until_next(now - begun, (at - first) / end))
-    return _judged(rows, names)
+                time.sleep(_until_next(passed, at / end))
+    return _judged(samples, names)
 
 
 def _until_next(passed: float, share: float) -> float:
@@ -82,27 +109,46 @@ def _stats(session: Any, names: list[str]) -> dict[str, Stat]:
     return {who: wait_for(partial(stat_of, session, who, 2.0), _PATIENCE, f"{who} answers") for who in names}
 
 
-def _judged(rows: list[tuple[float, float, dict[str, Stat]]], names: list[str]) -> dict[str, Any]:
-    hours = rows[-1][1] / 3600.0
-    kept = [row for row in rows if row[1] >= WARM * rows[-1][1]]
+def _judged(samples: list[_Sample], names: list[str]) -> dict[str, Any]:
+    hours = samples[-1].at / 3600.0
+    kept = [sample for sample in samples if sample.at >= WARM * samples[-1].at]
     if len(kept) < 10:
         raise LaunchFailed(f"{len(kept)} samples after the warm-up are too few: run it for more --hours")
-    at = np.array([row[1] for row in kept]) / 3600.0
-    processes = {who: _process(at, [row[2][who] for row in kept]) for who in names}
-    paces = [(after[0] - before[0]) / max(after[1] - before[1], 1e-9) for before, after in zip(kept, kept[1:], strict=False)]
+    at = np.array([sample.at for sample in kept]) / 3600.0
+    processes = {who: _process(at, [sample.stats[who] for sample in kept]) for who in names}
+    paces = [(after.passed - before.passed) / max(after.at - before.at, 1e-9) for before, after in zip(kept, kept[1:], strict=False)]
     tenth = max(1, len(paces) // 10)
     slower = float(np.median(paces[-tenth:]) / np.median(paces[:tenth]))
-    restarted = [who for who in names if len({row[2][who].pid for row in rows}) > 1]
+    early, late = (sum((sample.ages for sample in group), Counter[int]()) for group in (kept[1 : tenth + 1], kept[-tenth:]))
+    restarted = [who for who in names if len({sample.stats[who].pid for sample in samples}) > 1]
     steady = all(one["grown_mb"] < MOST_GROWTH and not one["more_files"] and not one["more_threads"] for one in processes.values())
+    apart = _apart(early, late)
     return {
         "robot_hours": hours,
-        "seconds": rows[-1][0],
+        "seconds": samples[-1].passed,
         "processes": processes,
         "slower": slower,
+        "ages": {"first": _ages(early), "last": _ages(late)},
+        "apart": apart,
         "restarted": restarted,
         "load": os.getloadavg()[0],
-        "passed": steady and slower <= MOST_SLOWER and not restarted,
+        "passed": steady and slower <= MOST_SLOWER and apart <= MOST_APART and not restarted,
     }
+
+
+def _ages(counts: Counter[int]) -> dict[str, float]:
+    """Return median, 99th percentile and largest of the ages [ticks]."""
+    values = np.repeat(list(counts), list(counts.values()))
+    if not values.size:
+        raise LaunchFailed("the motors obeyed no command in a tenth of the time")
+    return {"p50": float(np.percentile(values, 50)), "p99": float(np.percentile(values, 99)), "max": float(values.max())}
+
+
+def _apart(first: Counter[int], second: Counter[int]) -> float:
+    """Return the largest difference of the two distribution functions (the statistic of Kolmogorov and Smirnov)."""
+    ages = sorted({*first, *second})
+    shares = [np.cumsum([counts[age] for age in ages]) / counts.total() for counts in (first, second)]
+    return float(np.abs(shares[0] - shares[1]).max())
 
 
 def _process(hours: Any, stats: list[Stat]) -> dict[str, float]:
@@ -129,6 +175,9 @@ def report(result: dict[str, Any]) -> str:
         lines.append(
             f"{who:<18}{one['memory_mb']:>10.1f}{one['grown_mb']:>8.1f}{slope:>18}{one['more_files']:>+8.0f}{one['more_threads']:>+9.0f}"
         )
+    for which, one in result["ages"].items():
+        lines.append(f"Age of commands, {which} tenth: median {one['p50']:.0f}, p99 {one['p99']:.0f}, largest {one['max']:.0f} ticks.")
+    lines.append(f"Largest difference of their distribution functions: {result['apart']:.3f}.")
     lines.append(f"A tick of the last tenth over one of the first: {result['slower']:.2f}.")
     lines.append(f"Processes that were started again: {', '.join(result['restarted']) or 'none'}.")
     return "\n".join(lines)

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bus_schema.messages import Motion, State, Transition
+from bus_schema.messages import Motion, State, Tick, Transition
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from mobee.store import STORE, TransitionStore
@@ -20,7 +20,9 @@ from services.common.observe import Received, listen
 
 MOVES = np.deg2rad(2.0)  # rad/s; a part that is slower is at rest
 FRESH = 0.5  # s; an older state says nothing about now
+_RECENT = 100  # ticks that are kept, so that the first states after `take` have ages
 FACTOR = 1.05  # of the gate's limit: encoders are noisy
+OLDEST = 0.1  # s between the beginning of a tick and of the last one in which a command that answers it may be obeyed
 
 
 @dataclass
@@ -40,19 +42,28 @@ class Moment:
 
 @dataclass
 class Observer:
-    """Records the states of all parts and the transitions that agents publish."""
+    """Records the states of all parts, when each tick began, and the transitions that agents publish."""
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
+    ticks: dict[tuple[str, int], float] = field(default_factory=dict)  # run, k -> s, by robot_sim's monotonic clock
     motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, when they came
     published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
     conflicts: list[str] = field(default_factory=list)  # a line for each number under which two different transitions were published
+    locked: bool = False  # whether the robot runs in lockstep
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def attach(self, session: Any) -> None:
         """Subscribe to the streams of all parts and agents."""
+        listen(session, Tick.stream.key(), self._note_tick)
         listen(session, State.stream.keys(), self._note_state)
         listen(session, Motion.stream.keys(), self._note_motion)
         listen(session, Transition.stream.keys(), self._note_transition)
+
+    def _note_tick(self, received: Received) -> None:
+        tick = received.content()
+        with self.lock:
+            self.ticks[tick["run"], tick["k"]] = 1e-9 * tick["tw"]
+            self.locked = tick["mode"] == "lock"
 
     def _note_state(self, received: Received) -> None:
         state = received.content()
@@ -97,11 +108,18 @@ class Observer:
             newest = [states[-1] for states in self.parts.values()]
         return len(newest) == count and all(one.gate == "armed" and one.at > since for one in newest)
 
-    def take_states(self) -> dict[str, list[Moment]]:
-        """Return the states so far, and keep only the last of each part."""
+    def take(self) -> tuple[dict[str, list[Moment]], list[float]]:
+        """Return the states so far and the ages [s] of the commands that they obeyed; keep only the last state of each part.
+
+        An age is a lower bound: a tick is published after the gate has judged, and a busy machine may take long between the two, so that
+        the tick before is the one that counts.  A state whose ticks were not received has none.
+        """
         with self.lock:
             taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
-        return taken
+            ticks, self.ticks = self.ticks, dict(list(self.ticks.items())[-_RECENT:])
+        obeyed = (one for moments in taken.values() for one in moments if one.mode != "hold" and one.age >= 1)
+        spans = ((ticks.get((one.run, one.k - 1)), ticks.get((one.run, one.k - one.age))) for one in obeyed)
+        return taken, [before - asked for before, asked in spans if before is not None and asked is not None]
 
 
 @dataclass(frozen=True)
@@ -159,6 +177,12 @@ def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -
             if (excess > 0.0).any():
                 found.append(f"{part}: {np.rad2deg(excess.max()):.2f} deg too far in {after.t - before.t:.3f} s at tick {after.k}")
     return found
+
+
+def too_old(ages: Sequence[float]) -> list[str]:
+    """Return a line if a command was obeyed later than OLDEST; `ages` [s] as `Observer.take` returns them."""
+    oldest = max(ages, default=0.0)
+    return [f"a command was obeyed {1e3 * oldest:.0f} ms after the tick that it answers began"] if oldest > OLDEST else []
 
 
 @dataclass(frozen=True)

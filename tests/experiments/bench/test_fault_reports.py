@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reports and verdicts of the benchmarks of stops and faults on given results; nothing is launched here."""
+"""Reports and verdicts of the benchmarks of stops, faults and long runs on given results; nothing is launched here."""
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import pytest
 
-from experiments.bench import faults, stop
+from bus_schema.rpc import Stat
+from experiments.bench import faults, soak, stop
 from experiments.kit.live.faults import Fault
 from experiments.kit.live.observer import Kept, Stop
 
@@ -16,7 +18,15 @@ FINE = Kept(97, 0, 0, 0)
 
 def result(load: float, hold: float = 0.02, broken: tuple[str, ...] = (), kept: Kept = FINE) -> dict[str, Any]:
     stops = [("kill", Stop(hold, 0.1, 0.01))] * 10
-    row = {"seed": 7, "schedule": ["1.00 s kill model"], "load": load, "back_s": 1.2, "broken": list(broken), "stops": stops}
+    row = {
+        "seed": 7,
+        "schedule": ["1.00 s kill model"],
+        "load": load,
+        "back_s": 1.2,
+        "oldest_ms": 30.0,
+        "broken": list(broken),
+        "stops": stops,
+    }
     row["actions"] = [("agent", True), ("model", False)]
     return faults._result(faults.Settings(schedules=1, seed=7), [row], kept, 12.0)
 
@@ -55,3 +65,21 @@ def test_the_report_of_stops_fits_80_columns_and_names_ended_processes() -> None
     report = stop.report(given)
     assert "ENDED: model" in report and "LATE: tokens" in report
     assert max(len(line.partition("  ENDED")[0]) for line in report.splitlines()) <= 80
+
+
+@pytest.mark.parametrize(
+    ("rate", "grow", "aged", "passed"), [(1.0, 0.0, 0, True), (1.3, 0.0, 0, False), (1.0, 0.1, 0, False), (1.0, 0.0, 1, False)]
+)
+def test_a_long_run_is_judged_by_growth_pace_and_ages(rate: float, grow: float, aged: int, passed: bool) -> None:
+    samples, now = list[Any](), 0.0
+    for n in range(101):
+        late = n > 90
+        now += 0.1 * (rate if late else 1.0)
+        health: dict[str, Any] = {"memory_mb": 100.0 + grow * n, "files": 20, "threads": 4}
+        stat = Stat(v=1, who="model", instance="i1", pid=7, uptime=1.0, ready=True, text="", numbers={}, rejected={}, health=health)
+        samples.append(soak._Sample(now, 36.0 * n, {"model": stat}, Counter({1: 100, 2 + aged * late: 10})))
+    found = soak._judged(samples, ["model"])
+    assert found["passed"] is passed
+    assert found["slower"] == pytest.approx(rate)
+    assert found["apart"] == pytest.approx(aged * 10 / 110)
+    assert max(map(len, soak.report(found).splitlines())) <= 80
