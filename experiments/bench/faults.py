@@ -101,8 +101,8 @@ class _DisturbedSystem:
         states, ages = self.observer.take()
         if self.observer.locked:  # the robot waits for those who are absent, however long
             return {
-                "back_s": 0.0,
-                "oldest_ms": 0.0,
+                "back_s": None,
+                "oldest_ms": None,
                 "broken": [*broken, *violations(states, self._robot, NOISE)],
                 "stops": [],
                 "actions": [],

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 
 import atheris
 
-PACKAGES = ["mobee", "bus_schema", "services.launcher", "services.recorder", "services.common.config"]
+PACKAGES = ["mobee", "bus_schema", "services"]
 
 with atheris.instrument_imports(include=PACKAGES):
-    from tests.fuzz import files, readers
+    from tests.fuzz import files, handlers, readers
     from tests.fuzz.harness import fuzz
 
 READERS = {  # what each is fed, its seeds, and whether they are elements and attributes
@@ -21,6 +22,7 @@ READERS = {  # what each is fed, its seeds, and whether they are elements and at
     "store": (files.feed_store, files.store_seeds, False),
     "recording": (files.feed_recording, files.recording_seeds, False),
     "message": (files.feed_message, files.message_seeds, False),
+    **{who: (handlers.feeder(who), partial(handlers.seeds_of, who), False) for who in handlers.SERVICES},
 }
 
 if __name__ == "__main__":

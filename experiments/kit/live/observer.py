@@ -60,7 +60,10 @@ class Observer:
         listen(session, Transition.stream.keys(), self._note_transition)
 
     def _note_tick(self, received: Received) -> None:
-        tick = received.content()
+        try:
+            tick = received.content()
+        except ValueError:  # floods have the key of ticks, too
+            return
         with self.lock:
             self.ticks[tick["run"], tick["k"]] = 1e-9 * tick["tw"]
             self.locked = tick["mode"] == "lock"
@@ -162,13 +165,13 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
     """Return a line for each broken promise in the states of one schedule; `noise`: largest of the encoders, rad.
 
-    Within a run time never goes back, and no motor is faster than the gate allows.
+    Within a run time never goes back, and no motor is faster than the gate allows.  In lockstep tick 0 is repeated until all have answered.
     """
     found = []
     for part, moments in states.items():
         limit = np.array([motor.max_velocity for motor in robot.motor_table[robot.part(part).slice]])
         for before, after in zip(moments[:-1], moments[1:], strict=True):
-            if before.run != after.run:
+            if before.run != after.run or before.k == after.k == 0:
                 continue
             if after.k <= before.k:
                 found.append(f"{part}: tick {after.k} after tick {before.k}")
