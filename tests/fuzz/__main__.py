@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from functools import partial
 
@@ -29,4 +30,10 @@ if __name__ == "__main__":
     if len(sys.argv) < 2 or sys.argv[1] not in READERS:
         sys.exit(f"usage: python -m tests.fuzz {{{','.join(READERS)}}} [-max_total_time=SECONDS ...]")
     feed, seeds, is_xml = READERS[sys.argv.pop(1)]
-    fuzz(feed, seeds(), readers.words(seeds()) if is_xml else [])
+    code: int | str | None = 1
+    try:
+        fuzz(feed, seeds(), readers.words(seeds()) if is_xml else [])
+    except SystemExit as ended:
+        code = ended.code
+    finally:
+        os._exit(code if isinstance(code, int) else 1)  # an open session would keep the interpreter from exiting

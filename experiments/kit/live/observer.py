@@ -199,20 +199,19 @@ class Kept:
 
 
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
-    """Compare the published transitions with the store of a run."""
+    """Compare the transitions that were published so far with the store of a run, whose agents may still be learning."""
+    with observer.lock:
+        published, conflicts = dict(observer.published), len(observer.conflicts)
     kept = lost = differing = gaps = 0
     with TransitionStore(run_dir / STORE, "", read_only=True) as store:
-        on_disk = {
-            agent: {one.n: (one.s, one.a, one.s_next, one.settled, one.duration) for one in store.load(agent)} for agent in store.agents()
-        }
-        counts = {agent: len(store.times(agent)) for agent in on_disk}
-    for agent, made in on_disk.items():
-        kept += counts[agent]
-        gaps += counts[agent] - len(made)
-    with observer.lock:
-        for (agent, n), values in observer.published.items():
-            if agent in agents:
-                found = on_disk.get(agent, {}).get(n)
-                lost += found is None
-                differing += found is not None and found != values
-    return Kept(kept, lost, differing + len(observer.conflicts), gaps)
+        stored = {agent: store.load(agent) for agent in store.agents()}
+    on_disk = {agent: {one.n: (one.s, one.a, one.s_next, one.settled, one.duration) for one in made} for agent, made in stored.items()}
+    for agent, made in stored.items():
+        kept += len(made)
+        gaps += len(made) - len(on_disk[agent])
+    for (agent, n), values in published.items():
+        if agent in agents:
+            found = on_disk.get(agent, {}).get(n)
+            lost += found is None
+            differing += found is not None and found != values
+    return Kept(kept, lost, differing + conflicts, gaps)
