@@ -8,6 +8,7 @@ Nothing is read from the network.  A warning of Sphinx is an error: a page that 
 
 from __future__ import annotations
 
+import gc
 import posixpath
 import re
 import shutil
@@ -40,6 +41,7 @@ def build(out: Path) -> int:
     """Write the site into a folder; return Sphinx's exit code."""
     from sphinx.cmd.build import main as sphinx
 
+    gc.disable()  # the trees of all pages stay until the end: to search them for garbage takes long
     with tempfile.TemporaryDirectory() as folder:
         stage(Path(folder))
         code: int = sphinx(["-q", "-W", "--keep-going", "-b", "html", "-c", str(HERE), folder, str(out)])

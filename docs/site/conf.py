@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib import metadata
 from typing import Any
+
+from sphinx.search.en import SearchEnglish
 
 project = "MoBeE"
 author = "The MoBeE developers"
@@ -30,6 +33,14 @@ napoleon_numpy_docstring = False
 suppress_warnings = ["ref.python"]  # annotations hold short names, such as Pose, which the library and the bus both have
 
 
+class _Stems(SearchEnglish):
+    """The words of the search: each is reduced to its stem once, not wherever it stands."""
+
+    def __init__(self, options: dict[str, str]) -> None:
+        super().__init__(options)
+        self.stem = cache(self.stem)  # type: ignore[method-assign]
+
+
 def _as_restructured_text(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Make of a docstring's Markdown, `code` and plain text, what reStructuredText shows in the same way."""
     del app, what, name, thing, options
@@ -41,5 +52,6 @@ def _as_restructured_text(app: Any, what: str, name: str, thing: Any, options: A
 
 
 def setup(app: Any) -> None:
-    """Tell Sphinx about the conversion of docstrings; it comes before that of napoleon."""
+    """Tell Sphinx about the search and the conversion of docstrings, which comes before that of napoleon."""
+    app.add_search_language(_Stems)
     app.connect("autodoc-process-docstring", _as_restructured_text, priority=100)
