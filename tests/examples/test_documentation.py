@@ -6,12 +6,12 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from experiments.kit.live.launch import stop
+from services.common.session import open_client
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -143,18 +143,10 @@ def test_the_readers_own_agent_moves_the_free_arm(tmp_path: Path, free_port: int
     endpoint = f"tcp/127.0.0.1:{free_port}"
     launcher = launch(tmp_path, "free_arm.toml", endpoint)
     try:
-        wait_for_router(endpoint, tmp_path)
+        open_client(endpoint, patience=60.0).close()  # its router is there
         assert run(tmp_path, "my_agent.py", endpoint).startswith("Transition(n=2, ")
     finally:
         stop(launcher)
-
-
-def wait_for_router(endpoint: str, folder: Path) -> None:
-    give_up = time.monotonic() + 60
-    status = [sys.executable, "-m", "mobee_cli", "status", "--endpoint", endpoint]
-    while subprocess.run(status, cwd=folder, capture_output=True).returncode != 0:
-        assert time.monotonic() < give_up
-        time.sleep(0.2)
 
 
 def anchors(page: Path) -> set[str]:

@@ -76,8 +76,11 @@ RUN_HERE = (
 )
 """Commands on the pages that run here in this order, in one folder."""
 
-QUICKER = {"mobee roadmap build palm-down -o palm.npz": "--method least_squares"}
-"""Options with which a command takes a second instead of many; tests/mobee/roadmap tests all methods."""
+QUICKER = {
+    "mobee roadmap build palm-down -o palm.npz": "--method least_squares",  # tests/mobee/roadmap tests all methods
+    "mobee experiment run hypercube-exploration": "--seeds 2",
+}
+"""Options with which a command takes a second instead of many."""
 
 RUN_ELSEWHERE = {
     r"./launch": "tests/services/launcher/test_run.py",
