@@ -46,6 +46,7 @@ ROBOT = load_robot("icub")
 MOTORS = len(ROBOT.motors)
 SERVICES = ("robot_sim", "model", "controller", "agent_left_arm", "recorder", "vision", "launcher")
 IDENTITIES = (*SERVICES, "agent_torso", "monitor", "operator", "observer")
+SLOW = ("services.robot_sim.speed=1.0", "services.robot_sim.rate=50")  # a quarter of the messages; the robot need not learn
 UNKNOWN = 65534  # number of a user who owns nothing here
 SETTLE = 0.3  # s in which a message would arrive
 
@@ -102,7 +103,7 @@ def authority_of(secured: Secured, folder: Path) -> Path:
 def secured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Secured]:
     folder = tmp_path_factory.mktemp("intruders")
     made = make_keys(folder / "keys", *IDENTITIES, "renderer")
-    with running(folder, "tests/system/one_arm.toml", keys=made) as (system, watcher):
+    with running(folder, "tests/system/one_arm.toml", *SLOW, keys=made) as (system, watcher):
         found = Secured(system, watcher, made)
         found.pids = {who: watcher.pid(who) for who in ("robot_sim", "model", "controller", "agent_left_arm")}
         until(lambda: watcher.states["head"] and watcher.states["head"][-1].gate == "armed", 20.0, "the robot is armed")
