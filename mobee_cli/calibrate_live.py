@@ -8,7 +8,7 @@ import logging
 import os
 import signal
 import time
-from contextlib import suppress
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +36,7 @@ from mobee_cli.calibrate import rig_of
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
 from services.common import rpc
-from services.common.bus_plant import BusPlant
+from services.common.bus_follow import BusFollower
 from services.common.config import ServiceConfig
 from services.common.exit_codes import ENVIRONMENT, FAILED
 from services.common.hands import part_of
@@ -86,7 +86,7 @@ def calibrated_live(endpoint: str, marker: str, count: int, seed: int) -> Calibr
         with Service(WHO, ServiceConfig(endpoint=endpoint, robot=robot.name), robot, session=session) as service:
             signal.signal(signal.SIGINT, signal.default_int_handler)
             logging.getLogger().setLevel(logging.CRITICAL)
-            plant, pictures = BusPlant(service, robot, moved_parts(rig, part)), Pictures(service, rig)
+            plant, pictures = BusFollower(service, robot), Pictures(service, rig)
             service.on_clock(lambda clock: None)
             service.ready()
             lens = _lens(service, pictures)
@@ -94,8 +94,7 @@ def calibrated_live(endpoint: str, marker: str, count: int, seed: int) -> Calibr
             with Progress() as progress:
                 postures = choose_postures(rig, Model(robot, world_around(world, robot.name)), settings, part, count, seed)
                 seen = _watch(service, plant, pictures, rig, part, postures, progress)
-            with suppress(rpc.CallFailed):  # a goal that was lost meanwhile needs no release
-                plant.leave()
+            plant.let_go()
     return calibrate(rig, seen, settings)
 
 
@@ -123,15 +122,14 @@ def _lens(service: Service, pictures: Pictures) -> Lens:
 
 
 def _watch(
-    service: Service, plant: BusPlant, pictures: Pictures, rig: Rig, part: str, postures: Array, progress: Progress
+    service: Service, plant: BusFollower, pictures: Pictures, rig: Rig, part: str, postures: Array, progress: Progress
 ) -> list[Observation]:
     """Move through postures (K, n) rad; return what was seen of the tag while the robot moved, and at rest."""
     found, parts = [], moved_parts(rig, part)
     for number, posture in enumerate(postures):
         progress.show(number / len(postures), "watching the hand")
         pictures.shots.clear()
-        for which in parts:
-            _move(plant, which, posture[rig.robot.part(which).slice])
+        _move(plant, parts, posture)
         moving = len(pictures.shots)
         service.spin(time.monotonic() + REST)
         middle = [pictures.shots[int(moving * share)] for share in np.linspace(0.2, 0.5, MOVING)] if moving else []
@@ -141,16 +139,17 @@ def _watch(
     return found
 
 
-def _move(plant: BusPlant, part: str, target: Array) -> None:
-    """Move a part to a target (n_part,) rad, again after a hold; raises UserError if it is interrupted every time."""
+def _move(plant: BusFollower, parts: Sequence[str], posture: Array) -> None:
+    """Move parts to a posture (n,) rad at once, again after a hold; raises UserError if they are interrupted every time."""
     why = ""
     for _ in range(TRIES):
         try:
-            plant.measure(part)
-            plant.act(part, target)
+            plant.take(parts)
+            plant.follow(parts, [posture], period=0.0)
             return
         except ActionInterrupted as interruption:
             why = str(interruption)
+            plant.let_go()  # else the next attempt would begin by what was known before
     raise UserError(f"the robot was interrupted {TRIES} times: {why}. `mobee status` shows its state.", FAILED)
 
 
