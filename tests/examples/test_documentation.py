@@ -141,7 +141,7 @@ def test_the_readers_own_robot_runs_live(tmp_path: Path, free_port: int) -> None
 def test_the_readers_own_agent_moves_the_free_arm(tmp_path: Path, free_port: int) -> None:
     blocks("docs/agents.md", tmp_path)
     endpoint = f"tcp/127.0.0.1:{free_port}"
-    launcher = launch(tmp_path, "free_arm.toml", endpoint)
+    launcher = launch(tmp_path, "free_arm.toml", endpoint, "--set", "services.robot_sim.rate=50")
     try:
         open_client(endpoint, patience=60.0).close()  # its router is there
         assert run(tmp_path, "my_agent.py", endpoint).startswith("Transition(n=2, ")

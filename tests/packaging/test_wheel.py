@@ -38,7 +38,8 @@ class Installed:
         self.bin = folder / "venv/bin"
         self.packages = next((folder / "venv").glob("lib/python*/site-packages"))
         pip = [sys.executable, "-m", "pip", "--python", self.bin / "python", "--disable-pip-version-check", "--no-input"]
-        subprocess.run([*pip, "install", "--quiet", "--no-deps", "--no-index", self.wheel], check=True)
+        options = ["--quiet", "--no-deps", "--no-index", "--no-compile"]  # what the tests import is compiled then, a part of all
+        subprocess.run([*pip, "install", *options, self.wheel], check=True)
         # As a line of a .pth file the folder is only added to the path: an editable installation of MoBeE in it stays unseen.
         (self.packages / "others.pth").write_text(sysconfig.get_paths()["platlib"] + "\n")
 
