@@ -267,7 +267,7 @@ CALLS = (
     Call("{part}/rpc/drive/{verb}", ("take",), Take, Taken, ("robot_sim",), _DRIVERS),
     Call("{part}/rpc/drive/{verb}", ("arm", "release", "hold"), WithEpoch, Driven, ("robot_sim",), _DRIVERS),
     Call("sim/rpc/{verb}", ("reset", "pause", "resume"), Empty, Done, ("robot_sim",), _PERSONS),
-    Call("sim/rpc/{verb}", ("place",), Place, Done, ("robot_sim",), _PERSONS),
+    Call("sim/rpc/{verb}", ("place",), Place, Done, ("robot_sim",), (*_PERSONS, "agent")),
     Call("sim/rpc/{verb}", ("pace",), Pace, Done, ("robot_sim",), _PERSONS),
     Call("estop/rpc/{verb}", ("reset",), Empty, Done, ("robot_sim",), (*_PERSONS, "port_filter")),
     Call("{part}/rpc/{verb}", ("take",), Take, Taken, ("controller",), (*_USERS, "behaviour")),

@@ -4,5 +4,5 @@
 Reads: clock, {part}/motion, {part}/reach.
 Writes: agents/{part}/{transition,learned}.
 Answers: agent_{part}/rpc/{rest,resume,explore}.
-Calls: {part}/rpc/{take,goal,reach} of the controller, model/rpc/world/{add,remove}.
+Calls: {part}/rpc/{take,goal,reach} of the controller, model/rpc/world/{add,remove,list}; sim/rpc/place, if `put_back` is set.
 """

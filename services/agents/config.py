@@ -5,19 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from math import prod
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec import Meta
 
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS
+from mobee.learning.grid import Grid
 from mobee.learning.lattice import Lattice
 from mobee.learning.learner import CuriousSettings
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors import PREDICTORS
 from mobee.learning.reaching.strategies import STRATEGIES
-from mobee.learning.space import MAX_STATES
+from mobee.learning.space import MAX_STATES, Space
 from mobee.learning.transitions import DIVERGENCES
 from mobee.reach import RADIUS
 from mobee.robot.robot import Robot
@@ -62,11 +65,13 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     part: str = "left_arm"
     """Part that the agent moves."""
     joints: tuple[str, ...] = ()
-    """Motors that span the state space; empty: all of the part, or shoulder and elbow of a part that has a motor called elbow."""
-    levels: tuple[float, ...] = (0.25, 0.5, 0.75)
-    """Fractions of each joint's range at which the samples lie."""
-    neighbours: Annotated[int, Meta(ge=0)] = 0
-    """Number of nearest states that each state has actions to; 0: the published 8 of the torso, 16 of an arm."""
+    """Motors that span the state space; empty: those that `levels` names, else all of the part, or shoulder and elbow of a part that has
+    a motor called elbow."""
+    levels: tuple[float, ...] | Mapping[str, tuple[float, ...]] = (0.25, 0.5, 0.75)
+    """Fractions of each joint's range at which the samples lie; or those of each joint, as { l_elbow = [0.5, 0.8] }."""
+    neighbours: Annotated[int, Meta(ge=0)] | Literal["equidistant"] = 0
+    """Number of nearest states that each state has actions to, or "equidistant": those one step away along one joint; 0: the published 8
+    of the torso, 16 of an arm."""
     tie_seed: int = 0
     """Seed of the draw among equally near neighbours."""
     goal: tuple[Annotated[int, Meta(ge=0)], ...] = ()
@@ -79,6 +84,16 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     """File of transitions, or folder of a run, with which it begins if it has none of its own, as those learned offline; it is recorded."""
     rest: tuple[float, ...] = ()
     """Fraction of its range at which each motor of its part stays while it is not one of `joints`; empty: the middle."""
+    object: str = ""
+    """Object whose place is a part of each state, by its name in the model's world; empty: a state is a posture alone."""
+    area: tuple[tuple[float, float], ...] = ()
+    """Where the object may stand: lowest and highest x, and lowest and highest y of its centre, m, root frame."""
+    cells: tuple[int, int] = (3, 3)
+    """Number of cells along x and along y into which the area is divided; a state holds one of them."""
+    aside: Annotated[int, Meta(ge=0)] = 0
+    """Posture, as a number, to which the part moves when the object is not seen: from there nothing hides it, and it has room to stand."""
+    put_back: tuple[float, ...] = ()
+    """Position, m, at which the simulator sets the object down when it is not seen from `aside` either; empty: a person puts it back."""
     transitions: Annotated[int, Meta(ge=0)] = 0
     """Number of transitions after which the agent ends; 0: no limit."""
     targets: tuple[tuple[float, float, float], ...] = ()
@@ -99,6 +114,7 @@ class Config(LearningConfig, frozen=True, kw_only=True):
             require_name(kind, getattr(self, kind), table)
         if not self.learned:  # else the space is read from that run
             self.space(robot)
+        self._check_object()
         if not self.targets:
             return
         marker = self.marker or hand_of(robot, self.part)
@@ -114,21 +130,49 @@ class Config(LearningConfig, frozen=True, kw_only=True):
         """Return the settings of a reach agent."""
         return ReachSettings(**self._given(ReachSettings))
 
-    def space(self, robot: Robot) -> Lattice:
-        """Make the lattice, by default that of thesis 7.4 for the part; raises MobeeError if the settings make none."""
+    def space(self, robot: Robot) -> Space:
+        """Make the space; raises MobeeError if the settings make none.
+
+        By default the lattice of thesis 7.4 for the part; with an object its postures, each with every cell.
+        """
+        postures = self._postures(robot)
+        if not self.object:
+            return postures
+        if len(self.area) != 2:
+            given = [list(one) for one in self.area]
+            raise InvalidValue(f"area = {given}: give [[low, high], [low, high]] of x and y in m, for {self.object}.")
+        space = ObjectSpace(postures, Grid(*self.area, self.cells), self.object)
+        postures.target(self.aside)
+        return space
+
+    def _postures(self, robot: Robot) -> Lattice:
         part = robot.part(self.part)
         is_arm = any(name.endswith("elbow") for name in part.motors)
-        joints = self.joints or tuple(name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS))
-        if len(self.levels) ** len(joints) > MAX_STATES:
+        own = tuple(self.levels) if isinstance(self.levels, Mapping) else ()
+        joints = self.joints or own or tuple(name for name in part.motors if not is_arm or name.endswith(ARM_JOINTS))
+        sizes = [len(one) for one in self.levels.values()] if isinstance(self.levels, Mapping) else [len(self.levels)] * len(joints)
+        count = prod(map(float, sizes))
+        if count > MAX_STATES:
+            given = f"{sizes[0]} levels of {len(joints)} motors" if len(set(sizes)) == 1 else f"{' x '.join(map(str, sizes))} levels"
             raise InvalidValue(
-                f"{len(self.levels)} levels of {len(joints)} motors make {len(self.levels) ** len(joints):.3g} states, and an agent can "
+                f"{given} make {count:.3g} states, and an agent can "
                 f"have {MAX_STATES}: choose some motors of {self.part!r}, for example joints = {_listed(joints[:4])}."
             )
-        return Lattice(robot, joints, self.levels, self._neighbours(len(joints), is_arm), tie_seed=self.tie_seed, rest=self.rest or 0.5)
+        neighbours = self.neighbours or min(16 if is_arm else 8, int(count) - 1)  # the published ones, or all other states
+        return Lattice(robot, joints, self.levels, neighbours, tie_seed=self.tie_seed, rest=self.rest or 0.5)
 
-    def _neighbours(self, joints: int, is_arm: bool) -> int:
-        """Return the number of neighbours: as set, else the published one, or all other states if there are fewer."""
-        return self.neighbours or min(16 if is_arm else 8, len(self.levels) ** joints - 1)
+    def _check_object(self) -> None:
+        """Raise InvalidValue if the settings of an object contradict each other."""
+        if not self.object:
+            if self.area or self.put_back:
+                raise InvalidValue("area and put_back are settings of an object: name it with object, or leave them out.")
+            return
+        if self.targets:
+            raise InvalidValue(f"object = {self.object!r} is for curious agents, and targets for those that learn to reach: leave one out.")
+        if len(self.put_back) not in (0, 3):
+            raise InvalidValue(f"put_back = {list(self.put_back)}: give x, y and z of the centre of {self.object} in m, or leave it out.")
+        if self.put_back and not all(low <= at <= high for at, (low, high) in zip(self.put_back, self.area, strict=False)):
+            raise InvalidValue(f"put_back = {list(self.put_back)} is outside the area {[list(one) for one in self.area]}.")
 
     def _given(self, settings: type[Settings]) -> dict[str, Any]:
         return {one.name: getattr(self, one.name) for one in fields(settings) if one.name not in TASK}

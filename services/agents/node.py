@@ -15,12 +15,14 @@ from bus_schema.messages import Transition as TransitionMessage
 from bus_schema.rpc import Done, Empty, Explore
 from mobee import ActionInterrupted, CuriousAgent, MobeeError, ReachTarget
 from mobee.learning.explorers import EXPLORERS
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.record import load_learned
 from mobee.robot.robot import Robot
-from mobee.store import STORE, TransitionStore, store_of
+from mobee.store import STORE, Transition, TransitionStore, store_of
 from services.agents.config import Config
+from services.agents.object_plant import ObjectPlant
 from services.agents.store_wait import StoreWait
 from services.agents.streams import LearnedStream, ReachStream, publish_decision, publish_transition
 from services.common.bus_plant import BusPlant
@@ -79,7 +81,9 @@ class AgentNode:
         plant = BusPlant(service, robot, (config.part,))
         continued = store_of(Path(config.continues)) if config.continues else None
         space, settings = config.space(robot), config.curious()
-        self._agent = wait.until_accepted(lambda: CuriousAgent(space, plant, settings=settings, store=store, continues=continued))
+        self._object = ObjectPlant(service, plant, config, space) if isinstance(space, ObjectSpace) else None
+        seeing = self._object or plant
+        self._agent = wait.until_accepted(lambda: CuriousAgent(space, seeing, settings=settings, store=store, continues=continued))
         if store is not None:
             wait.let_append_wait(store)
         self._stream = service.bus.publisher(TransitionMessage, config.part)
@@ -125,17 +129,25 @@ class AgentNode:
             return
         self._made += 1
         self._timeouts += not made.settled
+        self._moves += self._moved_object(made)
         self._seconds += made.duration
         publish_transition(self._stream, agent.space, made.n, made, value, float(believed[outcomes == made.s_next].sum()))
         self._publish_learned()
+
+    def _moved_object(self, made: Transition) -> bool:
+        """Return whether the object was in another cell after a transition."""
+        space = self._agent.space
+        return isinstance(space, ObjectSpace) and space.cell(made.s) != space.cell(made.s_next)
 
     def _publish_learned(self) -> None:
         agent = self._agent
         self._learned.put(agent.transitions, agent.state, lambda: (agent.model.reward, agent.plan()[1]))
 
     def _mark(self) -> None:
-        self._made = self._timeouts = self._work.interrupted = 0
+        self._made = self._timeouts = self._moves = self._work.interrupted = 0
         self._seconds = 0.0
+        if self._object is not None:
+            self._object.absences = self._object.retreats = 0
 
     def _describe(self) -> tuple[str, dict[str, float]]:
         numbers = {
@@ -145,7 +157,11 @@ class AgentNode:
             "interrupted": self._work.interrupted,
             "action_time_mean": self._seconds / self._made if self._made else NOT_MEASURED,
         }
-        return f"{self._wait.status_prefix()}{self._agent.transitions} transitions, {self._made} now", numbers
+        text, seen = f"{self._agent.transitions} transitions, {self._made} now", self._object
+        if seen is not None:
+            numbers |= {"object_moves": self._moves, "object_absences": seen.absences, "retreats": seen.retreats}
+            text = f"{'waits until its object is back; ' if seen.is_absent else ''}{text}"
+        return f"{self._wait.status_prefix()}{text}", numbers
 
 
 class ReachNode:

@@ -115,9 +115,9 @@ class ReachClient:
         sphere = Geometry(kind="sphere", size=[target.radius])
         self._call("add", AddObject, name=TARGET, geometry=sphere, position=target.position.tolist(), quaternion=UPRIGHT, role="target")
 
-    def places(self) -> dict[str, Array]:
-        """See `BusPlant.places`."""
-        return {one.name: np.array(one.position) for one in self._listed().objects if not one.link}
+    def objects(self) -> dict[str, ObjectState]:
+        """See `BusPlant.objects`."""
+        return {one.name: one for one in self._listed().objects if not one.link}
 
     def _listed(self) -> World:
         try:
@@ -238,7 +238,11 @@ class BusPlant:
         A perceived object that is stale is left out.  For an agent whose states hold where an object is:
         `PerceivingPlant(plant, plant.places)`.  Raises ActionInterrupted while the model does not answer.
         """
-        return self._reaches.places()
+        return {name: np.array(one.position) for name, one in self.objects().items()}
+
+    def objects(self) -> dict[str, ObjectState]:
+        """Return the free objects in the model's world, by name, with role and time of the newest picture; otherwise as `places`."""
+        return self._reaches.objects()
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """See mobee.reach.ReachPlant."""
@@ -298,6 +302,16 @@ class BusPlant:
             self._wait(lambda: not self._is_resting)
         return self._is_resting
 
+    def pause(self, seconds: float) -> None:
+        """Run handlers for some seconds of real time; raises ActionInterrupted if this plant is asked to rest."""
+        run = self._runs
+        self._service.check_router()
+        self._wait(lambda: self._is_resting, seconds)
+        if self._is_resting:
+            raise ActionInterrupted("this service rests")
+        if run != self._runs:
+            raise ActionInterrupted("robot_sim started a new run")
+
     def leave(self) -> None:
         """Release all goals and, in lockstep, end the participation of this service."""
         for part in list(self._epochs):
@@ -309,8 +323,8 @@ class BusPlant:
         if self._is_resting:
             raise ActionInterrupted(f"{part}: this service rests")
 
-    def _wait(self, enough: Callable[[], bool]) -> None:
-        """Run handlers for a while, or until `enough` returns True; answer the tick before waiting."""
+    def _wait(self, enough: Callable[[], bool], seconds: float = RETRY_PERIOD) -> None:
+        """Run handlers for some seconds, or until `enough` returns True; answer the tick before waiting."""
 
         def may_continue() -> bool:
             if enough():
@@ -318,7 +332,7 @@ class BusPlant:
             self._answer()
             return False
 
-        self._service.spin(time.monotonic() + RETRY_PERIOD, may_continue)
+        self._service.spin(time.monotonic() + seconds, may_continue)
 
     def _answer(self) -> None:
         """Answer the tick that waits for this service; tick 0, which is repeated, only after all goals were taken."""

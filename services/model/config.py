@@ -21,6 +21,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """False: contacts are published but exert no force, for experiments without that force."""
     sigmas: Annotated[float, Meta(ge=0, le=10)] = 2.0
     """Standard deviations of a perceived object's position by which its shape is enlarged."""
+    ghosts: tuple[str, ...] = ()
+    """Perceived objects that the robot may touch: they have the role ghost, in place of target, and do not repel it."""
     calibration: str = ""
     """File of `mobee calibrate`, whose offsets of the head's encoders are added to what they report; empty: none."""
     terms: list[str] = []

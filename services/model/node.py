@@ -45,7 +45,7 @@ class ModelNode:
         self._publishes_contacts = bool(config.terms) or needs_contacts()
         self._q: Array = robot.home
         self._offsets = _encoder_offsets(config, robot)
-        self._world = WorldServer(service, self._model, config.sigmas)
+        self._world = WorldServer(service, self._model, config.sigmas, config.ghosts)
         bus = service.bus
         self._forces = bus.publisher(Forces, "model")
         self._participant = Participant(service)

@@ -33,9 +33,9 @@ MOST_MARGIN = 0.06  # m: an object whose place is less certain is no use as a ta
 class WorldServer:
     """Answers calls that edit the world of a model, and adds objects that vision perceives."""
 
-    def __init__(self, service: Service, model: Model, sigmas: float) -> None:
-        """`sigmas`: standard deviations of a perceived object's position by which its shape is enlarged."""
-        self._service, self._model, self._sigmas = service, model, sigmas
+    def __init__(self, service: Service, model: Model, sigmas: float, ghosts: Collection[str] = ()) -> None:
+        """`sigmas`: standard deviations of a perceived object's position by which its shape is enlarged; `ghosts`: see the settings."""
+        self._service, self._model, self._sigmas, self._ghosts = service, model, sigmas, frozenset(ghosts)
         self.latency = Percentiles()  # ms from the picture that shows an object to its place in the world
         self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
         self._perceived: set[str] = set()  # objects that vision added: it changes no other
@@ -162,7 +162,7 @@ class WorldServer:
     def _put(self, world: World, seen: WorldObject | AddObject, margin: float = 0.0) -> None:
         known = world.objects.get(seen.name)
         rotation = _rotation(seen.quaternion)
-        shape, role = _shape(seen.geometry, margin), self._roles.get(seen.name, seen.role)
+        shape, role = _shape(seen.geometry, margin), self._role_of(seen)
         if known is not None and known.kind == shape.kind and known.size == shape.size:
             world.move(seen.name, position=seen.position, rotation=rotation)
             if known.role != role:
@@ -173,6 +173,11 @@ class WorldServer:
         if known is not None:  # after the checks: an invalid object replaces nothing
             world.remove(seen.name)
         world.add(seen.name, shape, position=seen.position, rotation=rotation, role=role)
+
+    def _role_of(self, seen: WorldObject | AddObject) -> Role:
+        """Return the role of an object: as a client has set it, or that of the settings if vision perceives it, or as it was sent."""
+        as_sent: Role = "ghost" if seen.name in self._ghosts and isinstance(seen, WorldObject) else seen.role
+        return self._roles.get(seen.name, as_sent)
 
     def _move(self, world: World, request: MoveObject) -> None:
         rotation = None if request.quaternion is None else _rotation(request.quaternion)

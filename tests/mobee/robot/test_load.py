@@ -16,7 +16,7 @@ from tests.mobee.robot.urdf_files import arm_with, srdf_file
 
 def test_every_shipped_robot_and_world_is_read_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
     assert shipped_robots() == ("icub", "icub_2014", "icub_katana", "katana")
-    assert shipped_worlds() == ("cup", "table", "table_2014", "things")
+    assert shipped_worlds() == ("cup", "push", "table", "table_2014", "things")
     assert [load_robot(name).name for name in shipped_robots()] == ["icub", "icub_2014", "icub_katana", "katana400"]
     assert all(load_world(name).objects for name in shipped_worlds())
     assert len(recwarn) == 0

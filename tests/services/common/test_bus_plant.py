@@ -140,7 +140,7 @@ def test_a_target_that_another_client_has_removed_causes_no_error(service: FakeS
 def test_places_are_those_of_free_objects_that_are_not_stale(service: FakeService, client: ReachClient) -> None:
     service.objects = [thing("cup", "cylinder", [0.035, 0.09]), replace(thing("mug", "cylinder", [0.035, 0.09]), link="l_hand")]
     service.stale = {"ball": 7.26}
-    assert {name: place.tolist() for name, place in client.places().items()} == {"cup": AT}
+    assert {name: one.position for name, one in client.objects().items()} == {"cup": AT}
     service.failure = CallFailed("no_answer", "nobody answers")
     with pytest.raises(ActionInterrupted, match="does not list its objects"):
-        client.places()
+        client.objects()

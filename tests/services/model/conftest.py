@@ -15,7 +15,7 @@ from tests.services.model.stage import Stage, staged
 @pytest.fixture(scope="package")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     with rig(tmp_path_factory.mktemp("model"), load_robot("icub")) as made:
-        yield staged(made)
+        yield staged(made, "--ghosts", "saucer")
 
 
 @pytest.fixture

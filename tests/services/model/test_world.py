@@ -64,6 +64,19 @@ def test_the_role_that_a_client_gives_a_perceived_object_stays_while_vision_move
     assert run.world()["ball"].role == "target"
 
 
+def test_perceived_objects_that_the_settings_name_are_ghosts_from_the_start_and_again_after_they_expired(run: Stage) -> None:
+    for place in ([-0.3, 0.1, 0.0], [-0.3, 0.2, 0.0]):
+        run.perceive(place, valid_for=2, name="saucer")
+        wait_for(lambda: "saucer" in run.world(), "the saucer")
+        assert run.world()["saucer"].role == "ghost"
+        for _ in range(3):
+            run.tick()
+        assert "saucer" not in run.world()
+    run.edit("add", AddObject, name="saucer", geometry=BALL, position=[-0.5, 0.0, 0.3], quaternion=UPRIGHT, role="obstacle")
+    assert run.world()["saucer"].role == "obstacle"  # which a client has placed
+    run.edit("remove", OneName, name="saucer")
+
+
 def test_a_perceived_object_causes_contacts(run: Stage) -> None:
     palm = library().evaluate(run.rig.robot.home).position("left_palm")
     assert "ball" not in run.tick().touched.get("left_arm", [])
