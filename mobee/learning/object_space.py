@@ -82,7 +82,14 @@ class ObjectSpace(Space):
 
     def state_of(self, q: ArrayLike) -> int:
         """Raise InvalidValue: a posture is only a part of the state; see `state_after` and `state`."""
-        raise InvalidValue(f"a state of {self.part} holds the cell of {self.name} too: use state_after(outcome), or state(posture, cell).")
+        raise InvalidValue(
+            f"a state of {self.part} holds the cell of {self.name} too, so that no pose is a state: give the number of a state, "
+            f"posture + {len(self.postures)} x cell, or use state_after(outcome)."
+        )
+
+    def state_of_joints(self, q: ArrayLike) -> int:
+        """Raise InvalidValue, as `state_of`."""
+        return self.state_of(q)
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -100,7 +100,8 @@ class Stage:
         return self.rig.start("services.agents", "agent_torso", "--config", str(self.settings), *arguments)
 
     def made(self, n: int) -> list[Transition]:
-        return wait_for(lambda: len(self.transitions) >= n and list(self.transitions), f"{n} transitions", 20.0)
+        wait_for(lambda: len(self.transitions) >= n, f"{n} transitions", 20.0)
+        return list(self.transitions)
 
     def made_to(self, posture: int, known: int = 0) -> Transition:
         """The first transition after the known ones whose goal is a posture."""
@@ -108,7 +109,8 @@ class Stage:
         def found() -> list[Transition]:
             return [one for one in self.transitions[known:] if SPACE.posture(one.goal) == posture]
 
-        return wait_for(found, f"a transition to posture {posture}", 20.0)[0]
+        wait_for(found, f"a transition to posture {posture}", 20.0)
+        return found()[0]
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from bus_schema.rpc import Done, Empty, Place, World
 from mobee import load_robot
 from mobee.learning.object_space import ObjectSpace
 from mobee.store import STORE, TransitionStore
+from services.agents.config import Config
 from services.common import rpc
 from services.launcher.scenario import read_scenario
 from tests.examples.test_documentation import blocks, run
@@ -22,7 +23,7 @@ from tests.system.live import Watcher, running, until
 pytestmark = pytest.mark.system
 pytest.importorskip("mujoco")
 
-CONFIG = next(part.config for part in read_scenario("push").parts if part.who == "agent_left_arm")
+CONFIG = next(part.config for part in read_scenario("push").parts if isinstance(part.config, Config))
 FIRST, AWAY, OFFLINE = np.array([-0.3, -0.12, -0.055]), [-0.3, 0.3, -0.055], 20
 
 

@@ -70,6 +70,8 @@ def test_an_object_that_is_not_perceived_is_believed_where_it_was() -> None:
 def test_a_posture_alone_is_no_state() -> None:
     with pytest.raises(InvalidValue, match="state_after"):
         space().state_of(np.zeros(5))
+    with pytest.raises(InvalidValue, match=r"posture \+ 3 x cell"):
+        space().state_of_joints(np.zeros(1))
 
 
 @pytest.mark.parametrize("explorer", list(EXPLORERS))
