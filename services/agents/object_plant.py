@@ -11,6 +11,7 @@ from bus_schema import keys
 from bus_schema.rpc import Done, ObjectState, Place
 from mobee.arrays import Array
 from mobee.errors import MobeeError
+from mobee.learning.grid import MARGIN
 from mobee.learning.object_space import ObjectSpace
 from mobee.plant import Outcome, PerceivingPlant
 from services.agents.config import Config
@@ -22,7 +23,6 @@ LOOK = 2.0  # s of the robot's clock within which an object that nothing hides i
 PERIOD = 0.05  # s of real time between two looks
 CALM = 0.005  # m between the places of two looks at an object at rest
 PATIENCE = 10.0  # s of the robot's clock after which the simulator is asked again
-OUTSIDE = 0.02  # m beyond the border of the area at which the object still counts as inside: its place is seen with an error
 
 
 class ObjectPlant(PerceivingPlant):
@@ -128,4 +128,5 @@ class ObjectPlant(PerceivingPlant):
                 f'services.model.ghosts = ["{self._name}"], or its role in the world\'s file to ghost.'
             )
         at = np.array(found.position[:2])
-        return found if bool(((at > self._low - OUTSIDE) & (at < self._high + OUTSIDE)).all()) else None
+        is_inside = bool(((at > self._low - MARGIN) & (at < self._high + MARGIN)).all())  # places are seen with errors
+        return found if is_inside else None

@@ -39,7 +39,7 @@ put_back = [-0.4, -0.1, -0.05]
 
 
 class Table:
-    """A cup that is pushed to the other cell, or falls, when the part is told to go to posture 2; and what is seen of it."""
+    """A cup that is pushed to the other cell, or out of its area, when the part is told to go to posture 2; and what is seen of it."""
 
     def __init__(self, made: Rig, controller: FakeController) -> None:
         self.rig, self.controller = made, controller
@@ -59,7 +59,7 @@ class Table:
         self._before, self._old = self._seen(), self.old_pictures
         if self.place is not None and SPACE.postures.state_of(np.array(goal.q)) == 2:
             if self.falls:
-                self.place = None
+                self.place = (self.place[0], 0.3, self.place[2])
             elif self.pushes:
                 self.place = (self.place[0], -self.place[1], self.place[2])
 
@@ -136,7 +136,7 @@ def test_a_state_holds_the_cell_that_pictures_from_after_the_action_show(stage: 
     assert numbers["object_moves"] and numbers["retreats"] == numbers["object_absences"] == 0
 
 
-def test_an_action_after_which_the_cup_is_hidden_ends_aside_and_one_that_makes_it_fall_ends_when_it_is_back(stage: Stage) -> None:
+def test_an_action_that_hides_the_cup_ends_aside_and_one_that_pushes_it_out_of_its_area_ends_when_it_is_back(stage: Stage) -> None:
     stage.table.pushes, stage.table.hidden_at = True, 2
     stage.agent()
     hidden = stage.made_to(2)
