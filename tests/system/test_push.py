@@ -24,7 +24,7 @@ pytestmark = pytest.mark.system
 pytest.importorskip("mujoco")
 
 CONFIG = next(part.config for part in read_scenario("push").parts if isinstance(part.config, Config))
-FIRST, AWAY, OFFLINE = np.array([-0.3, -0.14, -0.055]), [-0.3, 0.3, -0.055], 20
+FIRST, AWAY, OFFLINE = np.array([-0.3, -0.155, -0.055]), [-0.3, 0.3, -0.055], 20
 
 
 def cup(watcher: Watcher) -> tuple[str, np.ndarray] | None:
