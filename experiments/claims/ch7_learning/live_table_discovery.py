@@ -262,7 +262,7 @@ def figure(folder: Path) -> Path:
             axes.plot(place + np.linspace(-0.15, 0.15, len(group)), group, "o", color="0.5" if name == OFFLINE else "tab:red", markersize=4)
         axes.set_xticks(range(len(values)), list(values), fontsize=8)
         finish(axes, xlim=(-0.5, len(values) - 0.5), ylabel=label)
-        axes.set_ylim(0.0, 1.05 * max(max(group) for group in values.values()))
+        axes.set_ylim(0.0, 1.05 * max(max(group) for group in values.values()) or 1.0)
     return saved(drawing, folder, 130)
 
 
