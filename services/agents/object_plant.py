@@ -53,7 +53,7 @@ class ObjectPlant(PerceivingPlant):
         """How often the part moved aside to see the object."""
 
     def measure(self, part: str) -> Array:
-        """See Plant; also looks where the object is, and may move the part aside for it."""
+        """Return the posture as `Plant.measure` does, after the object is seen; the part may have moved aside to see it."""
         self.plant.measure(part)
         self._look()
         return self.plant.measure(part)
@@ -65,7 +65,7 @@ class ObjectPlant(PerceivingPlant):
         return replace(outcome, q=q, perceived=self.perceive())
 
     def _look(self) -> bool:
-        """Find the object, whatever it takes; returns whether the part was moved for it.  Raises ActionInterrupted as `act`."""
+        """Wait until the object is seen in its area; return whether the part was moved for this.  Raises ActionInterrupted as `act`."""
         if self._is_seen(LOOK):
             return False
         self.retreats += 1
@@ -77,8 +77,8 @@ class ObjectPlant(PerceivingPlant):
     def _wait_for_object(self) -> None:
         self.absences += 1
         self.is_absent = True
-        who = "the simulator puts it back" if self._put_back else "put it back"
-        self._service.bus.event("warning", "object_absent", f"{self._name} is not seen in its area: {who}; {self._part} waits aside")
+        remedy = "the simulator puts it back" if self._put_back else "put it back"
+        self._service.bus.event("warning", "object_absent", f"{self._name} is not seen in its area: {remedy}; {self._part} waits aside")
         try:
             self._ask_simulator()
             while not self._is_seen(PATIENCE):

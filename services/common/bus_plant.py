@@ -303,7 +303,7 @@ class BusPlant:
         return self._is_resting
 
     def pause(self, seconds: float) -> None:
-        """Run handlers for some seconds of real time; raises ActionInterrupted if this plant is asked to rest."""
+        """Run handlers for some seconds of real time; raises ActionInterrupted at a request to rest, and at a new run of robot_sim."""
         run = self._runs
         self._service.check_router()
         self._wait(lambda: self._is_resting, seconds)

@@ -105,7 +105,7 @@ class System:
         self.tick()
 
     def tick(self) -> None:
-        """Let a tick of 10 ms pass, and its handlers run."""
+        """Publish a tick of 10 ms, and run all handlers that wait."""
         self._k += 1
         if isinstance(self.node, SimNode):
             self.node._tick(0.0)

@@ -104,7 +104,7 @@ class Stage:
         return list(self.transitions)
 
     def made_to(self, posture: int, known: int = 0) -> Transition:
-        """The first transition after the known ones whose goal is a posture."""
+        """The first transition to a posture, without the first `known` transitions."""
 
         def found() -> list[Transition]:
             return [one for one in self.transitions[known:] if SPACE.posture(one.goal) == posture]

@@ -56,7 +56,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _share(runs: Runs, name: str) -> tuple[float, float, float]:
-    """Return the share of the trials in which something was so, and its interval."""
+    """Return the share of the trials with a result, such as `lifted`, and its 95 % interval."""
     count = sum(bool(run[name]) for run in runs)
     return count / len(runs), *share_interval(count, len(runs))
 
