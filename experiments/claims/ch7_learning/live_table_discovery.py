@@ -5,7 +5,7 @@ Claim: the three agents of the table experiment, each a process of its own in th
 that are statistically those of the same agents on the offline plant, and touch the table and lean towards it as often.  Source: aim of
 this reproduction (thesis 7.4 was done live).  Published number: none.  Run time: 10 minutes on 2 cores, and 13 for each live run.
 
-The robot `icub`, the published gains and graphs, whole-tree forces; live on its motor model, or with --physics on PyBullet and MuJoCo, for
+The robot `icub`, the published gains and graphs, whole-tree forces; live on its motor model, or with --robots on PyBullet or MuJoCo, for
 which the offline motors were identified.  Test: the total variation between the outcomes observed live and those of all offline seeds but
 one, mean over the state-actions that both tried at least twice, beside the same numbers of the offline seeds.  Touch: the share of the
 arms' actions that ended in contact with table or ball.  Lean: mean tries of the torso's actions that lean forward over those of its
@@ -63,12 +63,12 @@ LIVE_COST = 5.0  # of a live run, relative to an offline one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, --live-seeds, --physics and --transitions."""
+    """Add the options of a sweep, --live-seeds, --robots and --transitions."""
     sweep_arguments(parser, seeds=SEEDS)
     text = f"live runs on each robot, one after the other (default: {LIVE_SEEDS})"
     parser.add_argument("--live-seeds", type=positive_whole, default=LIVE_SEEDS, metavar="N", help=text)
-    text = f"also live on {' and '.join(PHYSICS)} (default: only on the motor model)"
-    parser.add_argument("--physics", nargs="+", choices=PHYSICS, default=[], metavar="ENGINE", help=text)
+    text = f"live on these robots, of {', '.join(ROBOTS)} (default: {MOTORS}, the motor model)"
+    parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=[MOTORS], metavar="ROBOT", help=text)
     parser.add_argument("--transitions", type=positive_whole, metavar="N", help=f"per part (default: {TRANSITIONS})")
 
 
@@ -85,7 +85,7 @@ def live_cells(arguments: argparse.Namespace) -> list[Cell]:
     return [
         Cell(f"{robot}-n{number}-s{seed}", seed, {"task": TASK, "transitions": number, "robot": robot}, LIVE_COST)
         for seed in seeds
-        for robot in (MOTORS, *arguments.physics)
+        for robot in arguments.robots
     ]
 
 

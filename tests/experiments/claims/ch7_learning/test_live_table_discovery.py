@@ -27,7 +27,7 @@ def learned(rng, odd, share):
 
 
 def prepared(folder, odd, share=0.2, live_seeds=5):
-    arguments = argparse.Namespace(seed=0, seeds=19, quick=False, transitions=108, physics=["mujoco"], live_seeds=live_seeds)
+    arguments = argparse.Namespace(seed=0, seeds=19, quick=False, transitions=108, robots=["kinematic", "mujoco"], live_seeds=live_seeds)
     for cell in (*offline_cells(arguments), *live_cells(arguments)):
         is_odd = odd and cell.settings.get("robot") == "mujoco"
         write_cell(folder, cell, learned(np.random.default_rng(cell.seed), is_odd, share if is_odd else 0.2), 1.0)
