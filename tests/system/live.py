@@ -195,6 +195,11 @@ class Watcher:
         seen = self.states[part]
         return max((abs(v) for v in seen[-1].dq), default=0.0) if seen else 0.0
 
+    def rests(self, part: str, slower: float = 0.06, ticks: int = 50) -> bool:
+        """Whether all motors of the part were slower in each of the last ticks; the noise of 16 encoders seems 0.03 rad/s fast."""
+        recent = self.states[part][-ticks:]
+        return len(recent) == ticks and all(max(map(abs, state.dq)) < slower for state in recent)
+
     def wait_moving(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 40.0) -> None:
         until(lambda: all(self.speed(part) > faster for part in parts), timeout, f"{', '.join(parts)} move")
 

@@ -91,10 +91,10 @@ def test_the_hand_stops_when_the_cameras_fail_and_continues_when_they_see_the_cu
                 vision.put(valid)
             until(partial(says, watcher, reason), 10.0, f"the service pauses: {reason}")
             until(lambda: not watcher.motions["right_arm"][-1].owner, 10.0, "the arm is free")
-            until(lambda: watcher.speed("right_arm") < 0.02, 10.0, "the arm rests")
+            until(lambda: watcher.rests("right_arm"), 10.0, "the arm rests")
             begun = watcher.k
             until(partial(has_passed, watcher, begun + 100), 20.0, "one more second has passed")
-            assert watcher.speed("right_arm") < 0.02
+            assert watcher.rests("right_arm")
             vision.sees = True
 
 
