@@ -84,17 +84,17 @@ def test_a_chunk_that_would_expand_without_bound_is_not_expanded(tmp_path: Path)
 
 
 def test_the_oldest_files_go_when_all_are_too_large(tmp_path: Path) -> None:
-    largest = 400_000
+    largest = 1_600_000
     files = Files(tmp_path, largest, {})
     noise = random.Random(0)
-    for k in range(1000):
+    for k in range(4000):
         files.write(Channel("tick", "msgpack", "x"), noise.randbytes(1000), k, k)
         if k % 10 == 0:
             files.flush()
     files.close()
     assert 0.5 * largest < files.size <= largest * (1 + 1 / FILES)
     kept = [one.received for one in Recording(tmp_path)]
-    assert kept == list(range(kept[0], 1000))
+    assert kept == list(range(kept[0], 4000))
     assert files.begun > FILES
 
 
