@@ -134,7 +134,8 @@ class Child:
                 process_group=0,
             )
         if self.program.nice:
-            os.setpriority(os.PRIO_PROCESS, self.process.pid, self.program.nice)
+            own = os.getpriority(os.PRIO_PROCESS, 0)  # only root may start a process of a higher priority than its own
+            os.setpriority(os.PRIO_PROCESS, self.process.pid, max(own, self.program.nice))
             if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes, it preempts no other process
                 os.sched_setscheduler(self.process.pid, os.SCHED_BATCH, os.sched_param(0))
         self.has_token, self.asking, self.asked_at, self.stat = False, False, 0.0, None
