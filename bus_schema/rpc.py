@@ -183,7 +183,7 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
     quaternion: Quaternion
     role: Role
     link: str  # link that the object is attached to; empty: none
-    margin: Annotated[float, Meta(ge=0)] = 0.0  # m by which the shape is larger than the object on each side: it may be elsewhere
+    margin: Annotated[float, Meta(ge=0)] = 0.0  # m by which the shape is larger than the object on each side, for an uncertain position
     t_capture: Count | None = None  # ns, time of the newest picture that shows a perceived object
 
 

@@ -142,7 +142,7 @@ BENCHES = {
         },
     ),
     "plant": Bench(
-        "the offline plant beside MuJoCo's stepper: one arm, reaching, three agents at the table, and the same hash twice",
+        "the offline plant compared with MuJoCo's stepper: one arm, reaching, three agents at the table, and the same hash twice",
         quick="one short round",
         figure="tick and objects",
     ),
@@ -166,7 +166,7 @@ BENCHES = {
         options={"--seeds": _number("maps of each method, of which the worst counts (default: 1)")},
     ),
     "gym": Bench(
-        "the Gymnasium environments beside MuJoCo's: steps per second, alone and in a batch",
+        "the Gymnasium environments compared with MuJoCo's: steps per second, alone and in a batch",
         quick="two short rounds",
     ),
     "edges": Bench(
@@ -174,7 +174,7 @@ BENCHES = {
         quick="a map of 500 vertices, one round (default: 5000, 5 rounds)",
     ),
     "model": Bench(
-        "the egocentric model beside MuJoCo and python-fcl: poses per second, and the same contacts",
+        "the egocentric model compared with MuJoCo and python-fcl: poses per second, and the same contacts",
         quick="5 rounds of 500 poses, 50 poses to compare",
         figure="objects and primitives",
         options={

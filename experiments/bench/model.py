@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The egocentric model beside MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
+"""The egocentric model compared with MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
 
 Claim: one compiled kernel makes the model of thesis chapter 2 the fastest of its kind, on the iCub and on robots of other makers
-(scenes.py).  Ours gives every contact with depth, normal and point, and the projected forces; of MuJoCo forward kinematics and
-collision detection are timed, of python-fcl whether each pair touches.  Run time: about four minutes, a quarter with `--quick`.
+(scenes.py).  Our model computes every contact with depth, normal and point, and the projected forces.  MuJoCo is timed while it computes
+forward kinematics and detects collisions, python-fcl while it computes whether each pair touches.
+Run time: about four minutes, a quarter with `--quick`.
 """
 
 from __future__ import annotations

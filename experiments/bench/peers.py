@@ -16,7 +16,7 @@ from mobee.learning.value_iteration import OutcomeModel
 
 
 def import_peer(module: str, name: str, extra: str = "bench") -> Any:
-    """Import an optional package and return it; raises NotInstalled, which names the extra of MoBeE's that brings it."""
+    """Import an optional package and return it; raises NotInstalled, which names the extra of MoBeE that installs it."""
     try:
         return importlib.import_module(module)
     except ImportError:

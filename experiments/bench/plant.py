@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: how fast it is beside MuJoCo's stepper on the same model, and the gain of a batch of plants.
+"""The offline plant: how fast it is compared with MuJoCo's stepper on the same model, and the gain of a batch of plants.
 
 One arm goes to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
 """

@@ -86,14 +86,15 @@ def base_link(robot: Robot, arm: str) -> int:
 
 
 def learned_worth(predictor: RewardPredictor) -> Worth:
-    """Return the map of a reach learner: the largest reward that it predicts for a target, over all states of its space."""
+    """Return a function of places: the largest reward that a reach learner predicts for a target there, over all states of its space."""
     return lambda places: np.array([float(predictor.mean(place).max()) for place in places])
 
 
 def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> Worth:
-    """Return the map of an arm that nobody has learned: the manipulability sqrt(det J J^T) at random postures, relative to the largest.
+    """Return a function of places, without learning: the manipulability sqrt(det J J^T) of the arm near each, relative to the largest.
 
-    Postures in which the robot touches itself do not count.  A place that no posture comes near has minus its distance [m].
+    It is taken from random postures; those in which the robot touches itself do not count.  A place that is near to none of them has
+    minus its distance [m] from the nearest one.
 
     Args:
         robot: the robot, whose other parts are at home.

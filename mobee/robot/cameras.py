@@ -24,8 +24,8 @@ GRAMMAR = "NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place 
 def cameras_of(robot: Robot, asked: Sequence[str] = ()) -> dict[str, Camera]:
     """Return the cameras that make pictures, by name, as in keys of the bus: of a-z, 0-9 and _.
 
-    They are the first two of the robot's file, or the eyes "left" and "right" at markers left_eye and right_eye, and those that `asked`
-    names: others of the file, or new ones on links and markers, see GRAMMAR.
+    They are the first two cameras of the robot's file.  A file without cameras has the eyes "left" and "right" at its markers left_eye and
+    right_eye.  `asked` adds others: cameras of the file by their names, or new ones on links and markers, see GRAMMAR.
 
     Raises InvalidValue or UnknownName for one that cannot be made.
     """

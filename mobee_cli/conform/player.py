@@ -178,7 +178,7 @@ class Player:
         return message.seq
 
     def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float) -> None:
-        """Answer every tick with a valid command for some time."""
+        """Answer every tick with a valid command for a part, for this time."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             seen = self.tick.k

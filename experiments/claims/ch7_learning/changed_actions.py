@@ -96,7 +96,7 @@ Runs = Mapping[tuple[str, bool], list[dict[str, Any]]]  # by agent, and whether 
 
 
 def left(run: dict[str, Any], after: int = JUDGED_AFTER) -> float:
-    """Return the error of changed actions some transitions after the change, over that at the change."""
+    """Return the error of changed actions `after` transitions after the change, divided by their error at the change."""
     return float(run["errors"][after // CHECK_PERIOD, 0] / run["errors"][0, 0])
 
 

@@ -170,7 +170,7 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def covered(runs: Runs) -> Array:
-    """Return the transitions until every action was tried, by seed; all transitions of a run that ended before."""
+    """Return, for each run, the transitions until every action was tried; for an unfinished run, all its transitions."""
     return np.array([run["transitions"] for run in runs], dtype=np.float64)
 
 

@@ -360,7 +360,7 @@ class Judged:
 
 
 def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
-    """Return which actions (S, A) of these parts end differently at the table than at the ghost, by all seeds but one."""
+    """Return which actions (S, A) of these parts end differently at the table than at the ghost, by the runs of all seeds except `but`."""
     shares = []
     for world in ("table", "ghost"):
         others = [run for explorer in EXPLORERS for run in runs.get((explorer, world), []) if run.seed != but]

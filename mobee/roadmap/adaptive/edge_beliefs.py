@@ -71,7 +71,7 @@ class EdgeBeliefs:
         return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
 
     def observe(self, state: int, action: int, arrived: bool) -> None:
-        """Count an outcome of an edge; `arrived`: whether it ended at its goal."""
+        """Count a try of an edge; `arrived`: whether the motion ended at the goal of the edge."""
         if self.forgetting < 1.0:
             self.worked *= self.forgetting
             self.failed *= self.forgetting

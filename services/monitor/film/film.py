@@ -52,7 +52,7 @@ def scene_times(length: float) -> list[float]:
 
 
 def told_from(story: Story) -> float:
-    """Return the moment, s since the begin, from which on all agents act and the world is known, at most at a tenth of the run; else 0."""
+    """Return when all agents have begun to act and the world is known, s since the begin; 0 if that is later than a tenth of the run."""
     cards, objects = story.tracks.get("cards"), story.tracks.get("objects")
     if cards is None:
         return 0.0

@@ -41,7 +41,7 @@ class Hand(BusPlant):
 
     @property
     def tick(self) -> int:
-        """The current tick, the newer of the bus and of the part's motion: in lockstep only messages of its part arrive."""
+        """The current tick: that of the bus or of the part's motion, if newer; in lockstep only messages of this part arrive."""
         motion = self._motion.get(PART)
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
 

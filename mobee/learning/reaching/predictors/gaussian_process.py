@@ -64,7 +64,7 @@ class Posterior:
         return self._used
 
     def about(self, target: Array) -> tuple[Array, Array]:
-        """Return mean (S,) without the prior mean, and covariance (S, S), of the mean rewards for a target (3,) m."""
+        """Return mean (S,), less the prior mean, and covariance (S, S) of the mean rewards of all states for a target (3,) m."""
         known = self._updated(target)
         return known.mean, known.covariance
 
