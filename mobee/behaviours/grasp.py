@@ -57,7 +57,7 @@ class Palm:
 def palm_beside(place: ArrayLike, radius: float, azimuth: float, gap: float, ground: float, grip: Grip) -> Palm:
     """Return the pose of the palm beside an upright thing of this radius [m], the thumb up.
 
-    `place`: (2,) m, of the thing's axis.  `azimuth`: rad; with 0 the palm faces the left (-y), and turns to the front (-x) with it.
+    `place`: (2,) m, of the thing's axis.  `azimuth`: rad; at 0 the palm faces the left (-y), at pi / 2 the front (-x).
     `gap`: m, between palm and thing.  `ground`: m, height of what the thing stands on.
     """
     x, y = np.asarray(place, dtype=np.float64)

@@ -34,7 +34,7 @@ class LinkSolid:
     collides: bool
 
     def at(self, transforms: Array, white: float = 0.0) -> Solid:
-        """Return it where its link is, with a share of white in its colour; `transforms`: (L, 4, 4), from link_transforms."""
+        """Return the solid at the pose of its link, with a share of white in its colour; `transforms`: (L, 4, 4), see link_transforms."""
         link = transforms[self.link]
         red, green, blue = (white + (1.0 - white) * channel for channel in self.solid.color)
         position, rotation = link[:3, :3] @ self.solid.position + link[:3, 3], link[:3, :3] @ self.solid.rotation

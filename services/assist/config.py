@@ -41,7 +41,7 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
         self.assist(robot)
 
     def assist(self, robot: Robot) -> Assist:
-        """Return the choice of postures; raises MobeeError."""
+        """Return the object that chooses the postures, with the map that the settings name; raises MobeeError."""
         robot.part(self.arm)
         if self.learned:
             worth = learned_worth(load_reaches(Path(self.learned) / STORE, OfflinePlant(Model(robot)), self.arm).predictor)

@@ -48,7 +48,7 @@ def child(parent: Node, tag: str) -> Node | None:
 
 
 def triple(node: Node, name: str) -> Array:
-    """Return three numbers of plausible size."""
+    """Return three numbers of an attribute; reports an error if one is too large to be in metres or radians."""
     values = np.array(node.numbers(name, 3))
     if float(np.abs(values).max()) > FARTHEST:
         node.fail(name, f"{float(np.abs(values).max()):g} is too large", "URDF counts in metres and radians")
@@ -56,7 +56,7 @@ def triple(node: Node, name: str) -> Array:
 
 
 def bounded(node: Node, name: str, default: float | None = None) -> float:
-    """Return a number of plausible size."""
+    """Return the number of an attribute; reports an error if it is too large to be in metres or radians."""
     value = node.number(name, default)
     if abs(value) > FARTHEST:
         node.fail(name, f"{value:g} is too large", "URDF counts in metres and radians")
