@@ -100,9 +100,9 @@ class SideGrasp:
         return self._closed(q, self.grip.fingers, self.grip.thumb)
 
     def squeezed(self, q: Array) -> Array:
-        """Return where the fingers' motors hold what stopped them at q (n,) rad, (m,) rad: a little farther closed, so that they press on.
+        """Return goals (m,) rad of the fingers' motors that hold a thing: a little farther closed than q (n,) rad, where it stopped them.
 
-        Farther goals would let strong fingers push a thing out of the hand in time.
+        With farther goals strong fingers would slowly push the thing out of the hand.
         """
         fingers = q[self.hand.motors]
         toward = np.clip(self.closed(q)[self.hand.motors] - fingers, -self.grip.squeeze, self.grip.squeeze)

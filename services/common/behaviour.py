@@ -61,7 +61,7 @@ class Scene:
 
 
 class Behaviour:
-    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the motion so far.
+    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the present motion.
 
     While the target is stale, the part holds, or with `watches_last_place` continues as if the target were at rest in its last place.
     """

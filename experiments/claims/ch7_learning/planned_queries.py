@@ -144,7 +144,7 @@ def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """Means over the queries."""
+    """How well plans or paths lead to their goals: means over the queries."""
 
     success: float
     """Share of queries that reached their goal within MAX_ACTIONS actions."""
