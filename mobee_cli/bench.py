@@ -26,8 +26,8 @@ _NOTES = "Exit code: 0 every requirement is met and all agree, 1 not, 3 another 
 class Bench:
     """The options of one benchmark, the module `experiments.bench.<name>`.
 
-    The module has `Settings`, whose fields have the names of the options, `measure(settings)`, which returns a result as JSON has it
-    with the verdict under "passed", `report(result)`, and `QUICK`, other settings, where there is a --quick.
+    The module has `Settings`, whose fields have the names of the options.  It has `measure(settings)`, which returns a result of JSON types
+    with the verdict under "passed", and `report(result)`.  If there is a --quick, it has `QUICK`, the settings for it.
     """
 
     text: str

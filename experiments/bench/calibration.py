@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The calibration loop: fixed work without MoBeE, the measure for times that cannot be compared with a peer.
 
-One third of its time each is spent on Python (calls, a dictionary, floating point numbers), on NumPy with arrays of a few numbers, and on
+It consists of three parts of equal time: Python (calls, a dictionary, floating point numbers), NumPy with arrays of a few numbers, and
 NumPy with arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is
 measured here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time, so
 they are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.

@@ -46,7 +46,7 @@ def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
 
 
 def finish_normalised(axes: Any) -> None:
-    """Add to distributions of normalised squared errors in 3-D that of an honest covariance, labels and a legend."""
+    """Add to distributions of normalised squared errors in 3-D that of a correct covariance, labels and a legend."""
     from scipy.special import chdtr
 
     grid = np.linspace(0.0, 12.0, 300)

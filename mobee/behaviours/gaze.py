@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaze: neck and eyes keep a place in the middle of the pictures of all cameras.
 
-Motors that turn cameras but no shapes, the eyes, point the cameras at the target from the posture in which all other motors are about to
-be, so that they also compensate the motion of neck and torso (the vestibulo-ocular reflex).  The other motors of the part, the neck, move
-to the posture in which the eyes are in the middle of their range.  A `Reference` leads both there: at full speed while the target is far
-from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth pursuit).
+Motors that turn cameras but no shapes, the eyes, point the cameras at the target. Their goal is computed for the posture in which all other
+motors are about to be, so that they also compensate the motion of neck and torso (the vestibulo-ocular reflex).  The other motors of the
+part, the neck, move to the posture in which the eyes are in the middle of their range.  A `Reference` leads both there: at full speed while
+the target is far from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth pursuit).
 """
 
 from __future__ import annotations

@@ -154,8 +154,8 @@ def field_width(reach: float) -> float:
 def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float = SHORT) -> tuple[Robot, Ints]:
     """Return the robot with fields around these pairs of solids (p, 2), and the pairs that remain without.
 
-    `width`: of the fields [m]; narrower ones are tried for pairs whose fields meet at home, or in more than FIELD_OFTEN of random poses, or
-    could be kept apart by limits and clauses and have levers shorter than `short` least levers.
+    `width`: of the fields [m]; narrower ones are tried for pairs whose fields meet at home, or in more than FIELD_OFTEN of random poses.
+    They are also tried for pairs that limits and clauses could keep apart, and whose levers are shorter than `short` least levers.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)

@@ -286,7 +286,7 @@ class TransitionModel(Tabled):
         return reward
 
     def _gain_since_change(self, state: int, action: int, outcome: int) -> float:
-        """Return the reward of an observation: the change of the belief, in which earlier outcomes may become void."""
+        """Return the reward of an observation: the change of the belief, in which earlier outcomes may be forgotten."""
         assert self._runs is not None
         chosen, bins = self._bin(state, action, outcome), int(self._bins[state, action])
         bins = max(bins, chosen + 1)

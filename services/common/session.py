@@ -152,8 +152,8 @@ def open_router(
 ) -> zenoh.Session:
     """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable.
 
-    `identity`, `access`: the certificate that a secured router shows, and its access list.  Connections that say nothing are closed soon,
-    and many may wait meanwhile, so that they keep nobody out.
+    `identity`, `access`: the certificate that a secured router shows, and its access list.  Silent connections are closed soon,
+    and many connections may wait, so that silent ones do not keep other processes out.
     """
     settings: dict[str, object] = {
         "mode": "router",

@@ -87,7 +87,7 @@ class Options:
 
 
 def launch(options: Options) -> int:
-    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service failed for good, 2 bad input, 3 environment, 130 early Ctrl-C.
+    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service was given up, 2 bad input, 3 environment, 130 early Ctrl-C.
 
     If the system that it has joined was started again, it joins the new one.
     """

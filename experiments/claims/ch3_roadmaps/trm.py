@@ -84,8 +84,8 @@ def reachable(
 ) -> Array:
     """Return a dense set of reachable task points (R, m).
 
-    They are found by least squares on a lattice of half the spacing (m,) with many more starts per point than a map uses, and by
-    random starts at random points, which do not depend on neighbours.
+    They are found by least squares on a lattice of half the spacing (m,), with many more starts per point than a map uses.  Others
+    are found by random starts at random points, which do not depend on neighbours.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)

@@ -6,12 +6,12 @@ switches back and forth, since encoder noise decides what counts as contact. A f
 the hand slide along the surface at any angle, and settles. Source: thesis 4.4 (discussion), which gives no numbers. Run time: 5 to 10
 minutes for 10 angles with 30 trials of each of four variants.
 
-A client drives the left hand along a straight path through the surface of the table's field, 6 cm before it and 4 cm behind, at 20 % speed,
-and tries again whenever it gets control back, for 12 s.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.  Variants:
-off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
-are attractors of the controller.  The first recovery of each trial counts.  It succeeds if the hand ends without contact, did not
-touch again or go deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the
-encoders reported no contact during the motion back.
+A client drives the left hand at 20 % speed along a straight path through the surface of the table's field, from 6 cm before it to 4 cm
+behind it. For 12 s it tries again whenever it gets control back.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.
+Variants: off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
+are attractors of the controller.  The first recovery of each trial counts.  It succeeds if the hand ends without contact, did not touch
+again or go deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the encoders reported
+no contact during the motion back.
 """
 
 from __future__ import annotations

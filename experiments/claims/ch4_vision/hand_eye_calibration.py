@@ -235,7 +235,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the distributions of the error before and after, and of the normalised error beside the one of an honest covariance."""
+    """Draw the distributions of the error before and after, and of the normalised error, compared with that of a correct covariance."""
     runs = grouped(found, "calibration", ("hand",))["hand"]
     drawing = new_figure(9.0, 3.6)
     left, right = drawing.subplots(1, 2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ball, cup and box seen by imperfect, calibrated cameras: errors of their places, honest covariances, and false objects.
+"""Ball, cup and box seen by imperfect, calibrated cameras: errors of their positions, their covariances, and false objects.
 
 Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well,
 and sees nothing where nothing is.
@@ -277,7 +277,7 @@ def _row(run: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the distributions of the errors of each thing, and of the normalised error beside the one of an honest covariance."""
+    """Draw the distributions of the errors of each thing, and of the normalised error, compared with that of a correct covariance."""
     runs = grouped(found, "world", ("things",))["things"]
     drawing = new_figure(9.0, 3.6)
     left, right = drawing.subplots(1, 2)

@@ -7,10 +7,11 @@ Claim: curiosity learns the stochastic actions better than least-tried explorati
 
 The error of a state-action is the L1 distance, 0 to 2, between the believed and the true distribution of outcomes.  There are three worlds:
 the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant neighbours, and a tabular world, whose outcomes are known
-exactly, in which a plane separates three of 81 states from the others ("half-space").  The arm's true outcomes are estimated by walks that
-try every action 80 or 40 times.  An action is stochastic if its most likely outcome has a probability below .9: none of 432 on the arm with
-81 states, some 25 of 1536 with 256, 13 of 432 in the half-space.  An estimate from so few tries has an error of its own, some .1 for two
-equally likely outcomes.  It is a lower bound of measured errors, and makes the ratios for stochastic actions of the arm too small.
+exactly.  In the tabular world a plane separates three of 81 states from the others ("half-space").  The arm's true outcomes are estimated
+by walks that try every action 80 or 40 times.  An action is stochastic if its most likely outcome has a probability below .9: none of 432
+on the arm with 81 states, some 25 of 1536 with 256, 13 of 432 in the half-space.  An estimate from so few tries has an error of its own,
+some .1 for two equally likely outcomes.  It is a lower bound of measured errors, and makes the ratios for stochastic actions of the arm too
+small.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ class LikelihoodRatio:
     """A detector by the generalised likelihood ratio of two windows with different shares of contradicting outcomes.
 
     The outcomes since the last change are divided into two windows where their likelihood is largest.  A change is reported if its
-    logarithm exceeds that of a single window by more than the Bayesian information criterion of two further parameters, and by the
+    logarithm exceeds that of a single window by more than two terms: the Bayesian information criterion of two further parameters, and the
     logarithm of the largest probability of a change that `RunLength` considers.
     """
 

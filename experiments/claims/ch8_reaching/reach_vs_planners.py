@@ -12,9 +12,9 @@ executed through MoBeE.  "noise": encoder noise of 0.5 degrees, five times the u
 12 cm at 3 cm/s without a stop.  Success: the palm within 2 cm of the surface; the learner may reach three times, the peer has 20 actions.
 Plant time stands still during planning, which is measured in processor time.
 
-A moving target has another position after every motion of the peer, so that all paths but straight ones are replanned at each corner, and
-the last motion, of a second or more, goes to where the target was when that motion began.  The learner's reach follows the target.  Neither
-of them predicts the target's motion.
+A moving target has another position after every motion of the peer, so that all paths except straight ones are replanned at each corner.
+The last motion takes a second or more, and goes to the position that the target had when this motion began.  The learner's reach follows
+the target.  Neither of them predicts the target's motion.
 
 Two arms (twelve joints, thesis 1.5): no drawing of this problem was published.  Here both hands begin beside the table, below its top or
 just above it, and end on both sides of a cup; poses are drawn anew for each query.  So the times compare orders of magnitude only, and

@@ -4,9 +4,9 @@
 Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  A state that
 needs more tries is entered with the target in place if a try ends there, otherwise without the target.
 
-The oracle is an agent that plans and is evaluated like the learners, with the same discount, the same model of free transitions and the
-same limit of actions, but it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners; it can be
-exceeded by chance, and slightly by an agent that knows how transitions fail.
+The oracle is an agent that plans and is evaluated like the learners, with the same discount, model of free transitions and limit of
+actions.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners; it can be exceeded by
+chance, and slightly by an agent that knows how transitions fail.
 """
 
 from __future__ import annotations

@@ -5,14 +5,13 @@ Claim: trained offline and refined live, the learned reacher brings the palm to 
 thesis' 27 targets that can be reached, and of 90 % of new random targets, from random poses, without a solid contact deeper than 2 mm.
 Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
-The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet
-(with --backend mujoco MuJoCo), with gravity.  In each start a
-learner (predictor gp, strategy ucb, failures alike) makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant
-with the identified motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new targets, each from another pose,
-with up to three reaches per try.  The planner peer (inverse kinematics and RRT-Connect, replanned after every change) has the same targets,
-poses and robot, and the true model; the target exerts no force while the planner moves, because the planner avoids it.  In addition there
-are 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 at rest with a ball of 8 cm, in model and simulator, that crosses the
-hand's path at the same speed.
+The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet (with --backend mujoco MuJoCo),
+with gravity.  In each start a learner (predictor gp, strategy ucb, failures alike) makes 3000 curious transitions and 800 tries of the 27
+targets on the offline plant with the identified motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new
+targets, each from another pose, with up to three reaches per try.  The planner peer (inverse kinematics and RRT-Connect, replanned after
+every change) has the same targets, poses and robot, and the true model; the target exerts no force while the planner moves, because the
+planner avoids it.  In addition there are 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 targets at rest.  With these, a
+ball of 8 cm, in model and simulator, crosses the hand's path at the same speed.
 
 A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
 only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The network of a learned detector: three convolutions, kept as ONNX with the things that it was trained for, and run by OpenCV.
 
-The first convolution sees a pixel's surroundings twice: 5 x 5 pixels beside each other, which hold the edge, and 5 x 5 pixels that are
-`APART` from each other, which hold what is around it.  The others combine its numbers in each pixel.
+The first convolution has two inputs around each pixel: 5 x 5 adjacent pixels, which show the edge, and 5 x 5 pixels with a spacing of
+`APART`, which show what is around it.  The others combine its numbers in each pixel.
 """
 
 from __future__ import annotations
