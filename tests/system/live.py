@@ -74,7 +74,7 @@ def launch(
     for setting in settings:
         argv += ["--set", setting]
     with errors.open("w") as sink:
-        process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=sink, text=True, start_new_session=True)
+        process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=sink, text=True, process_group=0)
     return Launch(process, endpoint, runs, errors)
 
 
