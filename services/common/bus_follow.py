@@ -10,7 +10,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from bus_schema.messages import Motion, Tick
+from bus_schema.messages import Tick
 from bus_schema.rpc import Goal
 from mobee.arrays import Array
 from mobee.control.gains import Settle
@@ -24,6 +24,7 @@ from services.common.service import Service
 
 TAKE_TIMEOUT = 8.0  # s until the parts are under control and their goals free
 CLOCK_TIMEOUT = 5.0  # s within which the robot's clock must advance
+WINDOW, DRIFT = 0.3, 1e-3  # s; rad by which the mean of the encoders may change from one window to the next in a part at rest
 REST_TIMEOUT = 60.0  # s until the parts rest after the motion; the controller ends an action before
 
 
@@ -44,10 +45,14 @@ class BusFollower(BusPlant):
         return self._seen[-1][1]
 
     def come_to_rest(self, parts: Sequence[str], settle: Settle) -> None:
-        """Wait until these parts are commanded no more than speed and acceleration of `settle`; raises MobeeError after TAKE_TIMEOUT."""
+        """Wait until these parts rest; raises MobeeError after TAKE_TIMEOUT.
+
+        They rest when they are commanded no more than speed and acceleration of `settle`, and their encoders do not drift: below the
+        published speed, 1 deg/s, a spring can still be half a degree from its goal.
+        """
 
         def moving() -> list[str]:
-            return [part for part in parts if (one := self._motion.get(part)) is None or not self._rests(part, one, settle)]
+            return [part for part in parts if not self._is_commanded_to_rest(part, settle) or self._drifts(part)]
 
         self._service.spin(time.monotonic() + TAKE_TIMEOUT, lambda: not moving())
         if moving():
@@ -139,7 +144,19 @@ class BusFollower(BusPlant):
     def _note_tick(self, tick: Tick) -> None:
         self._seen.append((tick.t * 1e-9, np.array(tick.q)))
 
-    def _rests(self, part: str, motion: Motion, settle: Settle) -> bool:
+    def _is_commanded_to_rest(self, part: str, settle: Settle) -> bool:
+        motion = self._motion.get(part)
+        if motion is None:
+            return False
         unit = fine_units(self.robot)[self.robot.part(part).slice]
         slow, calm = np.abs(motion.dq) <= settle.speed * unit, np.abs(motion.ddq) <= settle.acceleration * unit
         return bool((slow & calm).all())
+
+    def _drifts(self, part: str) -> bool:
+        where, now = self.robot.part(part).slice, self._now
+        seen = [(t, q[where]) for t, q in self._seen if t > now - 2.0 * WINDOW]
+        before, after = ([q for t, q in seen if (t > now - WINDOW) is late] for late in (False, True))
+        if not before or not after or now - seen[0][0] < 1.5 * WINDOW:
+            return True  # not seen for long enough
+        change = np.mean(after, axis=0) - np.mean(before, axis=0)
+        return bool((np.abs(change) > DRIFT * fine_units(self.robot)[where]).any())
