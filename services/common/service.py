@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from functools import partial
+from functools import cache, partial
 from numbers import Integral
 from types import FrameType, TracebackType
 from typing import Self, TypeVar
@@ -361,9 +361,15 @@ def _measured(value: float) -> int | float | None:
 
 def return_free_memory() -> None:
     """Return memory that is free to the system, if the C library can: after the start 23 MB if meshes were read."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc
+    trim = _malloc_trim()
     if trim is not None:
         trim(0)
+
+
+@cache
+def _malloc_trim() -> Callable[[int], int] | None:
+    """Return the function of glibc, None with another C library; each `CDLL` makes classes that only a full collection frees."""
+    return getattr(ctypes.CDLL(None), "malloc_trim", None)
 
 
 def _leave() -> None:
