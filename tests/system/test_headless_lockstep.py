@@ -33,7 +33,7 @@ def test_forty_seconds_at_the_table(tmp_path: Path) -> None:
 
 
 def test_without_contact_forces_solids_touch(tmp_path: Path) -> None:
-    summary = in_lockstep(tmp_path, 1500, "services.model.contact_forces=false")
+    summary = in_lockstep(tmp_path, 800, "services.model.contact_forces=false")
     assert summary["solid_contact_ticks"] > 0
     assert summary["deepest_solid_contact_m"] > 0.0
     assert summary["closest_gap_m"] < 0.001
