@@ -12,7 +12,7 @@ from typing import IO
 
 from mcap.writer import CompressionType, Writer
 
-FILES = 128  # of which a full recording consists; the index of the one that is written is in memory, and pins more memory around it
+FILES = 128  # of which a full recording consists; the index of the one that is written is in memory, 60 kB a megabyte
 _NAME = re.compile(r"messages-(\d{4,})\.mcap$")
 MOST_CHANNELS = 5000  # of a file: the format numbers 65 535, and every chunk has an index of each
 _CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
