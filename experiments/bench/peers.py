@@ -29,7 +29,7 @@ def load_cma() -> Any:
 
 
 class CmaStrategy:
-    """CMA-ES with its default rates, with the methods of the library's strategies: `ask` for a generation, `tell` its costs."""
+    """CMA-ES with its default rates and the methods of the library's strategies: `ask` returns a generation, `tell` takes its costs."""
 
     def __init__(
         self, start: Array, std: float, seed: int, population: int | None = None, limits: tuple[float, float] | None = None

@@ -91,7 +91,9 @@ def learned_worth(predictor: RewardPredictor) -> Worth:
 
 
 def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> Worth:
-    """Return a function of places, without learning: the manipulability sqrt(det J J^T) of the arm near each, relative to the largest.
+    """Return a function of places (k, 3) m: the manipulability sqrt(det J J^T) of the arm near each, relative to the largest.
+
+    Unlike `learned_worth` it needs no learner.
 
     It is taken from random postures; those in which the robot touches itself do not count.  A place that is near to none of them has
     minus its distance [m] from the nearest one.

@@ -100,7 +100,7 @@ class SideGrasp:
         return self._closed(q, self.grip.fingers, self.grip.thumb)
 
     def squeezed(self, q: Array) -> Array:
-        """Return goals (m,) rad of the fingers' motors that hold a thing: a little farther closed than q (n,) rad, where it stopped them.
+        """Return the goals (m,) rad with which the fingers hold a thing: a little more closed than at q (n,) rad, where it stopped them.
 
         With farther goals strong fingers would slowly push the thing out of the hand.
         """

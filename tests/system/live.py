@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import zenoh
 
 from bus_schema import decode, keys
@@ -195,10 +196,10 @@ class Watcher:
         seen = self.states[part]
         return max((abs(v) for v in seen[-1].dq), default=0.0) if seen else 0.0
 
-    def rests(self, part: str, slower: float = 0.06, ticks: int = 50) -> bool:
-        """Whether all motors of the part were slower in each of the last ticks; the noise of 16 encoders seems 0.03 rad/s fast."""
-        recent = self.states[part][-ticks:]
-        return len(recent) == ticks and all(max(map(abs, state.dq)) < slower for state in recent)
+    def rests(self, part: str) -> bool:
+        """Whether all motors of the part are slower than 0.02 rad/s: means of a quarter of a second, since one tick is mostly noise."""
+        recent = np.array([state.q for state in self.states[part][-50:]])
+        return len(recent) == 50 and bool(np.abs(recent[25:].mean(axis=0) - recent[:25].mean(axis=0)).max() < 0.02 * 0.25)
 
     def wait_moving(self, parts: tuple[str, ...], faster: float = 0.1, timeout: float = 40.0) -> None:
         until(lambda: all(self.speed(part) > faster for part in parts), timeout, f"{', '.join(parts)} move")

@@ -74,6 +74,7 @@ def test_a_roadmap_is_played_on_the_running_robot(live: tuple[Launch, Watcher], 
     )
     played = command("roadmap", "play", str(two_poses(tmp_path / "map.npz")), "--to", "1", "--live", "--endpoint", system.endpoint)
     print(f"remaining error {1e3 * played['remaining_error']:.1f} mm")
+    assert played["remaining_error"] < 0.005  # m; up to 0.0104 from a torso that still turns when the path is planned
     assert played["arrived"] and played["solid"] == 0.0 and played["seconds"] > 1.0
     seen = [one for one in seen if one.src == seen[-1].src]  # of the last attempt
     assert {one.phase for one in seen[:-1]} == {"moving"} and len(seen) > 3

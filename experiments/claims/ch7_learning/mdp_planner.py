@@ -69,7 +69,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn with a seed, and follow plans to random goals; returns means over these queries."""
+    """Learn with a seed, then follow plans to random goals; returns the means over these goals."""
     condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
     queries = Queries.of_seed(plant, space, settings["queries"], seed)

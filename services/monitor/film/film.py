@@ -34,7 +34,7 @@ def film(run: Path, file: Path, progress: Callable[[float], None] = lambda share
     if file.suffix not in (".gif", ".mp4"):
         raise InvalidValue(f"{file}: a film is a .gif or a .mp4: give a name with one of these endings.")
     story = Story(run)
-    begin, pictures = told_from(story), []
+    begin, pictures = first_complete_moment(story), []
     moments = [begin + moment for moment in scene_times(story.length - begin)]
     artist = Artist(story, moments[::FRAMED])
     for number, moment in enumerate(moments):
@@ -51,8 +51,8 @@ def scene_times(length: float) -> list[float]:
     return [float(begin + stretch * frame / frames) for begin in begins for frame in range(frames)]
 
 
-def told_from(story: Story) -> float:
-    """Return when all agents have begun to act and the world is known, s since the begin; 0 if that is later than a tenth of the run."""
+def first_complete_moment(story: Story) -> float:
+    """Return when all agents have begun to act and the world is known, s since the beginning; 0 if that is later than a tenth of it."""
     cards, objects = story.tracks.get("cards"), story.tracks.get("objects")
     if cards is None:
         return 0.0
