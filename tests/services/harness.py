@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,6 +25,7 @@ from experiments.kit.live.launch import free_endpoint
 from mobee.robot.robot import Robot
 from services.common import rpc
 from services.common.bus import Bus
+from services.common.service import FRESH_STATS, STATS_PERIOD
 from services.common.session import open_router
 
 ROOT = Path(__file__).parents[2]
@@ -89,6 +91,7 @@ class Rig:
         self._kept: list[Any] = []
         self._programs: list[Program] = []
         self._tokens: dict[tuple[str, str], Any] = {}
+        self._stat_times: dict[str, deque[float]] = {}  # per service, monotonic clock
         liveliness = self.session.liveliness()
         self._kept.append(liveliness.declare_subscriber(keys.ALL_ALIVE, self._note_alive, history=True))
         self.token("router", "rig")
@@ -174,7 +177,12 @@ class Rig:
         return rpc.call(self.session, who, key, request, reply, timeout=timeout, **fields)
 
     def stat(self, who: str) -> Stat:
-        return self.call(keys.service_rpc(who, "stat"), Empty, Stat)
+        """Return the status of a service, computed for this call: a service repeats its last one if it is asked too often."""
+        times = self._stat_times.setdefault(who, deque([0.0] * FRESH_STATS, FRESH_STATS))
+        time.sleep(max(times[0] + 1.1 * STATS_PERIOD - time.monotonic(), 0.0))
+        stat = self.call(keys.service_rpc(who, "stat"), Empty, Stat)
+        times.append(time.monotonic())
+        return stat
 
     def _guarded(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
         def run(thing: Any) -> None:
