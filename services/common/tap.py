@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import zenoh
@@ -34,13 +34,13 @@ class Raw(Struct, frozen=True, gc=False):
 class Tap:
     """The messages of some keys.
 
-    Zenoh's thread stores them without Python, so that this process, however slowly it runs, delays no sender; beyond the capacity the
-    oldest are lost.
+    Zenoh's thread stores them without Python, so that this process, however slowly it runs, delays no sender; of more messages than may
+    wait the oldest are lost.
     """
 
-    def __init__(self, session: zenoh.Session, keys: Iterable[str], capacity: int) -> None:
-        """`capacity`: messages of each key expression that may wait."""
-        self._streams = [(key, session.declare_subscriber(key, RingChannel(capacity))) for key in keys]
+    def __init__(self, session: zenoh.Session, queues: Mapping[str, int]) -> None:
+        """`queues`: how many messages of each key expression may wait."""
+        self._streams = [(key, session.declare_subscriber(key, RingChannel(capacity))) for key, capacity in queues.items()]
 
     def drain(self) -> list[Raw]:
         """Return the messages that have arrived since the last call, in the order of their times of publication."""

@@ -14,7 +14,25 @@ import msgspec
 from msgspec import Struct
 
 from bus_schema import UNDECODABLE, encoding_of
-from bus_schema.messages import Camera, Clock, Contacts, Count, Image, Message, Pose, State
+from bus_schema.messages import (
+    Camera,
+    Clock,
+    Command,
+    Commands,
+    Contacts,
+    Count,
+    Follow,
+    Forces,
+    Image,
+    Message,
+    Motion,
+    Pose,
+    Reach,
+    State,
+    Targets,
+    Tick,
+    Truth,
+)
 from bus_schema.page import streams
 from mobee.robot.robot import Robot
 from services.common.service import Service, return_free_memory
@@ -26,7 +44,8 @@ from services.recorder.views import Views
 PERIOD = 0.25  # s between two checks for new messages; the time of the check is stored as the time of receipt
 FLUSH_PERIOD = 0.5  # s between two flushes, which bound what a kill of this process loses
 RETRY_PERIOD = 2.0  # s after which a recording that failed, as on a full disk, is tried again
-CAPACITY, LOCKED_CAPACITY = 5000, 20_000  # messages of each stream that wait, live and in lockstep; of more the oldest are lost
+CAPACITY, LOCKED_CAPACITY = 5000, 20_000  # messages that wait of a stream of PER_TICK, live and in lockstep; of more the oldest are lost
+OTHER_CAPACITY, OTHER_LOCKED_CAPACITY = 1000, 2000  # the same for each of the other streams
 KNOWN = 5000  # keys and senders that are remembered; a sender may invent more
 TRIM_PERIOD = 10.0  # s between two returns of free memory: a flood of messages leaves 100 MB of it
 NICENESS = 10
@@ -57,10 +76,21 @@ def sender_of(payload: bytes) -> tuple[str, int] | None:
 FOR_SUBSCRIBERS: tuple[type[Message], ...] = (Clock, State, Pose, Contacts, Image, Camera)
 """Streams that need not be published without a subscriber, and that follow from the ticks and the robot's world."""
 
+PER_TICK: tuple[type[Message], ...] = (
+    Clock, Tick, State, Command, Commands, Motion, Follow, Reach, Targets, Pose, Forces, Contacts, Truth,
+)  # fmt: skip
+"""Streams that may have a message in every tick."""
 
-def recorded_keys(everything: bool) -> list[str]:
-    """Return the key expressions of the streams that are recorded."""
-    return [cls.stream.keys() for cls in streams() if everything or cls not in FOR_SUBSCRIBERS]
+
+def queues(everything: bool, locked: bool) -> dict[str, int]:
+    """Return the key expressions of the streams that are recorded, each with the number of messages that may wait.
+
+    Zenoh allocates 0.25 kB per place at once, but a place takes memory only when it is used for the first time. A long queue of a stream
+    with few messages would therefore grow for hours.
+    """
+    most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
+    recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
+    return {cls.stream.keys(): most if cls in PER_TICK else others for cls in recorded}
 
 
 class RecorderNode:
@@ -77,7 +107,7 @@ class RecorderNode:
         self._failed_at = self._flushed = 0.0  # monotonic clock
         self._trouble = ""
         self._last: dict[tuple[str, str], int] = {}  # number of the last message of each key and sender
-        self._tap = Tap(service.bus.session, recorded_keys(config.everything), LOCKED_CAPACITY if service.locked else CAPACITY)
+        self._tap = Tap(service.bus.session, queues(config.everything, service.locked))
         service.describe, service.mark = self._describe, self._mark
         self._mark()
         service.on_alive(self._note_token)

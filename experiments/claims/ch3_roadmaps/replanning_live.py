@@ -215,7 +215,7 @@ class ContactStopPlant(BusPlant):
         self._watcher = None if watcher is None else Participant(watcher)
         if watcher is not None:
             watcher.on_clock(self._note_watch)
-        service.on_each(Forces, self._feel, "model")
+        service.on_each(Forces, self._record_bump, "model")
         service.on_each(Commands, self._note_commands)
 
     def act(self, part: str, target: Array) -> Outcome:
@@ -240,7 +240,7 @@ class ContactStopPlant(BusPlant):
         motion = self._motion.get(part)
         return self.bump is not None and motion is not None and motion.action_id == action_id
 
-    def _feel(self, forces: Forces) -> None:
+    def _record_bump(self, forces: Forces) -> None:
         if not self._objects.isdisjoint(forces.touched.get(self._part, ())):
             if forces.t - self._last > MIN_GAP and self.bump is None:
                 self.bump = forces.re_k

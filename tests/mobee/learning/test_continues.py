@@ -25,7 +25,7 @@ def agent(folder: Path, name: str, dt: float = 0.02, seed: int = 0, continues: P
     return CuriousAgent(SPACE, plant, seed=seed, store=TransitionStore(folder / name, PART), continues=continues)
 
 
-def test_it_has_learned_what_the_first_had_and_goes_on(tmp_path: Path) -> None:
+def test_it_has_learned_what_the_first_had_and_continues(tmp_path: Path) -> None:
     first = agent(tmp_path, "first.sqlite")
     first.run(12)
     second = agent(tmp_path, "second.sqlite", dt=0.01, continues=tmp_path / "first.sqlite")
