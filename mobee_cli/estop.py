@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import sys
 import time
 from typing import Any
 
@@ -15,6 +16,8 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
+from services.common.emergency_stop import StopRecord
+from services.common.exit_codes import ENVIRONMENT
 from services.common.observe import Received, alive, listen
 
 _REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under attack is slow
@@ -29,17 +32,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Send the stop or the release, and wait until the robot confirms it."""
-    with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
-        if arguments.reset:
-            try:
-                rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)
-            except rpc.CallFailed as failed:
-                raise UserError(f"the robot was not released: {failed}") from None
-            print("released: the controller arms the parts again, and running agents continue")
-        else:
+    if arguments.reset:
+        _release(arguments.endpoint)
+        return 0
+    recorded = _recorded(arguments.endpoint, arguments.reason)  # before the connection, which may take long in a flood
+    try:
+        with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
             parts = _stop(session, arguments.reason)
-            print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
+    except UserError as error:
+        if recorded and error.code == ENVIRONMENT:  # there is no router
+            kept = "The stop is recorded: robot_sim obeys the record if it still runs, and comes up stopped if it does not."
+            raise UserError(f"{error} {kept}", ENVIRONMENT) from None
+        raise
+    print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
     return 0
+
+
+def _release(endpoint: str) -> None:
+    with connected(endpoint, _CONNECT_PATIENCE) as session:
+        try:
+            rpc.call(session, "mobee", keys.ESTOP_RESET, Empty, Done, timeout=2.0)
+        except rpc.CallFailed as failed:
+            raise UserError(f"the robot was not released: {failed}") from None
+    print("released: the controller arms the parts again, and running agents continue")
+
+
+def _recorded(endpoint: str, reason: str) -> bool:
+    """Record the stop, if the robot was launched on this machine; say why that fails."""
+    try:
+        return StopRecord.of_endpoint(endpoint).add("mobee", reason[:2000])
+    except OSError as error:
+        print(f"mobee estop: the stop is sent on the bus only: {error.filename} cannot be written: {error.strerror}", file=sys.stderr)
+        return False
 
 
 def _stop(session: Any, reason: str) -> list[str]:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop beyond one process: its record on disk, and the session on which robot_sim receives it."""
+"""The emergency stop beyond one process: its record on disk, and the session on which robot_sim receives it.
+
+A client on robot_sim's machine writes the record itself (`StopRecord.add`), and robot_sim watches it: that stop needs no router.
+"""
 
 from __future__ import annotations
 
@@ -45,12 +48,16 @@ class StopRecord:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._seen: tuple[int, int] | None = None  # inode and time of the last change
 
     @classmethod
-    def of_endpoint(cls, endpoint: str) -> StopRecord:
-        """The record of the robot that is reached at an endpoint of this machine; all its runs share it."""
+    def of_endpoint(cls, endpoint: str, states: Path | None = None) -> StopRecord:
+        """The record of the robot that is reached at an endpoint of this machine; all its runs share it.
+
+        `states`: the folder of states of the user who has launched it; None: of this process.
+        """
         endpoint = re.sub("^(tls|quic)/", "tcp/", endpoint)  # a stop stays in force with or without security
-        states = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
+        states = states or Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
         return cls(states / FOLDER / f"{re.sub(r'[^A-Za-z0-9]+', '-', endpoint).strip('-')}.json")
 
     @property
@@ -78,6 +85,26 @@ class StopRecord:
             return Stop(str(found["source"]), str(found["reason"]), float(found["time"]))
         except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
             return Stop("robot_sim", f"the record of emergency stops {self._path} cannot be read ({type(error).__name__})")
+
+    def new_stop(self) -> Stop | None:
+        """Return the stop in force if the file has changed since the last call; its removal, at the end of a launch, is no stop."""
+        try:
+            found = self._path.stat()
+        except OSError:
+            return None
+        if self._seen == (seen := (found.st_ino, found.st_mtime_ns)):
+            return None
+        self._seen = seen
+        return self.read() if self._path.exists() else None
+
+    def add(self, source: str, reason: str) -> bool:
+        """Stop the robot, unless a stop is in force; returns False if there is no record, so that no robot watches it.  Raises OSError."""
+        if not self._path.exists():
+            return False
+        stop = Stop(source, reason, time.time())
+        if replaces(stop, self.read()):
+            self.latch(stop)
+        return True
 
     def latch(self, stop: Stop) -> None:
         """Record a stop; raises OSError."""

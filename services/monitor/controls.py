@@ -38,6 +38,7 @@ from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.reach import TARGET
 from mobee.robot.robot import Robot
+from services.common.emergency_stop import StopRecord
 from services.common.hands import hand_for, hand_of, part_of
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -155,8 +156,11 @@ class PageControls:
 
     def _stop(self) -> str:
         give_up = time.monotonic() + STOP_PATIENCE
+        source, reason = "page", "pressed on the page"
+        with suppress(OSError):  # the bus remains
+            StopRecord.of_endpoint(self._service.config.endpoint).add(source, reason)
         while time.monotonic() < give_up:
-            self._estop.put(set=True, source="page", reason="pressed on the page")
+            self._estop.put(set=True, source=source, reason=reason)
             time.sleep(STOP_PERIOD)
             if self._known.gates and all(gate == "estop" for gate in self._known.gates.values()):
                 return "Stopped: all motors."

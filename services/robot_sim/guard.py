@@ -195,6 +195,8 @@ class Guard:
         for message in self._line.take():
             if message.src != self._service.who or message.run != self._service.bus.run:  # not this process's own repetition
                 self._obey(Stop(message.source, message.reason, time.time()))
+        if self._record is not None and (recorded := self._record.new_stop()) is not None:
+            self._obey(recorded)
 
     def _obey(self, stop: Stop) -> None:
         if not replaces(stop, self._stop):
@@ -202,7 +204,7 @@ class Guard:
         if self._stop is None:
             self._stop_all(stop)
         self._stop = stop
-        if self._record is not None:
+        if self._record is not None and self._record.read() != stop:
             try:
                 self._record.latch(stop)
             except OSError as error:

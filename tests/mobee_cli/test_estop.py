@@ -6,14 +6,17 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from bus_schema import VERSION, encode, encoding_of, keys
 from bus_schema.messages import EStop, State
 from bus_schema.rpc import Done
+from mobee_cli import estop
 from mobee_cli.__main__ import main
 from services.common.bus import Bus
+from services.common.emergency_stop import StopRecord
 from services.common.observe import listen
 from services.common.session import open_router
 
@@ -82,6 +85,21 @@ def test_a_part_that_does_not_stop_is_named(robot: Robot, endpoint: str, capsys:
     robot.deaf.add("torso")
     assert main(["estop", "--endpoint", endpoint]) == 1
     assert "torso did not stop" in capsys.readouterr().err
+
+
+def test_a_stop_is_recorded_although_no_router_answers(
+    endpoint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(estop, "_CONNECT_PATIENCE", 0.1)
+    record = StopRecord.of_endpoint(endpoint)
+    assert main(["estop", "--endpoint", endpoint]) == 3
+    assert "recorded" not in capsys.readouterr().err
+    record.create()
+    assert main(["estop", "--endpoint", endpoint, "--reason", "smoke"]) == 3
+    assert "The stop is recorded: robot_sim obeys the record if it still runs" in capsys.readouterr().err
+    stop = record.read()
+    assert stop is not None and (stop.source, stop.reason) == ("mobee", "smoke")
 
 
 def test_reset_releases(robot: Robot, endpoint: str) -> None:

@@ -16,8 +16,10 @@ from bus_schema import keys
 from bus_schema.rpc import Empty, Stat
 from experiments.kit.live.launch import LaunchFailed, free_endpoint, launch_command, stop
 from services.common import rpc
+from services.common.emergency_stop import StopRecord
 
 _START_TIMEOUT = 120.0  # s
+_STATES = "state"  # folder of states
 
 
 @dataclass
@@ -34,6 +36,11 @@ class System:
         return next((self.folder / "runs").iterdir())
 
     @property
+    def stop_record(self) -> StopRecord:
+        """The record of its emergency stops."""
+        return StopRecord.of_endpoint(self.endpoint, self.folder / _STATES)
+
+    @property
     def says(self) -> str:
         """The lines of its screen so far."""
         return (self.folder / "launcher.err").read_text()
@@ -46,7 +53,7 @@ def running(folder: Path, scenario: str) -> Iterator[System]:
     `folder`: an empty one.  Raises LaunchFailed.
     """
     endpoint = free_endpoint()
-    environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
+    environment = {**os.environ, "XDG_STATE_HOME": str(folder / _STATES)}
     with (folder / "launcher.err").open("w") as errors:
         argv = launch_command(scenario, endpoint, folder / "runs", ())
         process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=errors, text=True, process_group=0, env=environment)

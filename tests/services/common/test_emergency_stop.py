@@ -32,6 +32,34 @@ def test_a_record_holds_the_stop_until_its_release_and_the_newest_creation_chang
     assert list(record.path.parent.iterdir()) == []
 
 
+def test_a_stop_that_another_process_records_is_noticed_once_and_the_end_of_a_launch_is_none(tmp_path: Path) -> None:
+    watching, other = StopRecord(tmp_path / "stop.json"), StopRecord(tmp_path / "stop.json")
+    assert watching.new_stop() is None
+    other.create()
+    assert watching.new_stop() is None
+    other.latch(STOP)
+    assert [watching.new_stop() for _ in range(2)] == [STOP, None]
+    other.release()
+    assert watching.new_stop() is None
+    other.remove()
+    assert watching.new_stop() is None
+
+
+def test_a_stop_is_recorded_for_a_robot_of_this_machine_only_and_does_not_replace_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    endpoint = "tcp/127.0.0.1:7447"
+    record = StopRecord.of_endpoint(endpoint)
+    assert not record.add("page", "pressed")
+    assert not record.path.parent.exists()
+    record.create()
+    assert StopRecord.of_endpoint("tls/127.0.0.1:7447").add("page", "pressed")
+    assert record.add("mobee", "later")
+    stop = record.read()
+    assert stop is not None and (stop.source, stop.reason) == ("page", "pressed")
+
+
 DAMAGED = [b"", b"{", b"null", b"[]", b'{"stopped": true}', b'{"stopped": 0}', b'{"stopped": "false"}', b"\xff\x00", b"[" * 100_000]
 
 

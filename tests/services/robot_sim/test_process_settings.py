@@ -13,7 +13,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
 from experiments.kit.live.launch import free_endpoint
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import Stop, StopRecord
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
@@ -108,6 +108,20 @@ def test_a_stop_outlives_the_process_and_that_of_a_client_replaces_that_of_the_l
         bus.start("services.robot_sim", "robot_sim", *options)
         bench.follow()
         assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
+        bus.call(keys.ESTOP_RESET, Empty, Done)
+        assert record.read() is None
+        assert bench.next_state("torso").gate == "hold"
+
+
+def test_a_stop_in_the_record_is_obeyed_without_a_message(tmp_path: Path) -> None:
+    record = StopRecord(tmp_path / "stop.json")
+    record.create()
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "kinematic", "--stop-record", str(record.path))
+        stop = Stop("mobee", "a hand in the way", time.time())
+        record.latch(stop)
+        wait_for(lambda: all(bench.next_state(part).gate == "estop" for part in ROBOT.parts), "the stop")
+        assert record.read() == stop
         bus.call(keys.ESTOP_RESET, Empty, Done)
         assert record.read() is None
         assert bench.next_state("torso").gate == "hold"
