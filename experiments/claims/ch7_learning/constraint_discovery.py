@@ -18,7 +18,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -29,7 +29,7 @@ from experiments.kit.cells import CellResult
 from experiments.kit.experiment import Claim, Envelope, Experiment, Measured, judged
 from experiments.kit.learning.arm import arm_plant, arm_space
 from experiments.kit.learning.exploration import LeastTries, begin_anywhere, explore
-from experiments.kit.learning.outcomes import exists_in, failures_of, uncertain_in, visits_of
+from experiments.kit.learning.outcomes import exists_in, failures_of, uncertain_of, visits_of
 from experiments.kit.plots import draw_stacked_bars, new_figure
 from experiments.kit.rules import all_hold, decides, is_above, of_each, rises, row, texts, within
 from experiments.kit.statistics import estimate, interquartile_mean, interval, ratio_estimate, relative_spread
@@ -82,29 +82,32 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Reduce the values of a trial to visits (81,), failures and tries (81, 8), and the values at the end (81, 8) for the figure."""
+    space, seen = arm_space(), values["seen"]
+    counts = {"visits": visits_of(space, seen), "failures": failures_of(space, seen), "tries": values["tries"]}
+    return {name: count.astype(np.uint16) for name, count in counts.items()} | {"values": values["values"].astype(np.float16)}
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One exploration: transitions (T, 3), tries (81, 8), and the values at the end (81, 8)."""
+    """One exploration: visits (81,) of the states, failures and tries (81, 8) of the actions, and the values at the end (81, 8)."""
 
     space: Lattice
-    seen: Ints
+    visits: Ints
+    failures: Ints
     tries: Ints
     values: Array
 
     @property
     def transitions(self) -> float:
         """The number of transitions."""
-        return float(len(self.seen))
+        return float(self.visits.sum())
 
-    @cached_property
-    def visits(self) -> Ints:
-        """The number of times each state was reached, (81,)."""
-        return visits_of(self.space, self.seen)
-
-    @cached_property
-    def failures(self) -> Ints:
-        """The number of tries of each state-action that did not end in its goal, (81, 8)."""
-        return failures_of(self.space, self.seen)
+    @property
+    def uncertain(self) -> float:
+        """The number of actions that failed in 10 to 90 % of their tries."""
+        return float(uncertain_of(self.failures, self.tries))
 
     @property
     def exists(self) -> NDArray[np.bool_]:
@@ -143,7 +146,8 @@ def groups(found: Cells) -> Laws:
     """Return the runs under each law, by seed."""
 
     def of(result: CellResult) -> Run:
-        return Run(arm_space(), *(result.values[name] for name in ("seen", "tries", "values")))
+        visits, failures, tries = (result.values[name].astype(np.intp) for name in ("visits", "failures", "tries"))
+        return Run(arm_space(), visits, failures, tries, result.values["values"].astype(float))
 
     every = runs_by(found, of, "law", "initial", "discount")
     each = {law: {key[1:]: runs for key, runs in sorted(every.items()) if key[0] == law} for law in LAWS}
@@ -319,8 +323,9 @@ uniform = _law_claim("thesis 7.2.4", "tries of state-actions are more uniform th
 
 
 def _stochastic(grouped: Groups) -> Measured:
-    counts = [float(uncertain_in(run.space, run.seen)) for run in _every(grouped)]
-    return within(counts, 1, least=1.0, text="{} of 432 actions per run fail in 10 to 90 % of their tries")
+    return within(
+        [run.uncertain for run in _every(grouped)], 1, least=1.0, text="{} of 432 actions per run fail in 10 to 90 % of their tries"
+    )
 
 
 stochastic = _law_claim(
@@ -366,6 +371,6 @@ EXPERIMENT = Experiment(
     claim="three of 81 states are hard to enter, because actions into them fail; agents that plan farther ahead or expect success "
     "try more there",
     source="thesis 7.2.2-7.2.5",
-    method=Sweep(conditions, trial, findings, plot),
+    method=Sweep(conditions, trial, findings, plot, summary=summary),
     claims=CLAIMS,
 )

@@ -81,7 +81,12 @@ def first_tries(space: Lattice, seen: Ints) -> Ints:
 
 def uncertain_in(space: Lattice, seen: Ints) -> int:
     """Return the number of actions that failed in 10 to 90 % of their tries."""
-    shares = failure_shares(space, seen)
+    return uncertain_of(failures_of(space, seen), tries_of(space, seen))
+
+
+def uncertain_of(failures: Ints, tries: Ints) -> int:
+    """Return the number of actions that failed in 10 to 90 % of their tries, both (S, A)."""
+    shares = failures / np.maximum(tries, 1)
     return int(((shares > UNCERTAIN[0]) & (shares < UNCERTAIN[1])).sum())
 
 

@@ -17,6 +17,7 @@ from experiments.claims.ch7_learning.constraint_discovery import (
     peaks,
     sooner,
     stochastic,
+    summary,
 )
 from experiments.kit.learning.arm import arm_space
 from tests.experiments.finished_cells import Cell, finished
@@ -34,7 +35,7 @@ def explored(failing: int, discount: float = 0.9):
     seen = np.array(rows, dtype=np.uint16)
     tries = np.zeros(SPACE.goals.shape, dtype=np.uint16)
     np.add.at(tries, tuple(seen[:, :2].T.astype(int)), 1)
-    return {"seen": seen, "tries": tries, "values": np.where(SPACE.goals >= 0, discount, -np.inf)}
+    return summary({"seen": seen, "tries": tries, "values": np.where(SPACE.goals >= 0, discount, -np.inf)})
 
 
 def every_setting(work):
