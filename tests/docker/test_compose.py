@@ -3,8 +3,9 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import subprocess
-from functools import cache
+import runpy
+import sys
+import warnings
 
 import pytest
 
@@ -71,18 +72,24 @@ def test_the_module_of_a_command_can_be_run(name: str) -> None:
     assert module_exists(name)
 
 
-@cache
-def usage(*program: str) -> str:
-    """What the program prints with --help."""
-    done = subprocess.run([*program, "--help"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def usage(program: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> str:
+    """What a program, `python -m MODULE ...`, prints with --help."""
+    _, option, module, *arguments = program
+    assert option == "-m"
+    monkeypatch.setattr(sys, "argv", [module, *arguments, "--help"])
+    with pytest.raises(SystemExit) as end, warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of a module that another test has imported
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    assert end.value.code in (0, None)
+    return capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", compose_commands())
-def test_a_command_uses_options_that_its_program_has(name: str) -> None:
+def test_a_command_uses_options_that_its_program_has(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     argv = as_processes(7999)[name]
     first_option = next(i for i, word in enumerate(argv) if word.startswith("--"))
-    known = usage(*argv[:first_option])
+    known = usage(argv[:first_option], monkeypatch, capsys)
     for option in (word for word in argv if word.startswith("--")):
         assert re.search(rf"(?<![\w-]){option}(?![\w-])", known), option

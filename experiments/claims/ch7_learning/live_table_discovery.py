@@ -22,7 +22,7 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -165,6 +165,13 @@ def distances(runs: Runs) -> dict[str, list[Distance]]:
     return {OFFLINE: [distance(one, others, MIN_TRIES) for one, others in zip(offline, without, strict=True)]} | live
 
 
+class Found(NamedTuple):
+    """All finished runs, and how far each is from the offline seeds."""
+
+    runs: Runs
+    apart: Mapping[str, list[Distance]]
+
+
 NUMBERS: dict[str, Callable[[Run], float]] = {"touch": lambda run: run.touch, "lean": lambda run: run.lean}
 
 
@@ -176,7 +183,7 @@ def results(folder: Path) -> dict[str, Any]:
         "transitions": int(runs[OFFLINE][0].result.cell.settings["transitions"]),
         "runs": {name: _row(group, apart[name]) for name, group in runs.items()},
         "at the table": {f"{name}, {part}": _ends(group, part) for name, group in runs.items() for part in TASKS[TASK].parts},
-        "claims": judged(CLAIMS, runs),
+        "claims": judged(CLAIMS, Found(runs, apart)),
     }
 
 
@@ -207,11 +214,11 @@ def _ends(runs: Sequence[Run], part: str) -> dict[str, int]:
     "that of another offline run",
     "equivalent",
 )
-def equal(runs: Runs) -> Measured:
-    found = {name: [one.variation for one in group] for name, group in distances(runs).items()}
-    spans = {name: difference_interval(found[name], found[OFFLINE]) for name in _live(found)}
-    text = texts(found, 4)
-    return _of_enough(runs, text, [decides(span, most=VARIATION) for span in spans.values()])
+def equal(found: Found) -> Measured:
+    variations = {name: [one.variation for one in group] for name, group in found.apart.items()}
+    spans = {name: difference_interval(variations[name], variations[OFFLINE]) for name in _live(variations)}
+    text = texts(variations, 4)
+    return _of_enough(found.runs, text, [decides(span, most=VARIATION) for span in spans.values()])
 
 
 @claim(
@@ -219,8 +226,8 @@ def equal(runs: Runs) -> Measured:
     f"live agents touch the table as often as offline ones: share of the arms' actions, second half, within {TOUCH}",
     "equivalent",
 )
-def touches(runs: Runs) -> Measured:
-    return _equivalent(runs, NUMBERS["touch"], TOUCH, 3)
+def touches(found: Found) -> Measured:
+    return _equivalent(found.runs, NUMBERS["touch"], TOUCH, 3)
 
 
 @claim(
@@ -228,8 +235,8 @@ def touches(runs: Runs) -> Measured:
     f"a live torso leans forward as often as an offline one: mean tries over those of its other actions, second half, within {LEAN}",
     "equivalent",
 )
-def leans(runs: Runs) -> Measured:
-    return _equivalent(runs, NUMBERS["lean"], LEAN, 2)
+def leans(found: Found) -> Measured:
+    return _equivalent(found.runs, NUMBERS["lean"], LEAN, 2)
 
 
 CLAIMS = (equal, touches, leans)
