@@ -21,7 +21,7 @@ from experiments.kit.sweep import Sweep
 from experiments.registry import EXPERIMENTS, load_experiment
 from tests.experiments.options import options_of
 
-QUICK = ("--quick", "--seeds", "1")
+QUICK = ("--quick", "--seeds", "1", "--jobs", "1")
 SHORTEST = {
     "constraint-discovery": QUICK,
     "constraint-violations": ("--gains", "default", "--tries", "2", "--forced-tries", "2"),

@@ -6,19 +6,22 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from experiments.kit.cup.scene import CUP
+from experiments.kit.cup.scene import CUP, TOP
 from experiments.kit.cup.trial import Trial, leans
 
 
-def test_the_hand_puts_the_cup_down_elsewhere() -> None:
+def test_a_hand_closes_around_the_cup_lifts_it_and_puts_it_down_elsewhere() -> None:
     trial = Trial("map", 424)
     before = trial.plant.things[CUP].position[:2].copy()
+    assert trial.scene.clutter
     result = trial.run()
     assert result.done, result.why
     assert result.pre_grasp
+    assert result.distance < 0.01
     assert result.lifted > 0.05
     assert np.linalg.norm(trial.plant.things[CUP].position[:2] - before) > 0.05
     assert not result.knocked
+    assert trial.plant.model.world.objects[CUP].position[2] == pytest.approx(TOP + 0.065)  # the model has not seen that it moved
 
 
 def test_where_no_place_works_the_cup_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
