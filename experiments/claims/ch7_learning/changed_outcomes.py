@@ -135,11 +135,19 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Reduce the transitions of a trial to `tried`, the number of those with a changed action before each check, (checks,)."""
+    kept = {name: value for name, value in values.items() if name != "seen"}
+    states, actions, _ = values["seen"].T
+    tried = values["changed"].astype(bool)[states, actions].reshape(len(values["series"]), CHECK_PERIOD).sum(axis=1)
+    return kept | {"tried": tried.astype(np.uint16)}
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; see `trial`."""
+    """One run; see `trial` and `summary`."""
 
-    seen: Ints
+    tried: Ints
     series: Array  # (checks, 4): errors, then values, each of changed and of unchanged actions
     at_change: float  # error of changed actions, before the first transition after the change
     changed: NDArray[np.bool_]
@@ -153,8 +161,7 @@ class Run:
     @property
     def tries(self) -> Array:
         """Tries of changed actions between two checks, over the mean of all actions, (checks,)."""
-        tried = self.changed[self.seen[:, 0], self.seen[:, 1]].reshape(len(self.series), -1).mean(axis=1)
-        relative: Array = tried * arm_space().state_actions / self.changed.sum()
+        relative: Array = self.tried / CHECK_PERIOD * arm_space().state_actions / self.changed.sum()
         return relative
 
     @property
@@ -214,7 +221,7 @@ def runs_of(found: Cells) -> Runs:
     def of(result: CellResult) -> Run:
         values = result.values
         changed, same = (values[name].astype(bool) for name in ("changed", "same"))
-        return Run(values["seen"].astype(np.intp), values["series"], values["at_change"], changed, same)
+        return Run(values["tried"].astype(np.intp), values["series"], values["at_change"], changed, same)
 
     return runs_by(found, of, "change", "explorer", "forgetting")
 
@@ -352,6 +359,6 @@ def _smooth(rate: Array) -> Array:
 EXPERIMENT = Experiment(
     claim="actions whose outcome suddenly changes are tried until the model is correct again; sooner with forgetting",
     source="thesis 7.2.6",
-    method=Sweep(conditions, trial, findings, plot),
+    method=Sweep(conditions, trial, findings, plot, summary=summary),
     claims=CLAIMS,
 )

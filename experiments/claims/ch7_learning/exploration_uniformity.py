@@ -23,7 +23,7 @@ import numpy as np
 from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
-from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, draw_tries, explored, relative_tries_of
+from experiments.kit.learning.outcomes import Explored, Groups, constraint_actions, draw_tries, explored, in_order, relative_tries_of
 from experiments.kit.plots import draw_heights, new_figure
 from experiments.kit.rules import all_hold, decides, of_each, row, stands_below, texts, within
 from experiments.kit.statistics import estimate, gini, interquartile_mean, interval, ratio_interval, relative_spread
@@ -58,6 +58,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)
     return {"seen": explore(agent, settings["transitions"]).astype(np.uint16)}
+
+
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Sort the transitions, whose order is not needed."""
+    return {"seen": in_order(values["seen"])}
 
 
 def groups(found: Cells) -> Groups:
@@ -184,6 +189,6 @@ def plot(found: Cells) -> Any:
 EXPERIMENT = Experiment(
     claim="curious exploration is more uniform than random and least-tried, except for spikes at actions that run into constraints",
     source="paper 3.1, fig. 5",
-    method=Sweep(conditions, trial, findings, plot),
+    method=Sweep(conditions, trial, findings, plot, summary=summary),
     claims=CLAIMS,
 )

@@ -28,7 +28,7 @@ from experiments.claims.ch7_learning.unreachable_states import DEFLECTED_TO, HAR
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, claim, judged
 from experiments.kit.learning.arm import DT, LEFT, RANK3, RANK4, arm_space, robot
 from experiments.kit.learning.exploration import begin_anywhere, newest
-from experiments.kit.learning.outcomes import ends_of, outcome_counts, visits_of
+from experiments.kit.learning.outcomes import ends_of, in_order, outcome_counts, visits_of
 from experiments.kit.plots import new_figure
 from experiments.kit.rules import all_hold, is_above, texts
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
@@ -143,8 +143,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Sort the transitions: their order is not needed, and a record of sorted ones is small."""
-    return values | {lattice: values[lattice][np.lexsort(values[lattice].T[::-1])] for lattice in LEVELS}
+    """Sort the transitions, whose order is not needed."""
+    return values | {lattice: in_order(values[lattice]) for lattice in LEVELS}
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.claims.ch7_learning import changed_outcomes
-from experiments.claims.ch7_learning.changed_outcomes import CHANGES, CHECK_PERIOD, WINDOW, Run, compare, plant_of, trial
+from experiments.claims.ch7_learning.changed_outcomes import CHANGES, CHECK_PERIOD, WINDOW, Run, compare, plant_of, summary, trial
 from experiments.kit.learning.arm import arm_space
 from experiments.kit.learning.truth import l1, truth_of
 from mobee import TransitionModel
@@ -22,7 +22,8 @@ def a_run(errors):
     series = np.ones((CHECKS, 4))
     series[CHECKS // 2 :, 0] = errors
     series[CHECKS // 2 :, 2] = 3.0
-    return Run(seen, series, 2.0, changed, ~changed)
+    values = summary({"seen": seen, "series": series, "at_change": 2.0, "changed": changed, "same": ~changed})
+    return Run(values["tried"], series, 2.0, changed, ~changed)
 
 
 def test_tries_are_over_the_mean_of_all_actions():
