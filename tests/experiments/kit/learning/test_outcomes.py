@@ -16,6 +16,8 @@ from experiments.kit.learning.outcomes import (
     first_places,
     first_tries,
     goals_of,
+    in_order,
+    outcome_counts,
     relative_tries,
     relative_tries_of,
     tries_of,
@@ -94,3 +96,10 @@ def test_first_tries_are_numbered_from_one():
 
 def test_an_action_is_uncertain_that_sometimes_fails():
     assert uncertain_in(SPACE, SEEN) == 1 and uncertain_in(SPACE, SEEN[3:]) == 0
+
+
+def test_sorted_transitions_have_the_same_counts(rng):
+    shuffled = rng.permutation(SEEN)
+    assert np.array_equal(in_order(shuffled), in_order(SEEN))
+    for counts in (tries_of, failures_of, outcome_counts, visits_of):
+        assert np.array_equal(counts(SPACE, in_order(shuffled)), counts(SPACE, SEEN))
