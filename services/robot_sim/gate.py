@@ -258,7 +258,7 @@ class Gate:
         self._admission = Admission(part, limits, dt, ttl_ticks)
         self._shaper = Shaper(limits, dt)
         self._in_force: InForce | None = None
-        self._newest_seq = -1
+        self._newest_seq: int  # since the last `take`, without which nothing is admitted
         self._last_position: tuple[Array, int] | None = None  # newest accepted position reference and its tick
 
     def take(self, who: str, instance: str) -> int:
@@ -275,9 +275,7 @@ class Gate:
         self._check_epoch(epoch)
         if self.state in ("estop", "fault"):
             raise Refused(self.state, f"{self.part} is in {self.state}: {_REMEDY[self.state]}")
-        if self.state != "armed":
-            self._forget()
-            self.state = "armed"
+        self.state = "armed"
 
     def release(self, epoch: int) -> None:
         """End the ownership; raises Refused (epoch)."""

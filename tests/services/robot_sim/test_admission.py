@@ -84,7 +84,7 @@ def test_a_command_at_a_bound_is_admitted(changes: dict[str, object]) -> None:
 )
 def test_a_refusal_says_by_how_much_a_reference_is_beyond_its_limit(mode: str, ref: object, text: str) -> None:
     gated = Gated().owned()
-    with pytest.raises(Refused, match=text):
+    with pytest.raises(Refused, match=f"^{PART}: {text}$"):
         gated.command(mode, ref)
 
 
@@ -117,6 +117,14 @@ def test_in_lockstep_a_silence_counts_as_the_most_ticks_that_a_command_may_be_ol
         admission.check_step(1.001 * most, q, 1000, q)
 
 
+def test_at_a_low_rate_a_silence_counts_as_one_tick() -> None:
+    admission, q = Admission(PART, LIMITS, 0.25, None), np.zeros(N)
+    stride = MAX_STEP * LIMITS.velocity * 0.25
+    admission.check_step(0.999 * stride, q, 1000, q)
+    with pytest.raises(Refused, match="a jump of"):
+        admission.check_step(1.001 * stride, q, 1000, q)
+
+
 def test_after_a_velocity_a_position_is_compared_with_the_measured_one() -> None:
     gated = Gated().owned()
     gated.command("position", 0.02)
@@ -135,6 +143,9 @@ def test_references_exactly_at_the_bounds_are_admitted() -> None:
     margin = POSITION_MARGIN * LIMITS.fine
     for reference in (LIMITS.upper + margin, LIMITS.lower - margin):
         admission.check(Order("controller", 1, 1, 1, "position", reference, 100), 1)
+    for sign in (1.0, -1.0):  # with the rounding that is allowed
+        admission.check(Order("controller", 1, 1, 1, "velocity", sign * LIMITS.velocity * (1.0 + 1e-9), 100), 1)
+        admission.check(Order("controller", 1, 1, 1, "torque", sign * LIMITS.torque * (1.0 + 1e-9), 100), 1)
 
 
 def test_a_command_100_ms_old_is_just_in_time() -> None:
@@ -146,9 +157,10 @@ def test_a_command_100_ms_old_is_just_in_time() -> None:
     assert gated.gate.age == 11
 
 
-def test_a_command_from_before_a_freeze_of_this_process_is_refused_although_no_tick_has_passed() -> None:
+@pytest.mark.parametrize("ticks", [1, 20])  # that the gate has seen
+def test_a_command_from_before_a_freeze_of_this_process_is_refused_although_no_tick_has_passed(ticks: int) -> None:
     gated = Gated().owned()
-    for _ in range(20):
+    for _ in range(ticks):
         gated.tick()
     gated.now += 100_000_000
     gated.command(ref=0.05, ttl=200)  # it answers the newest tick, which began 100 ms ago

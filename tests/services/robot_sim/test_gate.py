@@ -79,6 +79,34 @@ def test_a_command_is_in_force_until_its_ttl_and_not_a_nanosecond_longer(late: i
     assert gated.gate.state == state
 
 
+@pytest.mark.parametrize(("speed", "real"), [(0.25, 4.0), (1.0, 1.0), (4.0, 1.0)])
+def test_in_slow_motion_times_are_longer_and_in_fast_motion_they_stay(speed: float, real: float) -> None:
+    still, ms = np.zeros(N), 1_000_000
+
+    def armed() -> Gate:
+        gate = Gate(PART, LIMITS, 0.01, speed=speed)
+        gate.arm(gate.take("controller", "c1"))
+        gate.tick(1, 0, still, still)
+        return gate
+
+    def order(ttl: int) -> Order:
+        return Order("controller", 1, 0, 1, "velocity", still, ttl)
+
+    for late, state in ((0, "armed"), (1, "hold")):
+        gate = armed()
+        gate.admit(order(50), 1, 0, still)
+        gate.tick(2, round(50 * real) * ms + late, still, still)
+        assert gate.state == state
+    armed().admit(order(500), 1, round(100 * real) * ms, still)
+    with pytest.raises(Refused, match="answers a tick that began"):
+        armed().admit(order(500), 1, round(101 * real) * ms, still)
+
+
+def test_the_first_epoch_is_1_unless_an_earlier_one_is_given() -> None:
+    assert Gate(PART, LIMITS, 0.01).take("controller", "c1") == 1
+    assert Gate(PART, LIMITS, 0.01, epoch=5).take("controller", "c1") == 6
+
+
 def test_a_moving_part_continues_smoothly_in_position_mode() -> None:
     gated = Gated().owned()
     for _ in range(30):
