@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 import pytest
 
 from bus_schema import keys
@@ -57,6 +58,7 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
         bench.drive("left_arm", "arm", epoch)
     assert caught.value.code == "estop"
     wait_for(lambda: sum(stop.src == "robot_sim" for stop in stops) >= 3, "its repetition")
+    assert min(np.diff([stop.tw for stop in stops if stop.src == "robot_sim"])) < 5e8  # ns
     assert abs(bench.next_state("left_arm").dq[ELBOW]) < 0.01
     bench.rig.call(keys.ESTOP_RESET, Empty, Done)
     assert bench.next_state("left_arm").gate == "hold"
@@ -76,6 +78,22 @@ def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench)
     bench.rig.call(keys.sim("resume"), Empty, Done)
     assert bench.next_state("left_arm").gate == "hold"
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
+
+
+def test_an_emergency_stop_is_obeyed_in_a_pause_although_no_tick_begins(bench: Bench) -> None:
+    stops, delays = bench.rig.record(EStop), []
+    bench.rig.call(keys.sim("pause"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].mode == "paused", "the pause")
+    for _ in range(5):
+        stops.clear()
+        said = time.monotonic_ns()
+        bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
+        wait_for(lambda: any(stop.src == "robot_sim" and stop.set for stop in tuple(stops)), "the stop")
+        delays.append(next(stop.tw for stop in stops if stop.src == "robot_sim") - said)
+        bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+    bench.rig.call(keys.sim("resume"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
+    assert np.median(delays) < 2e8  # ns, by robot_sim's clock
 
 
 def test_only_the_client_that_paused_can_resume_while_it_runs(bench: Bench) -> None:
