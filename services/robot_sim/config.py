@@ -55,7 +55,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     ticks: Annotated[int, Meta(ge=0)] = 0
     """Lockstep: stop after so many ticks; 0: never."""
     stop_record: str = ""
-    """File that holds the emergency stop, so that it outlives this process; one that is missing counts as a stop.  Empty: not kept."""
+    """File that holds the emergency stop, and into which programs of this machine write one; missing at the start: stopped; empty: none."""
     record: str = ""
     """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
 
