@@ -26,6 +26,7 @@ SAFETY = {  # between a command and a motor: all mutants
     "services/robot_sim/guard.py": (
         f"{SIM}/test_process_admission.py",
         f"{SIM}/test_process_modes.py",
+        f"{SIM}/test_process_streams.py",
         f"{SIM}/test_process_settings.py",
         f"{SIM}/test_lockstep.py",
     ),
