@@ -26,6 +26,7 @@ from experiments.claims.ch7_learning.planned_queries import TESTS, UP, Queries, 
 from experiments.kit.experiment import Claim, Envelope, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, RANK3, arm_space
 from experiments.kit.learning.exploration import explore
+from experiments.kit.learning.outcomes import in_order
 from experiments.kit.plots import draw_curve, draw_points, finish, new_figure
 from experiments.kit.rules import all_hold, decides, rises, texts
 from experiments.kit.statistics import estimate, interval
@@ -77,6 +78,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
         return {"tests": {mode: queries.in_all_worlds(rival) for mode, rival in roadmaps(plant, space).items()}}
     agent = CuriousAgent(space, plant, seed=seed, forgetting=settings.get("forgetting", 1.0))
     return _entered(agent, plant, queries, share) if condition == "enters" else _learned(agent, queries, share)
+
+
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Sort the transitions of an agent, whose order is not needed."""
+    return values | ({"seen": in_order(values["seen"]).astype(np.uint8)} if "seen" in values else {})
 
 
 def _learned(agent: CuriousAgent, queries: Queries, share: float) -> dict[str, Any]:
@@ -343,6 +349,6 @@ def _label(axes: Any, places: Array) -> None:
 EXPERIMENT = Experiment(
     claim="the learned MDP planner needs no static workspace; trained with a moving obstacle, it plans around where that tends to be",
     source="paper 3.1, 3.2.1, fig. 7; thesis 7.4.1",
-    method=Sweep(conditions, trial, findings, plot),
+    method=Sweep(conditions, trial, findings, plot, summary=summary),
     claims=CLAIMS,
 )
