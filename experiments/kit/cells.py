@@ -6,8 +6,10 @@ from __future__ import annotations
 import json
 import os
 import re
+import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -95,6 +97,15 @@ def cell_path(folder: Path, name: str) -> Path:
 def load_cells(folder: Path) -> dict[str, CellResult]:
     """Return the finished cells of a run by name, sorted; raises InvalidValue for a damaged file."""
     return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
+
+
+@contextmanager
+def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> Iterator[Path]:
+    """Yield a temporary folder with the finished cells of a run, whose values are reduced by the summary."""
+    with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
+        for one in load_cells(folder).values():
+            write_cell(Path(reduced), one.cell, summary(one.values), one.seconds)
+        yield Path(reduced)
 
 
 def read_cell(path: Path) -> CellResult:

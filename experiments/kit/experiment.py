@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
+from experiments.kit.cells import reduced_cells
 from experiments.kit.statistics import error_rate
 from mobee.errors import InvalidValue, UnknownName
 
@@ -219,7 +220,8 @@ class Method(Protocol):
 class Steps:
     """A method made of functions, for an experiment that is not a sweep; see `Method`.
 
-    `recomputed`: computes `results` from the files `kept`; None for an experiment without claims.
+    `recomputed`: computes `results` from the files `kept`; None for an experiment without claims.  `summary`: reduces the values of each
+    cell for the record, if `kept` are cells; reduced values give the same results, and stay as they are when they are reduced again.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -227,10 +229,11 @@ class Steps:
     figure: Callable[[Path], Path]
     recomputed: Callable[[Path], dict[str, Any]] | None = None
     kept: tuple[str, ...] = ()
+    summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return the folder of the run."""
-        return nullcontext(folder)
+        """Return the folder of the run, or with a `summary` a temporary one with the reduced cells."""
+        return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
     def results(self, folder: Path) -> dict[str, Any]:
         """Compute the results from the `kept` files in the folder."""

@@ -5,18 +5,17 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from experiments.kit.cells import CELL_FILES, Cell, CellResult, Work, cell_path, load_cells, write_cell
+from experiments.kit.cells import CELL_FILES, Cell, CellResult, Work, cell_path, load_cells, reduced_cells, write_cell
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.engines import Done, in_processes, on_ray
 from experiments.kit.plots import saved
@@ -119,16 +118,9 @@ class Sweep:
         found = load_cells(folder)
         return found if self.summary is None else {name: _summarised(one, self.summary) for name, one in found.items()}
 
-    @contextmanager
-    def recorded(self, folder: Path) -> Iterator[Path]:
-        """Yield the folder with the `kept` files of a run; with a `summary` a temporary one with the reduced cells."""
-        if self.summary is None:
-            yield folder
-            return
-        with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
-            for one in self._loaded(folder).values():
-                write_cell(Path(reduced), one.cell, one.values, one.seconds)
-            yield Path(reduced)
+    def recorded(self, folder: Path) -> AbstractContextManager[Path]:
+        """Return the folder with the `kept` files of a run; with a `summary` a temporary one with the reduced cells."""
+        return nullcontext(folder) if self.summary is None else reduced_cells(folder, partial(_reduced, self.summary))
 
     def figure(self, folder: Path) -> Path:
         """Draw the finished cells; raises InvalidValue if there are none."""
@@ -142,12 +134,15 @@ _SUMMARY = "is_summary"
 
 
 def _summarised(one: CellResult, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> CellResult:
-    """Return a cell with reduced values; the cell of a record has them already."""
-    if one.values.get(_SUMMARY):
-        return one
+    """Return a cell with reduced values."""
     found = CellResult(one.cell, one.seconds, one.path)
-    vars(found)["values"] = summary(one.values) | {_SUMMARY: True}  # where the property keeps what it has read
+    vars(found)["values"] = _reduced(summary, one.values)  # where the property keeps what it has read
     return found
+
+
+def _reduced(summary: Callable[[dict[str, Any]], dict[str, Any]], values: dict[str, Any]) -> dict[str, Any]:
+    """Return the summary of values; those of a record are reduced already."""
+    return values if values.get(_SUMMARY) else summary(values) | {_SUMMARY: True}
 
 
 def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
