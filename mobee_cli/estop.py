@@ -58,9 +58,9 @@ def _release(endpoint: str) -> None:
 
 
 def _recorded(endpoint: str, reason: str) -> bool:
-    """Record the stop, if the robot was launched on this machine; say why that fails."""
+    """Record the stop if the robot was launched on this machine, and return whether it was; print why if the file cannot be written."""
     try:
-        return StopRecord.of_endpoint(endpoint).add("mobee", reason[:2000])
+        return StopRecord.of_endpoint(endpoint).stop("mobee", reason[:2000])
     except OSError as error:
         print(f"mobee estop: the stop is sent on the bus only: {error.filename} cannot be written: {error.strerror}", file=sys.stderr)
         return False

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The emergency stop beyond one process: its record on disk, and the session on which robot_sim receives it.
 
-A client on robot_sim's machine writes the record itself (`StopRecord.add`), and robot_sim watches it: that stop needs no router.
+A client on robot_sim's machine writes the record itself (`StopRecord.stop`), and robot_sim watches it: that stop needs no router.
 """
 
 from __future__ import annotations
@@ -97,13 +97,13 @@ class StopRecord:
         self._seen = seen
         return self.read() if self._path.exists() else None
 
-    def add(self, source: str, reason: str) -> bool:
-        """Stop the robot, unless a stop is in force; returns False if there is no record, so that no robot watches it.  Raises OSError."""
+    def stop(self, source: str, reason: str) -> bool:
+        """Record a stop, unless one is in force; returns False if there is no record, so that no robot watches it.  Raises OSError."""
         if not self._path.exists():
             return False
-        stop = Stop(source, reason, time.time())
-        if replaces(stop, self.read()):
-            self.latch(stop)
+        new = Stop(source, reason, time.time())
+        if replaces(new, self.read()):
+            self.latch(new)
         return True
 
     def latch(self, stop: Stop) -> None:

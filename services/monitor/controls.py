@@ -158,7 +158,7 @@ class PageControls:
         give_up = time.monotonic() + STOP_PATIENCE
         source, reason = "page", "pressed on the page"
         with suppress(OSError):  # the bus remains
-            StopRecord.of_endpoint(self._service.config.endpoint).add(source, reason)
+            StopRecord.of_endpoint(self._service.config.endpoint).stop(source, reason)
         while time.monotonic() < give_up:
             self._estop.put(set=True, source=source, reason=reason)
             time.sleep(STOP_PERIOD)

@@ -51,11 +51,11 @@ def test_a_stop_is_recorded_for_a_robot_of_this_machine_only_and_does_not_replac
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     endpoint = "tcp/127.0.0.1:7447"
     record = StopRecord.of_endpoint(endpoint)
-    assert not record.add("page", "pressed")
+    assert not record.stop("page", "pressed")
     assert not record.path.parent.exists()
     record.create()
-    assert StopRecord.of_endpoint("tls/127.0.0.1:7447").add("page", "pressed")
-    assert record.add("mobee", "later")
+    assert StopRecord.of_endpoint("tls/127.0.0.1:7447").stop("page", "pressed")
+    assert record.stop("mobee", "later")
     stop = record.read()
     assert stop is not None and (stop.source, stop.reason) == ("page", "pressed")
 

@@ -124,7 +124,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return results(folder)
 
 
-def verdicts(folder: Path) -> dict[str, Any]:
+def judged_claims(folder: Path) -> dict[str, Any]:
     """Compute the claims from the finished blocks."""
     return {"claims": judged(CLAIMS, Runs(_blocks(folder), _touchable(), _left()))}
 
@@ -133,7 +133,7 @@ def results(folder: Path) -> dict[str, Any]:
     """Compute the claims and the tables from the finished blocks; to explain the misses, their reaches are simulated from all states."""
     blocks, known, left = _blocks(folder), _touchable(), _left()
     return {
-        **verdicts(folder),
+        **judged_claims(folder),
         "tries": table(blocks, known),
         "missed": misses(blocks, known, _why),
         "targets that can be reached": sorted(known),
@@ -407,7 +407,7 @@ def figure(folder: Path) -> Path:
 EXPERIMENT = Experiment(
     claim="on the live robot the learned reacher brings the palm to the targets that can be reached, without other contacts",
     source="aim of this reproduction; thesis 8, 9.3",
-    method=Steps(add_arguments, run, figure, verdicts, (f"start-*/*/{BLOCK}",)),
+    method=Steps(add_arguments, run, figure, judged_claims, (f"start-*/*/{BLOCK}",)),
     claims=CLAIMS,
     repeats="starts",
 )
