@@ -10,7 +10,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 from typing import Any
 
 from mobee_cli.connect import add_endpoint, connected
@@ -84,7 +84,7 @@ def _add_echo(parser: argparse.ArgumentParser) -> None:
 
 def _echo(session: Any, arguments: argparse.Namespace) -> int:
     """Print messages until the count, the duration or Ctrl-C ends it."""
-    queue: SimpleQueue[Received] = SimpleQueue()
+    queue: Queue[Received] = Queue()
     listen(session, arguments.key, queue.put)
     begun, count, hinted = time.monotonic(), 0, False
     while count < arguments.count and time.monotonic() < begun + arguments.duration:

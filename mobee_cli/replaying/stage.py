@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 from typing import Any, Self
 
 import msgspec
@@ -39,7 +39,7 @@ class Stage:
     def __init__(self, who: str, settings: str, folder: Path) -> None:
         """`who`: the service; `settings`: its settings file of the recorded run; `folder`: for that file and the log."""
         self.who, self._folder, self._settings = who, folder, settings
-        self.said: SimpleQueue[Item] = SimpleQueue()  # messages of the service
+        self.said: Queue[Item] = Queue()  # messages of the service
         self._tokens: dict[tuple[str, str], Any] = {}
         self._kept: list[Any] = []
         self._ready = False

@@ -9,7 +9,6 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any, NoReturn
 
@@ -52,25 +51,28 @@ class Timer:
 
 
 class Inbox:
-    """Handlers in order of arrival, and timers."""
+    """Handlers in order of arrival, and timers.
+
+    Not a `queue.SimpleQueue`: its `get` can wait without limit if its time ends while it begins to wait (CPython 3.11).
+    """
 
     def __init__(self) -> None:
-        self._queue: SimpleQueue[Handler] = SimpleQueue()
+        self._queue: deque[Handler] = deque()
+        self._signal = Lock()  # released to wake the main thread
+        self._signal.acquire()
         self._later: deque[Handler] = deque()
         self._timers: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
         self._turn = Lock()  # held by the thread that runs handlers: the main thread, except while it waits in `serve`
         self._turn.acquire()
         self._serves = False
-        self._calls: SimpleQueue[None] = SimpleQueue()  # wakes the main thread while it serves
         self.dropped = 0  # number of messages and calls dropped because too many were waiting
         self.handled = 0  # number of messages, calls and timers whose handler has run
 
     def put(self, handler: Handler) -> None:
         """Queue a handler for the main thread; any thread may call this."""
-        self._queue.put(handler)
-        if self._serves:
-            self._calls.put(None)
+        self._queue.append(handler)
+        self._wake()
 
     def handle(self, handler: Handler) -> None:
         """Run the handler in this thread if the main thread waits in `serve` and no handler is queued; otherwise queue it as `put` does.
@@ -81,7 +83,7 @@ class Inbox:
             self.put(handler)
             return
         try:
-            if self._queue.empty():
+            if not self._queue:
                 self._run(handler)
             else:
                 self.put(handler)
@@ -92,14 +94,14 @@ class Inbox:
 
     def waiting(self) -> int:
         """Return the number of handlers that wait; any thread may call this."""
-        return self._queue.qsize() + len(self._later)
+        return len(self._queue) + len(self._later)
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
         """Queue the handler as `put` does; while `crowd` handlers are waiting, drop and count it, and return False.
 
         This limits the memory that a flood of messages takes.
         """
-        if self._queue.qsize() >= crowd:
+        if len(self._queue) >= crowd:
             self.dropped += 1
             return False
         self.put(handler)
@@ -118,7 +120,7 @@ class Inbox:
         timer = Timer(handler)
         heapq.heappush(self._timers, (when, next(self._order), timer))
         if self._serves:
-            self._calls.put(None)  # the main thread may be waiting for a later time
+            self._wake()  # the main thread may be waiting for a later time
         return timer
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
@@ -139,7 +141,7 @@ class Inbox:
         finally:
             self._serves = False
 
-    def _spin(self, until: float, enough: Callable[[], bool] | None, take: Callable[[float], Handler]) -> None:
+    def _spin(self, until: float, enough: Callable[[], bool] | None, take: Callable[[float], Handler | None]) -> None:
         last = max(until, time.monotonic()) + GRACE
         while enough is None or not enough():
             now = time.monotonic()
@@ -151,30 +153,37 @@ class Inbox:
                     self.handled += 1
                 continue
             wake = min(until, self._timers[0][0]) if self._timers else until
+            if (handler := take(wake - now)) is not None:
+                self._run(handler)
+            elif time.monotonic() >= until:
+                return
+
+    def _wake(self) -> None:
+        """Let the main thread continue if it waits, otherwise let its next wait end at once."""
+        if self._signal.locked():
             try:
-                handler = take(wake - now)
-            except Empty:
-                if time.monotonic() >= until:
-                    return
-                continue
-            self._run(handler)
+                self._signal.release()
+            except RuntimeError:  # another thread has released it since
+                return
 
-    def _awaited(self, seconds: float) -> Handler:
-        """Wait for the next handler in the queue and return it; raises Empty after `seconds`."""
-        return self._queue.get(timeout=seconds) if seconds > 0 else self._queue.get_nowait()
+    def _awaited(self, seconds: float) -> Handler | None:
+        """Return the next handler; None if none comes within `seconds`, or sooner if the thread was woken for one that has run."""
+        if seconds > 0 and not self._queue:
+            self._signal.acquire(timeout=seconds)
+        return self._queue.popleft() if self._queue else None
 
-    def _called(self, seconds: float) -> Handler:
-        """Wait for a handler and return it; other threads may run handlers meanwhile. Raises Empty after `seconds`.
+    def _called(self, seconds: float) -> Handler | None:
+        """Return the next handler as `_awaited` does; other threads may run handlers meanwhile.
 
         A handler stays in the queue until this thread continues, which keeps the order.
         """
-        if seconds > 0 and self._queue.empty():
+        if seconds > 0 and not self._queue:
             self._turn.release()
             try:
-                self._calls.get(timeout=seconds)
+                self._signal.acquire(timeout=seconds)
             finally:
                 self._turn.acquire()
-        return self._queue.get_nowait()
+        return self._queue.popleft() if self._queue else None
 
     def _run(self, handler: Handler) -> None:
         while self._later:

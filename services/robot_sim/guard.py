@@ -12,6 +12,7 @@ from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 from services.common.emergency_stop import Stop, StopLine, StopRecord, replaces
+from services.common.inbox import Timer
 from services.common.service import CallRefused, Service
 from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, refused_as_call
 from services.robot_sim.kinematic import Backend
@@ -34,11 +35,13 @@ class Guard:
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._stop: Stop | None = None if record is None else record.read()
         self._counted = dict.fromkeys(INDISPENSABLE, "")  # instance that was there first: a second token of that name changes nothing
+        self._runs = {service.bus.run}  # of this process
         self._waiting: list[tuple[str, Order]] = []  # lockstep: orders for the next tick
         self._on_answer: Callable[[str, int, Answer], None] = lambda who, re_k, answer: None
         if not service.locked:
             self._newest = service.bus.latest(Commands)
         self._estop = service.bus.publisher(EStop)
+        self._repetition = Timer(self._repeat_stop)
         # Epochs grow over restarts too, if the clock does: what a controller holds from before does not fit again.
         self.gates = {part: self._gate(part, time.time_ns() // 1_000_000) for part in robot.parts}
         self._line = StopLine(service.second_session())
@@ -60,6 +63,7 @@ class Guard:
         """Start a new run: all gates are idle and without owner; a latched emergency stop stays."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
+        self._runs.add(self._service.bus.run)
         if self._stop is not None:
             self._stop_gates(self._stop)
 
@@ -193,7 +197,7 @@ class Guard:
 
     def _check_stop(self) -> None:
         for message in self._line.take():
-            if message.src != self._service.who or message.run != self._service.bus.run:  # not this process's own repetition
+            if message.src != self._service.who or message.run not in self._runs:  # not this process's own repetition
                 self._obey(Stop(message.source, message.reason, time.time()))
         if self._record is not None and (recorded := self._record.new_stop()) is not None:
             self._obey(recorded)
@@ -214,6 +218,7 @@ class Guard:
         """Stop the gates, and publish the stop until it is reset."""
         self._stop = stop
         self._stop_gates(stop)
+        self._repetition.cancel()  # of a stop that was reset less than a period ago
         self._repeat_stop()
 
     def _stop_gates(self, stop: Stop) -> None:
@@ -223,7 +228,7 @@ class Guard:
     def _repeat_stop(self) -> None:
         if self._stop is not None:
             self._estop.put(set=True, source=self._stop.source, reason=self._stop.reason[:2000])
-            self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_stop)
+            self._repetition = self._service.inbox.at(time.monotonic() + ESTOP_PERIOD, self._repeat_stop)
 
     def _reset_stop(self, request: Empty, key: str) -> Done:
         """Release the robot; if the release cannot be recorded, the stop stays."""

@@ -46,16 +46,13 @@ def test_a_cancelled_timer_does_nothing_and_wakes_no_thread(monkeypatch: pytest.
     for timer in cancelled:
         timer.cancel()
     waits: list[float] = []
-    take = inbox._queue.get
+    take = inbox._awaited
 
-    class Queue:
-        def get(self, timeout: float) -> object:
-            waits.append(timeout)
-            return take(timeout=timeout)
+    def counted(seconds: float) -> object:
+        waits.append(seconds)
+        return take(seconds)
 
-        get_nowait = inbox._queue.get_nowait
-
-    monkeypatch.setattr(inbox, "_queue", Queue())
+    monkeypatch.setattr(inbox, "_awaited", counted)
     inbox.spin(start + 10.0, lambda: bool(seen))
     assert seen == ["due"]
     assert len(waits) == 1
@@ -78,6 +75,20 @@ def test_spin_runs_handlers_that_another_thread_puts() -> None:
     inbox.spin(now() + 10.0, lambda: bool(seen))
     sender.join()
     assert seen == [1]
+
+
+def test_a_wait_ends_however_short_it_is() -> None:
+    """The queue of the standard library waits without limit if the process is interrupted as it begins to wait."""
+    inbox, rescued = Inbox(), threading.Event()
+    rescue = threading.Timer(20.0, lambda: (rescued.set(), inbox.put(lambda: None)))
+    rescue.start()
+    for take in (inbox._awaited, inbox._called):
+        for _ in range(300_000):
+            inbox.put(lambda: None)
+            assert take(0.0) is not None
+            assert take(1e-6) is None
+    rescue.cancel()
+    assert not rescued.is_set()
 
 
 def test_spin_returns_during_a_flood() -> None:

@@ -139,3 +139,13 @@ def test_a_reset_is_a_new_run_at_home_without_owners(bench: Bench) -> None:
         bench.drive("left_arm", "arm", epoch)
     assert caught.value.code == "epoch"
     assert bench.take("left_arm") > epoch
+
+
+def test_a_latched_stop_outlives_a_reset(bench: Bench) -> None:
+    bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
+    wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+    bench.rig.call(keys.sim("reset"), Empty, Done)
+    bench.follow()
+    assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
+    bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+    assert {bench.next_state(part).gate for part in ROBOT.parts} == {"hold"}
