@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import msgspec
@@ -93,6 +93,12 @@ def queues(everything: bool, locked: bool) -> dict[str, int]:
     return {cls.stream.keys(): most if cls in PER_TICK else others for cls in recorded}
 
 
+def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
+    """Return the keys with a variable that have a message in every tick."""
+    recorded = (cls for cls in PER_TICK if cls.stream.variable and (everything or cls not in FOR_SUBSCRIBERS))
+    return [cls.stream.key(name) for cls in recorded for name in (("model",) if cls is Forces else parts)]
+
+
 class RecorderNode:
     """Writes all messages as they are, and copies for viewers."""
 
@@ -107,7 +113,7 @@ class RecorderNode:
         self._failed_at = self._flushed = 0.0  # monotonic clock
         self._trouble = ""
         self._last: dict[tuple[str, str], int] = {}  # number of the last message of each key and sender
-        self._tap = Tap(service.bus.session, queues(config.everything, service.locked))
+        self._tap = Tap(service.bus.session, queues(config.everything, service.locked), frequent_keys(robot.parts, config.everything))
         service.describe, service.mark = self._describe, self._mark
         self._mark()
         service.on_alive(self._note_token)

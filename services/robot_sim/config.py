@@ -50,7 +50,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """Standard deviation of a part's sampling time, share of a tick."""
     truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
     """Rate of the messages with the ground truth, per second."""
-    participants: tuple[str, ...] = ()
+    participants: tuple[Annotated[str, Meta(pattern="^[a-z0-9_]+$")], ...] = ()
     """Lockstep: services that must be present before tick 1; the launcher names all services that affect the robot's motion."""
     ticks: Annotated[int, Meta(ge=0)] = 0
     """Lockstep: stop after so many ticks; 0: never."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -82,9 +84,9 @@ class Bench:
         return self.rig.stat("robot_sim").numbers
 
 
-@pytest.fixture(scope="module")
-def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
-    with rig(tmp_path_factory.mktemp("robot_sim"), ROBOT) as made:
+@contextmanager
+def robot_sim(folder: Path, *participants: str) -> Iterator[Bench]:
+    with rig(folder, ROBOT) as made:
         made.bus.who = "controller"
         clocks = made.record(Clock)
         states, events = made.record(State, "torso"), made.record(Event, "robot_sim")
@@ -92,9 +94,15 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
         commands = made.bus.publisher(Command, "torso")
         all_commands = made.bus.publisher(Commands, delivery="STEP")
         made.token("launcher", "l1")
-        flags = ("--backend", "kinematic", "--rate", "50", "--mode", "lock", "--participants", "controller", "--encoder-noise", "0.0")
+        flags = ("--backend", "kinematic", "--rate", "50", "--mode", "lock", "--participants", *participants, "--encoder-noise", "0.0")
         made.start("services.robot_sim", "robot_sim", *flags)
         yield Bench(made, clocks, states, events, answers, commands, all_commands)
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+    with robot_sim(tmp_path_factory.mktemp("robot_sim"), "controller") as made:
+        yield made
 
 
 @pytest.fixture
@@ -209,6 +217,36 @@ def test_a_late_participant_is_dropped_its_parts_hold_and_the_run_is_marked(benc
         return bench.stat()["tick"] == before
 
     wait_for(is_waited_for, "a tick that waits")
+
+
+@pytest.mark.parametrize("late, gate", [("model", "hold"), ("agent_head", "armed")])
+def test_all_parts_hold_if_a_service_is_late_that_the_whole_robot_needs(tmp_path: Path, late: str, gate: str) -> None:
+    others = {"model", "agent_head"}
+    with robot_sim(tmp_path, "controller", *others) as bench:
+        wait_for(lambda: bench.clocks, "tick 0")
+        bench.done(0, including=sorted(others))
+        wait_for(lambda: bench.k == 1, "tick 1")
+        bench.arm()
+        bench.command(0.1, re_k=1)
+        bench.done(1, including=sorted(others - {late}))
+        assert bench.newest(2).gate == gate
+        bench.hears("not_repeatable", f"{late} did not answer tick 1 within 2 s")
+        if gate == "hold":
+            bench.hears("hold", "model is late")
+
+
+def test_a_command_that_waits_when_a_new_run_begins_is_dropped(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    rejected = bench.rig.stat("robot_sim").rejected
+    run = bench.clocks[-1].run
+    bench.command(0.1, re_k=1)
+    bench.rig.call(keys.sim("reset"), Empty, Done)  # by another path: the command is there before the answer to the first tick
+    wait_for(lambda: bench.clocks[-1].run != run and bench.k == 0, "a new run")
+    bench.begin()
+    bench.step()
+    assert bench.rig.stat("robot_sim").rejected == rejected
+    assert bench.newest(bench.k).gate == "idle"
 
 
 def test_a_participant_that_has_ended_is_not_waited_for(bench: Bench) -> None:

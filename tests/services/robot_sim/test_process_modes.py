@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 
 import numpy as np
@@ -54,6 +55,7 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
     bench.keep("left_arm", epoch, 0.2, lambda: elbow(0.3))
     bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
     wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+    assert re.match("emergency stop by test since .*: because; kinematic", bench.rig.stat("robot_sim").text)
     with pytest.raises(CallFailed) as caught:
         bench.drive("left_arm", "arm", epoch)
     assert caught.value.code == "estop"
