@@ -7,9 +7,10 @@ import json
 import os
 import re
 import socket
+import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 
 import zenoh
@@ -23,7 +24,7 @@ LEASE = 1.0  # s
 _MOST_CONNECTIONS = 10_000  # of a router
 LOCAL_ENDPOINT = "MOBEE_LOCAL_ENDPOINT"  # environment variable: address at which a service connects to the router, instead of its endpoint
 
-_COMMON = {
+_COMMON: dict[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
     "transport/shared_memory/enabled": False,
@@ -72,21 +73,49 @@ def end_unreceived(endpoint: str, lease: float) -> None:
     network that is as long again as the cut.  A listener gives the limit to the connections that it accepts; a client that has connected
     again must set it again.  On one host nothing is cut, and a process may be without a processor for longer than the lease.
     """
+    if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
+        _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
+
+
+def receive_together(sockets: Iterable[int], count: int) -> None:
+    """Let the system wake this process for these connections (`sockets_at`) only when `count` bytes wait; only Linux can.
+
+    With 1, what waits is received at once.  The caller must do that several times in a lease: a connection counts as dead if nothing is
+    received for so long.
+    """
+    if sys.platform == "linux":
+        _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
+
+
+def sockets_at(endpoint: str) -> list[int]:
+    """Return the descriptors of this process's TCP sockets that listen at the port of an endpoint or are connected to it."""
     port = endpoint.rpartition(":")[2]
-    if is_local(endpoint) or not hasattr(socket, "TCP_USER_TIMEOUT") or not port.isdecimal():
-        return
-    for name in os.listdir("/proc/self/fd"):
+    if not port.isdecimal() or not os.path.isdir("/proc/self/fd"):
+        return []
+    found = []
+    for number in map(int, os.listdir("/proc/self/fd")):
         try:
-            one = socket.socket(fileno=int(name))
+            one = socket.socket(fileno=number)
         except OSError:  # no socket, or closed meanwhile
             continue
         try:
             if one.family in (socket.AF_INET, socket.AF_INET6) and one.type == socket.SOCK_STREAM and int(port) in _ports(one):
-                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
+                found.append(number)
         except OSError:  # closed meanwhile
             continue
         finally:
             one.detach()  # it stays Zenoh's
+    return found
+
+
+def _set_option(sockets: Iterable[int], level: int, option: int, value: int) -> None:
+    for number in sockets:
+        with suppress(OSError):  # closed meanwhile
+            one = socket.socket(socket.AF_INET, socket.SOCK_STREAM, 0, fileno=number)
+            try:
+                one.setsockopt(level, option, value)
+            finally:
+                one.detach()
 
 
 def _ports(one: socket.socket) -> tuple[int, ...]:
@@ -102,6 +131,14 @@ def spare_threads() -> None:
     In lockstep services wait for one message after the other, and handing each from thread to thread takes a fifth of the time.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
+
+
+def spare_memory() -> None:
+    """Let Zenoh send and receive at most 8 kB at a time in this process; call it before the first session.
+
+    For each batch of messages that is received, Zenoh allocates and clears a buffer of the largest size, by default 64 kB.
+    """
+    _COMMON["transport/link/tx/batch_size"] = 8192
 
 
 @contextmanager

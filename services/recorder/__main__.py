@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
 from services.common.service import Service
-from services.common.session import spare_threads
+from services.common.session import spare_memory, spare_threads
 from services.recorder.config import Config
 from services.recorder.node import RecorderNode
 
@@ -24,6 +24,8 @@ def record(who: str, config: Config) -> None:
     """Record under a name of a service until a signal or a shutdown call; raises MobeeError or BusUnreachable if it cannot begin."""
     robot = robot_of(config)
     spare_threads()  # messages arrive one by one: handing each from thread to thread costs more than it
+    if not config.everything:  # pictures are larger
+        spare_memory()
     with Service(who, config, robot) as service:
         node = RecorderNode(service, config, robot)
         service.ready()
