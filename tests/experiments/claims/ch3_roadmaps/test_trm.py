@@ -181,4 +181,4 @@ def test_the_reachable_points_are_those_of_the_search_and_of_all_other_maps() ->
     np.testing.assert_allclose(row["coverage"], [3 / 6, 3 / 6])
     np.testing.assert_allclose(row["largest_hole"], [3.3, 2.5])
     assert row["evaluations_a_vertex"].tolist() == [15.0, 15.0]
-    assert findings(found)["maps"]["inspect"]["evolution"]["vertices"].startswith("2")
+    assert findings(maps(found))["maps"]["inspect"]["evolution"]["vertices"].startswith("2")
