@@ -41,6 +41,7 @@ _FREEZES = (0.2, 1.0, 3.0)  # s; a service that is frozen for longer than 2 s is
 _FLOODS = ("estop, set = false", "calls of robot_sim's stat", "tick, garbage", "commands, garbage", "tokens")
 VITAL = ("robot_sim", "controller", "model")
 STOP_AT = 1.0  # s after the beginning of a schedule around a stop
+_SIGNALLED = ("kill", "freeze", "throttle", "disk", "files")  # kinds that need the process of their target
 _FILES = 20  # that a process may open while it has too few
 _THROTTLE_PERIOD = 0.05  # s
 
@@ -140,8 +141,9 @@ class FaultInjector:
         try:
             for fault in schedule:
                 self._wait(begun + fault.at)
+                pid = self._pid(fault.target) if fault.kind in _SIGNALLED else None  # a call: before the time
                 times.append(time.monotonic())
-                self._do(fault)
+                self._do(fault, pid)
             self._wait(max((at for at, _ in self._ends), default=0.0))
         finally:
             for _, lasting in self._ends:
@@ -159,27 +161,26 @@ class FaultInjector:
             if time.monotonic() >= until and not any(at <= until for at, _ in self._ends):
                 return
 
-    def _do(self, fault: Fault) -> None:
+    def _do(self, fault: Fault, pid: int | None) -> None:
         if fault.kind in ("stop", "false_stop"):
             self._stops.put(set=fault.kind == "stop", source="test", reason="a schedule of faults")
         elif fault.kind in FORGED:
             self._forge(fault.kind)
         elif fault.kind == "kill":
-            if (pid := self._pid(fault.target)) is not None:
+            if pid is not None:
                 _send(pid, signal.SIGKILL)
         else:
             lasting = ExitStack()
-            lasting.enter_context(self._lasting(fault))
+            lasting.enter_context(self._lasting(fault, pid))
             self._ends.append((time.monotonic() + fault.duration, lasting))
 
-    def _lasting(self, fault: Fault) -> AbstractContextManager[None]:
+    def _lasting(self, fault: Fault, pid: int | None) -> AbstractContextManager[None]:
         if fault.kind == "flood":
             return flood(self._endpoint, fault.target)
         if fault.kind == "token":
             return _forged_token(self._session, fault.target)
         if fault.kind == "duplicate":
             return _duplicate(self._endpoint, fault.target)
-        pid = self._pid(fault.target)
         if pid is None:
             return nullcontext()
         return {"freeze": _frozen, "throttle": _throttled, "disk": _without_disk, "files": _without_files}[fault.kind](pid)

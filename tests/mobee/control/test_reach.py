@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.arrays import Array
-from mobee.control.reach import reach_path
+from mobee.control.reach import bend_bound, reach_path
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.robot.load import load_robot
@@ -49,6 +49,30 @@ def test_out_of_reach_it_ends_stuck_at_the_nearest_point() -> None:
     path = reach_path(ARM, "tip", np.array([0.0, 1.1, 0.0]), BENT)
     assert path.end == "stuck"
     assert path.distance == pytest.approx(0.2, abs=1e-4)
+
+
+def test_where_the_normal_cannot_be_turned_as_wanted_it_ends_stuck_with_an_angle() -> None:
+    path = reach_path(ARM, "tip", ARM.evaluate(BENT).position("tip"), BENT, np.array([0.0, 0.0, 1.0]))
+    assert path.end == "stuck"
+    assert path.angle == pytest.approx(np.pi / 2, abs=1e-3)  # the arm moves in the plane of x and y
+
+
+@given(poses, st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(np.array), poses)
+def test_the_bound_of_the_bend_holds_for_every_motion(q: Array, error: Array, along: Array) -> None:
+    """For the second derivative of the marker's position and turn along a straight line of postures, by differences."""
+    h = 1e-4
+
+    def rows(at: Array) -> Array:
+        return ARM.jacobian(at, "tip") * np.repeat([1.0, 0.1], 3)[:, None]
+
+    bend = (rows(q + h * along) - rows(q - h * along)) @ along / (2.0 * h)
+    assert abs(error @ bend) <= bend_bound(ARM.jacobian(q, "tip"), error) * (along @ along) + 1e-6
+
+
+@pytest.mark.parametrize("row", [3, 4, 5])
+def test_a_turn_about_any_axis_adds_to_the_bound_of_the_bend(row: int) -> None:
+    error = np.eye(6)[row]
+    assert bend_bound(ARM.jacobian(BENT, "tip"), error) == pytest.approx(0.1 * np.linalg.norm(ARM.jacobian(BENT, "tip")[3:]) ** 2)
 
 
 def test_in_a_singular_pose_it_is_stuck_at_the_start_as_the_thesis_warns() -> None:

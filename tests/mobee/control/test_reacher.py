@@ -144,6 +144,33 @@ def test_a_new_reacher_replaces_the_last_one() -> None:
     assert np.array_equal(one.step(BENT, DT).velocity, other.step(BENT, DT).velocity)
 
 
+def test_it_is_stuck_three_seconds_after_it_came_nearer_for_the_last_time() -> None:
+    reacher = Reacher(Controller(PLANAR), "tip", np.array([0.0, 1.1, 0.0]))
+    states = [reacher.update(BENT, 0.125) for _ in range(26)]  # the marker does not move
+    assert states == ["reaching"] * 24 + ["stuck"] * 2
+    assert reacher.distance == pytest.approx(np.linalg.norm(np.array([0.0, 1.1, 0.0]) - PLANAR.evaluate(BENT).position("tip")))
+
+
+def test_its_distance_is_averaged_over_a_quarter_of_a_second() -> None:
+    there, nearer = (PLANAR.evaluate(q).position("tip") for q in (BENT, 0.9 * BENT))
+    reacher = Reacher(Controller(PLANAR), "tip", there)
+    reacher.update(0.9 * BENT, DT)
+    assert reacher.distance == pytest.approx(np.linalg.norm(there - nearer))
+    reacher.update(BENT, DT)
+    assert reacher.distance == pytest.approx(np.linalg.norm(there - nearer) * (1.0 - DT / 0.25))
+
+
+def test_stop_leaves_every_motor_that_moves_the_marker_where_it_is() -> None:
+    model = Model(load_robot("icub"))
+    controller, q = Controller(model), model.robot.home + 0.05
+    before = controller.attractor.copy()
+    Reacher(controller, "left_palm", np.array([-0.3, -0.2, 0.1])).stop(q)
+    moves = np.abs(model.jacobian(q, "left_palm")).max(axis=0) > 0
+    assert 8 <= moves.sum() < len(moves)
+    assert np.array_equal(controller.attractor[moves], q[moves])
+    assert np.array_equal(controller.attractor[~moves], before[~moves])
+
+
 def test_stop_ends_the_pull_and_leaves_the_other_motors_at_their_attractors() -> None:
     model = Model(load_robot("icub"))
     controller, q = Controller(model), model.robot.home + 0.05

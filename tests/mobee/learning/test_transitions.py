@@ -312,7 +312,10 @@ def test_a_gain_is_never_negative(count, others):
     assert information_gain(count, count + others) >= 0.0
 
 
-@pytest.mark.parametrize(("p", "t"), [((1, 0), (1, 1)), ((1, 1), (1, 0)), ((1,), (1, 1)), ((), ()), ((1, np.nan), (1, 1))])
+@pytest.mark.parametrize(
+    ("p", "t"),
+    [((1, 0), (1, 1)), ((1, 1), (1, 0)), ((1,), (1, 1)), ((), ()), ((1, np.nan), (1, 1)), ((1, np.inf), (1, 1)), ((1, 1), (1, np.inf))],
+)
 def test_divergence_is_refused_where_it_is_undefined(p, t):
     with pytest.raises(InvalidValue, match="bins"):
         kl_divergence(p, t)
