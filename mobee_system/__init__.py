@@ -34,4 +34,5 @@ def main() -> int:
     from mobee_cli.__main__ import main as run_command
 
     signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as at Ctrl-C, what a verb has started ends with it
     return run_command()

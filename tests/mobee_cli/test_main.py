@@ -99,6 +99,16 @@ def test_ctrl_c_ends_a_page_but_breaks_off_a_recording(monkeypatch: pytest.Monke
     assert main(["view", "katana", "--save", str(tmp_path / "katana.rrd")]) == 130
 
 
+def test_sigterm_interrupts_a_verb_so_that_what_it_has_started_ends() -> None:
+    code = (
+        "import os, signal, sys, mobee_system\nfrom mobee_cli import robots\n"
+        "def run(_):\n    try: os.kill(os.getpid(), signal.SIGTERM); signal.pause()\n    finally: print('ended')\n"
+        "robots.run = run\nsys.argv = ['mobee', 'robots']\nsys.exit(mobee_system.main())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "ended\n", "mobee robots: interrupted\n")
+
+
 def test_ctrl_c_during_the_imports_prints_no_traceback() -> None:
     code = (
         "import builtins, os, signal, mobee_system\nreal = builtins.__import__\n"
