@@ -158,6 +158,24 @@ def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> No
     assert bench.newest(9).t == round(9 * TICK * 1e9)
 
 
+def test_commands_of_one_tick_are_admitted_once_each(bench: Bench) -> None:
+    bench.begin()
+    bench.arm()
+    head = bench.rig.call(keys.drive("head", "take"), Take, Taken, who="controller", instance="c1").epoch
+    bench.rig.call(keys.drive("head", "arm"), WithEpoch, Driven, epoch=head)
+    heads, to_head = bench.rig.record(State, "head"), bench.rig.bus.publisher(Command, "head")
+    refused = bench.rig.stat("robot_sim").rejected
+    for _ in range(8):
+        k = bench.k
+        bench.command(0.1, re_k=k)
+        to_head.put(epoch=head, re_k=k, mode="velocity", ref=[0.1] + 5 * [0.0], ttl=1000)
+        bench.step()
+    wait_for(lambda: heads[-1].k == bench.k, "the state of the head")
+    assert bench.newest(bench.k).cmd_age == heads[-1].cmd_age == 1
+    assert bench.newest(bench.k).q[0] > bench.newest(2).q[0] and heads[-1].q[0] > heads[0].q[0]
+    assert bench.rig.stat("robot_sim").rejected == refused
+
+
 def test_commands_to_several_parts_also_answer_the_tick(bench: Bench) -> None:
     bench.begin()
     bench.arm()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import time
 
@@ -13,6 +14,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
 from mobee.model.masses import gravity_torque
+from services.common.bus import Bus
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
 from tests.services.robot_sim.bench import DT, ELBOW, ROBOT, Bench, elbow
@@ -151,3 +153,19 @@ def test_a_latched_stop_outlives_a_reset(bench: Bench) -> None:
     assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
     bench.rig.call(keys.ESTOP_RESET, Empty, Done)
     assert {bench.next_state(part).gate for part in ROBOT.parts} == {"hold"}
+
+
+def test_its_own_repetition_is_no_new_stop_whatever_run_it_was_sent_in(bench: Bench) -> None:
+    runs = [bench.clocks[-1].run]
+    bench.rig.call(keys.sim("reset"), Empty, Done)
+    bench.follow()
+    runs.append(bench.clocks[-1].run)
+    own = Bus(bench.rig.session, "robot_sim", logging.getLogger("rig"))
+    for own.run in runs:
+        own.publisher(EStop).put(set=True, source="test", reason="of before")
+    time.sleep(0.2)
+    assert {bench.next_state(part).gate for part in ROBOT.parts} == {"idle"}
+    own.run = "run_of_another_process"
+    own.publisher(EStop).put(set=True, source="test", reason="of another")
+    wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+    bench.rig.call(keys.ESTOP_RESET, Empty, Done)
