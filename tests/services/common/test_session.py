@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import os
+import select
+import socket
+import sys
 from pathlib import Path
 
 import pytest
 
 from experiments.kit.live.launch import free_endpoint
-from services.common.session import local_endpoint, open_client, open_router
+from services.common.session import local_endpoint, open_client, open_router, receive_together, sockets_at
 from tests.services.harness import wait_for
 
 
@@ -38,3 +41,22 @@ def test_there_is_no_local_endpoint_where_its_name_would_be_too_long(tmp_path: P
     monkeypatch.setattr("tempfile.tempdir", str(deep))
     with local_endpoint() as local:
         assert local == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux wakes a process for several bytes together")
+def test_a_connection_wakes_this_process_once_enough_bytes_wait() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        with socket.create_connection(("127.0.0.1", port)) as client, listener.accept()[0] as server:
+            found = sockets_at(f"tcp/127.0.0.1:{port}")
+            assert sorted(found) == sorted([listener.fileno(), client.fileno()])
+            receive_together([*found, 999_999], 1000)  # the last is no descriptor: closed meanwhile
+            server.sendall(bytes(10))
+            assert select.select([client], [], [], 0.2)[0] == []
+            receive_together(found, 1)
+            assert select.select([client], [], [], 5.0)[0] == [client]
+            assert client.recv(100) == bytes(10)
+
+
+def test_an_endpoint_without_a_port_has_no_sockets() -> None:
+    assert sockets_at("unixsock-stream//somewhere/bus") == []
