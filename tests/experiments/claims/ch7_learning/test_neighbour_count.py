@@ -24,6 +24,10 @@ def test_the_fewest_actions_of_a_hypercube_are_the_differing_joints():
         assert fewest_actions(space, start, goal) == (start ^ goal).bit_count()
 
 
+def test_where_no_actions_lead_there_are_no_fewest():
+    assert fewest_actions(arm_space(neighbours=4, tie_seed=1014), 42, 38) == 0
+
+
 def test_a_known_model_leads_the_arm_to_its_goal_by_the_shortest_path():
     space = arm_space(HYPERCUBE)
     model = TransitionModel(space)
