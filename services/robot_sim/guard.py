@@ -205,9 +205,9 @@ class Guard:
     def _obey(self, stop: Stop) -> None:
         if not replaces(stop, self._stop):
             return
-        if self._stop is None:
+        was_released, self._stop = self._stop is None, stop
+        if was_released:
             self._stop_all(stop)
-        self._stop = stop
         if self._record is not None and self._record.read() != stop:
             try:
                 self._record.latch(stop)
@@ -216,7 +216,6 @@ class Guard:
 
     def _stop_all(self, stop: Stop) -> None:
         """Stop the gates, and publish the stop until it is reset."""
-        self._stop = stop
         self._stop_gates(stop)
         self._repetition.cancel()  # of a stop that was reset less than a period ago
         self._repeat_stop()

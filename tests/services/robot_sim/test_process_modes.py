@@ -12,7 +12,7 @@ import pytest
 
 from bus_schema import keys
 from bus_schema.messages import EStop
-from bus_schema.rpc import Done, Empty
+from bus_schema.rpc import Done, Driven, Empty, Reply, Request, Take, Taken, WithEpoch
 from mobee.model.masses import gravity_torque
 from services.common.bus import Bus
 from services.common.rpc import CallFailed
@@ -169,3 +169,27 @@ def test_its_own_repetition_is_no_new_stop_whatever_run_it_was_sent_in(bench: Be
     own.publisher(EStop).put(set=True, source="test", reason="of another")
     wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
     bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+
+
+def test_a_stop_soon_after_a_reset_is_repeated_as_often_as_any(bench: Bench) -> None:
+    stops = bench.rig.record(EStop)
+    publisher = bench.rig.bus.publisher(EStop)
+    for n in range(6):
+        publisher.put(set=True, source="test", reason=f"number {n}")
+        wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+        bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+        wait_for(lambda: all(bench.newest(part).gate != "estop" for part in ROBOT.parts), "the reset")
+    publisher.put(set=True, source="test", reason="the last")
+    wait_for(lambda: any(stop.src == "robot_sim" and stop.reason == "the last" for stop in tuple(stops)), "its repetition")
+    before = len(stops)
+    time.sleep(1.0)
+    assert 1 <= len(stops) - before <= 20  # ten a second
+    bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+
+
+@pytest.mark.parametrize("verb, request_type, reply", [("take", Take, Taken), ("hold", WithEpoch, Driven)])
+def test_a_part_that_the_robot_has_not_is_refused_by_name(bench: Bench, verb: str, request_type: type[Request], reply: type[Reply]) -> None:
+    fields = {"instance": "c1"} if verb == "take" else {"epoch": 1}
+    with pytest.raises(CallFailed, match="no part 'tail'; this robot has torso, head, left_arm, right_arm") as caught:
+        bench.rig.call(keys.drive("tail", verb), request_type, reply, who="controller", **fields)
+    assert caught.value.code == "part"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import time
 from pathlib import Path
@@ -14,6 +15,7 @@ from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
 from experiments.kit.live.launch import free_endpoint
 from services.common.emergency_stop import Stop, StopRecord
+from services.common.rpc import CallFailed
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
@@ -125,3 +127,18 @@ def test_a_stop_in_the_record_is_obeyed_without_a_message(tmp_path: Path) -> Non
         bus.call(keys.ESTOP_RESET, Empty, Done)
         assert record.read() is None
         assert bench.next_state("torso").gate == "hold"
+
+
+def test_a_stop_that_cannot_be_recorded_holds_and_is_reported(tmp_path: Path) -> None:
+    record = StopRecord(tmp_path / "states" / "stop.json")
+    record.create()
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "kinematic", "--stop-record", str(record.path))
+        shutil.rmtree(record.path.parent)
+        bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
+        wait_for(lambda: all(bench.newest(part).gate == "estop" for part in ROBOT.parts), "the stop")
+        bench.hears("estop_record", 0, "the stop holds, but")
+        with pytest.raises(CallFailed) as caught:
+            bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+        assert caught.value.code == "estop_record"
+        assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
