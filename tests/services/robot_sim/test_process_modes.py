@@ -66,6 +66,8 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
     assert abs(bench.next_state("left_arm").dq[ELBOW]) < 0.01
     bench.rig.call(keys.ESTOP_RESET, Empty, Done)
     assert bench.next_state("left_arm").gate == "hold"
+    bench.hears("estop_reset", 0, "emergency stop reset by test")
+    wait_for(lambda: any(stop.src == "robot_sim" and not stop.set for stop in tuple(stops)), "the release, for observers")
     assert bench.drive("left_arm", "arm", epoch) == "armed"
     time.sleep(0.25)
     assert bench.next_state("torso").gate == "hold"
