@@ -128,7 +128,7 @@ class Inbox:
 
         Handlers that are queued at that time still run, but for at most GRACE s, so that a flood does not block the caller.
         """
-        self._spin(until, enough, self._awaited)
+        self._spin(until, enough, self._take_waiting)
 
     def serve(self, until: float) -> None:
         """Run handlers as `spin` does; while this thread waits, other threads may run handlers themselves (`handle`).
@@ -137,7 +137,7 @@ class Inbox:
         """
         self._serves = True
         try:
-            self._spin(until, None, self._called)
+            self._spin(until, None, self._take_serving)
         finally:
             self._serves = False
 
@@ -166,14 +166,14 @@ class Inbox:
             except RuntimeError:  # another thread has released it since
                 return
 
-    def _awaited(self, seconds: float) -> Handler | None:
+    def _take_waiting(self, seconds: float) -> Handler | None:
         """Return the next handler; None if none comes within `seconds`, or sooner if the thread was woken for one that has run."""
         if seconds > 0 and not self._queue:
             self._signal.acquire(timeout=seconds)
         return self._queue.popleft() if self._queue else None
 
-    def _called(self, seconds: float) -> Handler | None:
-        """Return the next handler as `_awaited` does; other threads may run handlers meanwhile.
+    def _take_serving(self, seconds: float) -> Handler | None:
+        """Return the next handler as `_take_waiting` does; other threads may run handlers meanwhile.
 
         A handler stays in the queue until this thread continues, which keeps the order.
         """

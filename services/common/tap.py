@@ -38,7 +38,7 @@ class Tap:
     wait the oldest are lost.
     """
 
-    def __init__(self, session: zenoh.Session, queues: Mapping[str, int], frequent: Iterable[str] = ()) -> None:
+    def __init__(self, session: zenoh.Session, queues: Mapping[str, int], frequent: Iterable[str]) -> None:
         """Subscribe.
 
         `queues`: how many messages of each key expression may wait.  `frequent`: keys with many messages that only expressions with

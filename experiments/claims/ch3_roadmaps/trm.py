@@ -335,7 +335,7 @@ def figure(folder: Path) -> Path:
     chosen = {one.cell.settings["task"]: one for one in finished}
     tasks = [task for task in EXAMPLES if task in chosen]
     if not tasks:
-        raise InvalidValue(f"{folder} has no finished maps: the run was stopped before the first.")
+        raise InvalidValue(f"{folder} has no maps: a record holds only their measures, or the run was stopped before the first.")
     panels = []
     for task in tasks:
         example = EXAMPLES[task]()

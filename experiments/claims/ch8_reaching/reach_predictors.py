@@ -127,7 +127,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the rewards of the oracle and of learners to the sums over the targets, (L, R, 1); the truth of a target stays whole."""
+    """Sum the rewards of oracle and learners over the targets: (L, R, 1).  A cell without them, the truth of a target, is not changed."""
     rewards = {name: value for name, value in values.items() if name.startswith("rewards_")}
     return {name: value.sum(axis=-1, keepdims=True) for name, value in rewards.items()} or values
 

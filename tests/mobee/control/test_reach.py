@@ -51,7 +51,7 @@ def test_out_of_reach_it_ends_stuck_at_the_nearest_point() -> None:
     assert path.distance == pytest.approx(0.2, abs=1e-4)
 
 
-def test_where_the_normal_cannot_be_turned_as_wanted_it_ends_stuck_with_an_angle() -> None:
+def test_a_normal_out_of_reach_ends_stuck_with_the_remaining_angle() -> None:
     path = reach_path(ARM, "tip", ARM.evaluate(BENT).position("tip"), BENT, np.array([0.0, 0.0, 1.0]))
     assert path.end == "stuck"
     assert path.angle == pytest.approx(np.pi / 2, abs=1e-3)  # the arm moves in the plane of x and y

@@ -144,7 +144,7 @@ def test_a_new_reacher_replaces_the_last_one() -> None:
     assert np.array_equal(one.step(BENT, DT).velocity, other.step(BENT, DT).velocity)
 
 
-def test_it_is_stuck_three_seconds_after_it_came_nearer_for_the_last_time() -> None:
+def test_a_reach_is_stuck_after_three_seconds_without_progress() -> None:
     reacher = Reacher(Controller(PLANAR), "tip", np.array([0.0, 1.1, 0.0]))
     states = [reacher.update(BENT, 0.125) for _ in range(26)]  # the marker does not move
     assert states == ["reaching"] * 24 + ["stuck"] * 2

@@ -46,13 +46,13 @@ def test_a_cancelled_timer_does_nothing_and_wakes_no_thread(monkeypatch: pytest.
     for timer in cancelled:
         timer.cancel()
     waits: list[float] = []
-    take = inbox._awaited
+    take = inbox._take_waiting
 
     def counted(seconds: float) -> object:
         waits.append(seconds)
         return take(seconds)
 
-    monkeypatch.setattr(inbox, "_awaited", counted)
+    monkeypatch.setattr(inbox, "_take_waiting", counted)
     inbox.spin(start + 10.0, lambda: bool(seen))
     assert seen == ["due"]
     assert len(waits) == 1
@@ -82,7 +82,7 @@ def test_a_wait_ends_however_short_it_is() -> None:
     inbox, rescued = Inbox(), threading.Event()
     rescue = threading.Timer(20.0, lambda: (rescued.set(), inbox.put(lambda: None)))
     rescue.start()
-    for take in (inbox._awaited, inbox._called):
+    for take in (inbox._take_waiting, inbox._take_serving):
         for _ in range(300_000):
             inbox.put(lambda: None)
             assert take(0.0) is not None
