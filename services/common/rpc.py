@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import uuid
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ import zenoh
 from msgspec import Struct
 from zenoh.handlers import Callback
 
-from bus_schema import VERSION, Refused, decode, encode, encoding_of
+from bus_schema import VERSION, Refused, decode, encode, encoding_of, keys
 from bus_schema.authority import may_call
 from bus_schema.messages import Served
 from bus_schema.rpc import Empty, Failure, Reply, Request
@@ -22,6 +22,7 @@ from services.common.identity import Identity
 
 _R = TypeVar("_R", bound=Reply)
 TIMEOUT = 0.5  # s
+FLUSH_TIMEOUT = 0.5  # s
 LOCKED_TIMEOUT = 1.5  # s, in lockstep: shorter than its patience, so that the load of the machine changes nothing
 
 
@@ -57,6 +58,18 @@ def call(
             if failed.code != "no_answer" or not left:
                 raise
     raise CallFailed("no_answer", _no_answer(key))
+
+
+def flush(session: zenoh.Session, who: str) -> None:
+    """Wait until the router has received every message sent so far, for at most FLUSH_TIMEOUT; call it before the session is closed.
+
+    Zenoh drops what it is sending when a session is closed, and a router what it has not read when it cannot write to a closed connection.
+    The question has the lowest priority, so the router answers it after all other messages; it does so even if no service has the key.
+    """
+    key, lowest = keys.service_rpc("router", "stat"), zenoh.Priority.BACKGROUND
+    payload = encode(Empty(v=VERSION, id=uuid.uuid4().hex, who=who))
+    answers = session.get(key, payload=payload, encoding=encoding_of(Empty), attachment=key, priority=lowest, timeout=FLUSH_TIMEOUT)
+    deque(answers, maxlen=0)
 
 
 def ask(

@@ -90,6 +90,7 @@ class Service(Listener):
         session = session or self._open_session()
         with ExitStack() as failed:
             failed.enter_context(session)  # closes it: an open callback would keep the interpreter from exiting
+            failed.callback(rpc.flush, session, self.who)
             self._begin(session, robot, inbox or Inbox(), prompt)
             self._sessions = failed.pop_all()
 
@@ -99,7 +100,9 @@ class Service(Listener):
 
     def second_session(self) -> zenoh.Session:
         """Open another session with the router, for a stream that must not wait behind the others; it is closed with the service."""
-        return self._sessions.enter_context(self._open_session())
+        session = self._sessions.enter_context(self._open_session())
+        self._sessions.callback(rpc.flush, session, self.who)
+        return session
 
     def _begin(self, session: zenoh.Session, robot: Robot | None, inbox: Inbox, prompt: bool) -> None:
         locked = self.config.mode == "lock"
