@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import cma
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -110,6 +111,29 @@ def test_the_rates_leave_something_of_the_shape(d: int, population: int, separab
     assert 0 < rates.path < 1
     negative = -rates.weights[rates.weights < 0].sum()
     assert rates.rank_all * negative * d <= 1.0 - rates.rank_one - rates.rank_all + 1e-12  # CMA's bound
+
+
+@pytest.mark.parametrize(("d", "population"), [(2, 6), (10, 10), (40, 15), (10, 40), (3, 100)])
+def test_the_rates_of_the_shape_are_those_of_pycma(d: int, population: int) -> None:
+    rates, theirs = path_rates(d, population), cma.CMAEvolutionStrategy(np.zeros(d), 1.0, {"popsize": population, "verbose": -9})
+    mine = [rates.effective, rates.rank_one, rates.rank_all, rates.length]
+    np.testing.assert_allclose(mine, [theirs.sp.weights.mueff, theirs.sp.c1, theirs.sp.cmu, theirs.const.chiN], rtol=1e-12)
+    np.testing.assert_allclose(rates.weights, np.array(theirs.sp.weights), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("d", "population", "path", "damping"), [(10, 10, 0.2844285879, 1.2844285879), (3, 100, 0.8284079507, 4.9241566753)]
+)
+def test_path_and_damping_are_those_of_the_tutorial(d: int, population: int, path: float, damping: float) -> None:
+    """Hansen 2016, eqs. 55 and 56, by hand from the effective numbers of samples, 3.1672992814 and 26.9666550647."""
+    rates = path_rates(d, population)
+    assert (rates.path, rates.damping) == pytest.approx((path, damping), rel=1e-9)
+
+
+def test_a_diagonal_shape_learns_faster_by_the_ratio_of_the_parameters() -> None:
+    full, diagonal = path_rates(10, 10), path_rates(10, 10, separable=True)
+    assert diagonal.rank_one / full.rank_one == pytest.approx(4.0)
+    assert diagonal.rank_all / full.rank_all == pytest.approx(4.0)
 
 
 def test_published_utilities_by_hand() -> None:
