@@ -2,16 +2,17 @@
 """Raw records: the values of every seed of a run, with settings and commit, in one archive per experiment.
 
 The archives are part of the repository.  Anybody can compute all verdicts, intervals and figures from them again, without a new run.
+Their files are compressed together, since those of one experiment are much alike: that takes less than half the room of a .zip.
 """
 
 from __future__ import annotations
 
 import io
 import lzma
+import tarfile
 import tempfile
 import zipfile
-import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from mobee.errors import InvalidValue
 
 RECORDS = Path(__file__).parent.parent / "records"
 MAX_BYTES, MAX_ALL = 2_000_000, 10_000_000  # of one archive, and of all together
+_SUFFIX = ".tar.xz"
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
@@ -29,12 +31,12 @@ class TooLarge(InvalidValue):
 
 def record_path(name: str, confirms: bool = False) -> Path:
     """Return the archive of an experiment, or with `confirms` of its run with new seeds."""
-    return RECORDS / f"{name}{'-confirm' if confirms else ''}.zip"
+    return RECORDS / f"{name}{'-confirm' if confirms else ''}{_SUFFIX}"
 
 
 def all_records() -> list[Path]:
     """Return all archives, sorted."""
-    return sorted(RECORDS.glob("*.zip"))
+    return sorted(RECORDS.glob(f"*{_SUFFIX}"))
 
 
 def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False, folder: Path | None = None) -> Path:
@@ -56,21 +58,41 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
     files = sorted({path for pattern in kept for path in place.glob(pattern)})
     if not files:
         raise InvalidValue(f"{run} has none of the files {', '.join(kept) or '(the experiment names none)'}: there is nothing to record.")
+    members = {member: source.read_bytes() for member, source in ((CONFIG, run / CONFIG), (VERSIONS, versions))}
+    members |= {str(file.relative_to(place)): _unpacked(file) if file.suffix == ".npz" else file.read_bytes() for file in files}
+    archive = _archive(members)
+    if len(archive) > MAX_BYTES:
+        raise TooLarge(
+            f"the record of {name} has {len(archive) / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: give its sweep a summary."
+        )
     path = record_path(name, confirms)
-    unfinished = path.with_suffix(".unfinished")
-    path.parent.mkdir(exist_ok=True)
-    with zipfile.ZipFile(unfinished, "w") as archive:
-        for member, source in [(CONFIG, run / CONFIG), (VERSIONS, versions), *((str(file.relative_to(place)), file) for file in files)]:
-            content = _unpacked(source) if source.suffix == ".npz" else source.read_bytes()
-            archive.writestr(zipfile.ZipInfo(member, _NO_TIME), content, zipfile.ZIP_LZMA)
-    if (size := unfinished.stat().st_size) > MAX_BYTES:
-        unfinished.unlink()
-        raise TooLarge(f"the record of {name} has {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:.0f} MB fit: give its sweep a summary.")
-    if confirms and path.exists() and path.read_bytes() != unfinished.read_bytes():
-        unfinished.unlink()
+    if confirms and path.exists() and _members(path) != members:
         raise InvalidValue(f"{path} exists: an experiment is confirmed once, with the first run of new seeds. {run} is another run.")
+    path.parent.mkdir(exist_ok=True)
+    unfinished = path.with_suffix(".unfinished")
+    unfinished.write_bytes(archive)
     unfinished.replace(path)
     return path
+
+
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    """Return the archive of files by name."""
+    content = io.BytesIO()
+    with lzma.open(content, "wb", preset=9 | lzma.PRESET_EXTREME) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
+        for name, data in members.items():
+            about = tarfile.TarInfo(name)  # without a time or an owner: the same files give the same archive
+            about.size = len(data)
+            archive.addfile(about, io.BytesIO(data))
+    return content.getvalue()
+
+
+def _members(path: Path) -> dict[str, bytes]:
+    """Return the files of an archive by name; raises InvalidValue if it is damaged."""
+    try:
+        with tarfile.open(path, "r:xz") as archive:
+            return {about.name: file.read() for about in archive if (file := archive.extractfile(about)) is not None}
+    except (tarfile.TarError, lzma.LZMAError, EOFError, OSError) as error:
+        raise InvalidValue(f"{path} is damaged ({error}): restore it with git, or write it anew.") from None
 
 
 def _unpacked(path: Path) -> bytes:
@@ -91,10 +113,13 @@ def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
     path = record_path(name, confirms)
     if not path.exists():
         raise InvalidValue(f"there is no record of {name!r} in {path.parent}: run the experiment, then `mobee experiment claims --write`.")
-    with tempfile.TemporaryDirectory(prefix="mobee-record-") as folder:
-        try:
-            with zipfile.ZipFile(path) as archive:
-                archive.extractall(folder)
-        except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, OSError) as error:
-            raise InvalidValue(f"{path} is damaged ({error}): restore it with git, or write it anew.") from None
-        yield Path(folder)
+    members = _members(path)
+    with tempfile.TemporaryDirectory(prefix="mobee-record-") as name_of_folder:
+        folder = Path(name_of_folder)
+        for member, data in members.items():
+            file = folder / member
+            if not file.resolve().is_relative_to(folder.resolve()):
+                raise InvalidValue(f"{path} is damaged (a file is named {member}): restore it with git, or write it anew.")
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(data)
+        yield folder
