@@ -30,7 +30,12 @@ SAFETY = {  # between a command and a motor: all mutants
         f"{SIM}/test_process_settings.py",
         f"{SIM}/test_lockstep.py",
     ),
-    "mobee/simulation/motors.py": ("tests/mobee/simulation", f"{SIM}/test_gate.py"),
+    "mobee/simulation/motors.py": (
+        "tests/mobee/simulation",
+        "tests/mobee/reference",
+        "tests/mobee/control/test_slides.py",
+        f"{SIM}/test_gate.py",
+    ),
 }
 OTHERS = {  # of these a sample
     "mobee/control/law.py": ("tests/mobee/control", "tests/mobee/reference"),

@@ -10,7 +10,7 @@ import pytest
 from mobee.control.law import FRICTION, INERTIA
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
-from mobee.simulation.motors import MotorParameters, Motors
+from mobee.simulation.motors import SERVO_GAIN, MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
 
 STEP = 0.005
@@ -113,7 +113,10 @@ def test_encoder_noise_is_white_seeded_and_independent_of_the_tick() -> None:
         readings = np.array([m.encoders(k, dt) for k in range(20_000)])
         assert readings.std(axis=0) * np.sqrt(dt / 0.02) == pytest.approx(np.full(3, 0.002), rel=0.02)
         assert np.abs(np.mean(readings[1:] * readings[:-1], axis=0)).max() < 0.03 * readings.var()
-    assert np.array_equal(motors(noisy, seed=5).encoders(1, 0.01), motors(noisy, seed=5).encoders(1, 0.01))
+    again = motors(noisy, seed=5)
+    again.encoders(7, 0.01)
+    assert np.array_equal(motors(noisy, seed=5).encoders(1, 0.01), again.encoders(1, 0.01))
+    assert np.abs(motors(noisy).encoders(1, 1.0)).min() > 0.0
     assert not np.array_equal(motors(noisy, seed=5).encoders(1, 0.01), motors(noisy, seed=6).encoders(1, 0.01))
 
 
@@ -148,6 +151,29 @@ def test_position_mode_goes_to_the_reference_no_faster_than_the_motor_can() -> N
     path = run(m, 3.0)
     assert path[-1] == pytest.approx([1.5, -0.3, 0.0], abs=1e-3)
     assert np.abs(np.diff(path, axis=0)).max() / STEP <= two_part_arm().motor_table[0].max_velocity + 1e-9
+
+
+def test_the_servo_moves_by_its_gain() -> None:
+    m = motors()
+    m.command(ALL, "position", np.full(3, 0.01))
+    m.move(1, STEP)
+    assert m.velocities == pytest.approx(np.full(3, SERVO_GAIN * 0.01))
+
+
+def test_motors_that_are_started_again_are_as_new_ones() -> None:
+    kind, place = MotorParameters(friction=0.01), np.array([0.1, -0.2, 0.3])
+    old, new = motors(kind, seed=1), motors(kind, seed=7, q=place)
+    for mode in ("torque", "velocity"):
+        old.command(ALL, mode, np.full(3, 0.7))
+        old.move(3, STEP)
+    old.encoders(2, 0.01)
+    old.restart(7, place)
+    for k, mode in enumerate(("hold", "velocity", "position", "torque", "velocity")):
+        for m in (old, new):
+            m.command(ALL, mode, None if mode == "hold" else np.full(3, 0.4))
+            m.move(3, STEP)
+        assert old.state.tobytes() == new.state.tobytes(), mode
+        assert old.encoders(k, 0.01).tobytes() == new.encoders(k, 0.01).tobytes()
 
 
 def test_torque_mode_is_inertia_and_viscous_friction() -> None:
@@ -260,8 +286,8 @@ def test_substeps_cover_the_tick() -> None:
     assert [MotorParameters().substeps(dt) for dt in (0.001, 0.005, 0.01, 0.012, 0.02)] == [1, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("change", [{"lag": -0.1}, {"encoder_noise": np.nan}, {"substep": 0.0}])
-def test_nonsense_parameters_are_refused_by_name(change: dict[str, float]) -> None:
+@pytest.mark.parametrize("change", [{"lag": -0.1}, {"lag": np.inf}, {"friction": (0.1, -0.1)}, {"encoder_noise": np.nan}, {"substep": 0.0}])
+def test_nonsense_parameters_are_refused_by_name(change: dict[str, Any]) -> None:
     with pytest.raises(InvalidValue, match=next(iter(change))):
         MotorParameters(**change)
 

@@ -92,6 +92,25 @@ def test_the_exponential_is_that_of_the_whole_matrix() -> None:
     np.testing.assert_allclose(turned(np.ones(4), z, weights, 0.3), np.exp(np.diag(exponent)), rtol=1e-12)
 
 
+def test_a_generation_of_the_published_full_form_is_one_exponential() -> None:
+    """Glasmachers et al. 2010: the shape with its size becomes exp(rate / 2 sum_i u_i z_i z_i^T)."""
+    from scipy.linalg import expm
+
+    es = NES(np.zeros(D), 1.0, population=9, method="xnes", seed=4)
+    z = es.ask()
+    es.tell(np.arange(9.0))
+    rate = 0.6 * (3.0 + np.log(D)) / (D * np.sqrt(D))
+    np.testing.assert_allclose(es.sigma * es.shape, expm(0.5 * rate * (z.T * published_utilities(9)) @ z), rtol=1e-12, atol=1e-12)
+
+
+def test_the_step_size_grows_at_most_by_e_in_a_generation() -> None:
+    es = NES(np.zeros(D), 1.0, seed=4)
+    es.path = np.full(D, 10.0)
+    es.ask()
+    es.tell(np.arange(float(es.population)))
+    assert es.sigma == pytest.approx(np.e)
+
+
 def test_a_long_series_ends() -> None:
     from scipy.linalg import expm
 
@@ -163,6 +182,7 @@ def test_an_infinite_cost_is_the_worst() -> None:
         lambda: NES([np.nan], 1.0),
         lambda: NES([0.0, 0.0], [1.0, 1.0, 1.0]),
         lambda: NES([0.0], 0.0),
+        lambda: NES([0.0, 0.0], [1.0, 0.0]),
         lambda: NES([0.0], 1.0, population=3),
         lambda: NES([0.0], 1.0).tell([1.0] * 4),
     ],
