@@ -9,6 +9,7 @@ import pytest
 
 from mobee.control.law import FRICTION, INERTIA
 from mobee.errors import InvalidValue
+from mobee.model.masses import gravity_torque
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import SERVO_GAIN, MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
@@ -252,15 +253,58 @@ def test_torques_move_a_joint_through_its_play_and_a_block_stops_the_motor_behin
     assert m.motor_velocities.tolist() == [0.0] * 3
 
 
-def test_another_substep_keeps_the_commands_in_the_delay_line() -> None:
+def test_another_substep_keeps_the_commands_in_the_delay_line_in_their_order() -> None:
     m = motors(replace(IDEAL, delay=0.02))
-    m.command(ALL, "velocity", np.full(3, 0.5))
-    m.move(2, 0.005)
-    moved = []
-    for _ in range(30):
+    each = np.array([1.0, 2.0, -1.0])
+    for speed in (0.1, 0.2, 0.3):
+        m.command(ALL, "velocity", speed * each)
+        m.move(5 if speed == 0.1 else 1, 0.005)
+    path = []
+    for _ in range(22):
         m.move(1, 0.001)
-        moved.append(m.q[0] > 0.0)
-    assert 10 <= moved.index(True) <= 20
+        path.append(m.velocities)
+    speeds = [0.1] * 18 + [0.2] + [0.3] * 3  # those before the oldest delayed command continue
+    np.testing.assert_allclose(path, np.outer(speeds, each), atol=1e-12)
+
+
+def test_a_longer_substep_keeps_the_newest_commands() -> None:
+    m = motors(replace(IDEAL, delay=0.02))
+    for speed in (0.1, 0.2, 0.3):
+        m.command(ALL, "velocity", np.full(3, speed))
+        m.move(30 if speed == 0.1 else 1, 0.001)
+    m.move(1, 0.01)
+    assert m.velocities == pytest.approx(np.full(3, 0.2))
+
+
+def test_driving_begins_with_the_substep_that_it_is_given() -> None:
+    driven, moved = (motors(MotorParameters(encoder_noise=0.0), q=np.full(3, 0.3)) for _ in range(2))
+    assert driven.drive(0.002).tolist() == [0.0] * 3
+    for m in (driven, moved):
+        m.command(ALL, "velocity", np.full(3, 0.5))
+    for _ in range(50):
+        driven.adopt(driven.q + 0.001 * driven.drive(0.001))
+        moved.move(1, 0.001)
+    np.testing.assert_allclose(driven.q, moved.q, atol=1e-12)
+    assert driven.q.min() > 0.301
+
+
+def test_motors_enter_a_mode_also_if_others_are_in_it() -> None:
+    m = motors()
+    m.command(slice(0, 1), "velocity", np.array([0.5]))
+    m.command(ALL, "velocity", np.full(3, 0.5))
+    m.move(1, STEP)
+    assert m.velocities == pytest.approx(np.full(3, 0.5))
+
+
+def test_a_motor_that_enters_torque_mode_carries_its_weight_and_an_effort_can_be_set() -> None:
+    robot = load_robot("icub")
+    m = Motors(robot, IDEAL, 0, robot.home)
+    m.command(ALL, "velocity", np.zeros(len(robot.motors)))
+    assert not m.load.any()
+    m.command(ALL, "torque")
+    assert m.load == pytest.approx(gravity_torque(robot, robot.home)) and m.load.any()
+    m.efforts = np.arange(float(len(robot.motors)))
+    assert m.efforts.tolist() == [*range(len(robot.motors))]
 
 
 def test_parameters_of_another_number_of_motors_are_refused() -> None:
