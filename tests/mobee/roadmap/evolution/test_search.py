@@ -77,6 +77,25 @@ def test_the_same_seed_gives_the_same_search() -> None:
     assert not np.array_equal(one.x, other.x)
 
 
+def test_a_search_outside_the_box_is_led_back_by_the_penalty() -> None:
+    """All samples are moved to the border and cost the same there, so only the distance to the box can lead the search."""
+    search = Search([1.5, 1.5], 0.1, BOX, seed=1)
+    before = search._nes.mean.copy()
+    for _ in range(30):
+        search.tell(np.zeros(len(search.ask())))
+    assert np.abs(search._nes.mean - 0.5).max() < 0.6 < np.abs(before - 0.5).max()
+
+
+def test_a_search_that_is_narrow_in_one_coordinate_only_continues() -> None:
+    search = Search([0.5, 0.5], [1e-6, 0.1], BOX, Restart(std=1e-3))
+    search.tell((search.ask() ** 2).sum(axis=1))
+    assert search.starts == 1
+
+
+def test_all_evaluations_are_used_if_they_are_whole_generations() -> None:
+    assert minimize(lambda x: (x**2).sum(axis=1), np.ones(3), 1.0, evaluations=20, population=10).evaluations == 20
+
+
 def test_never_more_evaluations_than_allowed() -> None:
     count = 0
 
