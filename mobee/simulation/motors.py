@@ -159,11 +159,10 @@ class Motors:
         self.begin_substeps(parameters.substep)
 
     def restart(self, seed: int, q: Array) -> None:
-        """Start again as new motors of that seed would: at rest at q (n,) rad, in hold, with no command in the delay line."""
+        """Start again as new motors of that seed would: at rest at q (n,) rad, in hold, which reads no command from the delay line."""
         self.seed = _checked_seed(seed)
         self._rest(q)
-        self._line[:] = 0.0
-        self.struct.seed, self.struct.noise_tick, self.struct.newest = self.seed, -1, len(self._line) - 1
+        self.struct.seed, self.struct.noise_tick = self.seed, -1
 
     def _rest(self, q: Array) -> None:
         self.state[:] = 0
