@@ -76,7 +76,7 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:
-    """Return the archive of files by name."""
+    """Return an archive with these files, given as contents by name."""
     content = io.BytesIO()
     with lzma.open(content, "wb", preset=9 | lzma.PRESET_EXTREME) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
         for name, data in members.items():
@@ -87,7 +87,7 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
 
 
 def _members(path: Path) -> dict[str, bytes]:
-    """Return the files of an archive by name; raises InvalidValue if it is damaged."""
+    """Return the contents of the files in an archive, by name; raises InvalidValue if it is damaged."""
     try:
         with tarfile.open(path, "r:xz") as archive:
             return {about.name: file.read() for about in archive if (file := archive.extractfile(about)) is not None}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -73,7 +74,7 @@ def test_what_a_closing_process_has_sent_arrives_even_if_the_router_had_no_proce
                         time.sleep(0.001)
                     flood.recv()
                     router.send_signal(signal.SIGSTOP)
-                    time.sleep(0.01)  # until all its threads have stopped
+                    os.waitpid(router.pid, os.WUNTRACED)  # until all its threads have stopped
                     for number in range(MANY):
                         publisher.put(bytes([number]) + bytes(60_000))
                     threading.Timer(0.05, router.send_signal, [signal.SIGCONT]).start()
