@@ -144,7 +144,7 @@ def test_the_rates_of_the_shape_are_those_of_pycma(d: int, population: int) -> N
     ("d", "population", "path", "damping"), [(10, 10, 0.2844285879, 1.2844285879), (3, 100, 0.8284079507, 4.9241566753)]
 )
 def test_path_and_damping_are_those_of_the_tutorial(d: int, population: int, path: float, damping: float) -> None:
-    """Computed by hand from the formulas of Hansen 2016 (arXiv:1604.00772); effective numbers of samples: 3.1672992814 and 26.9666550647."""
+    """By hand from the formulas of Hansen 2016 (arXiv:1604.00772); effective numbers of samples: 3.1672992814 and 26.9666550647."""
     rates = path_rates(d, population)
     assert (rates.path, rates.damping) == pytest.approx((path, damping), rel=1e-9)
 
