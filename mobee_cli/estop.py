@@ -68,10 +68,11 @@ def _recorded(endpoint: str, reason: str) -> bool:
 
 def _stop(session: Any, reason: str) -> list[str]:
     """Repeat the stop until every part reports it; raises UserError if one does not, or if none is there."""
-    gates: dict[str, str] = {}
+    stopped: dict[str, bool] = {}  # by part; never False again: a repetition after a release would undo it
 
     def note(received: Received) -> None:
-        gates[received.key.partition("/")[0]] = received.content()["gate"]
+        part = received.key.partition("/")[0]
+        stopped[part] = stopped.get(part, False) or received.content()["gate"] == "estop"
 
     listen(session, State.stream.keys(), note)
     publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(EStop)
@@ -79,10 +80,10 @@ def _stop(session: Any, reason: str) -> list[str]:
     while time.monotonic() < give_up:
         publisher.put(set=True, source="mobee", reason=reason[:2000])
         time.sleep(_REPEAT)
-        seen = dict(gates)
-        if seen and all(gate == "estop" for gate in seen.values()):
+        seen = dict(stopped)
+        if seen and all(seen.values()):
             return sorted(seen)
-    moving = [part for part, gate in gates.items() if gate != "estop"]
+    moving = [part for part, is_stopped in stopped.items() if not is_stopped]
     result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot publishes its state"
     kept = ". The launcher keeps the stop: robot_sim comes up stopped" if "launcher" in alive(session) else ""
     raise UserError(f"the stop was sent for {_PATIENCE:g} s, but {result}: use the robot's own emergency button{kept}")

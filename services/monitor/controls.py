@@ -50,6 +50,7 @@ from services.monitor.web.server import Refused
 TRIES = 3
 FREE_PATIENCE = 4.0  # s until a part that was taken can move
 STOP_PATIENCE, STOP_PERIOD = 2.0, 0.1  # s for which an emergency stop is repeated until all parts report it
+STOP_CHECK = 0.01  # s between two checks for that report
 AFTER_REACH = 4.0  # s for which the hand stays after a reach, before the part is given back
 PLACE_RADIUS = 0.03  # m, of the sphere that is presented at a place
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
@@ -61,6 +62,7 @@ class Known:
     """The newest messages that the calls depend on; the main thread writes them, other threads read them."""
 
     gates: dict[str, str] = field(default_factory=dict)  # by part
+    stopped: float = 0.0  # s, monotonic clock: when all parts last reported an emergency stop
     motions: dict[str, Motion] = field(default_factory=dict)
     reaches: dict[str, Reach] = field(default_factory=dict)
     objects: dict[str, ObjectState] = field(default_factory=dict)  # of the model's world
@@ -84,6 +86,7 @@ class PageControls:
         self._lock = RLock()
         self._holder, self._pages = "", 0
         self._taken: dict[str, _Taken] = {}
+        self._released = 0.0  # s, monotonic clock: when a page last released an emergency stop
         self._estop = service.bus.publisher(EStop)
         self._verbs: Mapping[str, Callable[[dict[str, Any]], str]] = {
             "release": self._release_stop,
@@ -155,18 +158,23 @@ class PageControls:
     # The whole robot
 
     def _stop(self) -> str:
-        give_up = time.monotonic() + STOP_PATIENCE
+        begin = repeat = time.monotonic()
         source, reason = "page", "pressed on the page"
         with suppress(OSError):  # the bus remains
             StopRecord.of_endpoint(self._service.config.endpoint).stop(source, reason)
-        while time.monotonic() < give_up:
-            self._estop.put(set=True, source=source, reason=reason)
-            time.sleep(STOP_PERIOD)
-            if self._known.gates and all(gate == "estop" for gate in self._known.gates.values()):
+        while (now := time.monotonic()) < begin + STOP_PATIENCE:
+            if self._known.stopped > begin:  # never again after that: a release may follow at once
                 return "Stopped: all motors."
+            if self._released > begin:
+                raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
+            if now >= repeat:
+                self._estop.put(set=True, source=source, reason=reason)
+                repeat = now + STOP_PERIOD
+            time.sleep(STOP_CHECK)
         raise Refused(f"the stop was sent for {STOP_PATIENCE:g} s, and not every part confirms it: use the robot's own emergency button")
 
     def _release_stop(self, given: dict[str, Any]) -> str:
+        self._released = time.monotonic()
         return self._plain(keys.ESTOP_RESET, "Released: the controller arms the parts, and agents continue.")
 
     def _reset(self) -> str:

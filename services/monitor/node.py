@@ -193,6 +193,8 @@ class MonitorNode:
                 self._known.reaches[part] = reach
                 self._teller.note_reach(part, reach)
         self._known.gates = {part: state.gate for part, state in self._body.states.items()}
+        if self._known.gates and set(self._known.gates.values()) == {"estop"}:
+            self._known.stopped = time.monotonic()
 
     def _show_body(self) -> None:
         server = self._output.server

@@ -55,8 +55,11 @@ class Robot:
     def stop(self) -> None:
         self.gates.update({part: "estop" for part in self.gates if part not in self.deaf})
 
-    def reset(self, query: object) -> None:
+    def release(self) -> None:
         self.gates.update(dict.fromkeys(self.gates, "hold"))
+
+    def reset(self, query: object) -> None:
+        self.release()
         with query:
             query.reply(keys.ESTOP_RESET, encode(Done(v=VERSION)), encoding=encoding_of(Done))
 
@@ -79,6 +82,13 @@ def test_every_part_stops_and_is_named(robot: Robot, endpoint: str, capsys: pyte
     assert main(["estop", "--endpoint", endpoint]) == 0
     assert robot.gates == {"torso": "estop", "head": "estop"}
     assert capsys.readouterr().out.startswith("stopped: head, torso;")
+
+
+def test_a_release_by_another_client_is_not_undone(robot: Robot, endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estop, "_REPEAT", 1.0)  # the release comes before the first repetition
+    listen(robot.session, EStop.stream.key(), lambda heard: threading.Timer(0.3, robot.release).start())
+    assert main(["estop", "--endpoint", endpoint]) == 0
+    assert set(robot.gates.values()) == {"hold"}
 
 
 def test_a_part_that_does_not_stop_is_named(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
