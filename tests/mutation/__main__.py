@@ -44,8 +44,14 @@ OTHERS = {  # of these a sample
     "mobee/learning/transitions.py": ("tests/mobee/learning",),
     "mobee/roadmap/evolution/nes.py": ("tests/mobee/roadmap/evolution",),
     "mobee/roadmap/evolution/search.py": ("tests/mobee/roadmap/evolution",),
-    "services/controller/goals.py": (f"{CONTROLLER}/test_goals.py", f"{CONTROLLER}/test_node.py", f"{CONTROLLER}/test_client_forces.py"),
-    "services/controller/drives.py": (f"{CONTROLLER}/test_drives.py", f"{CONTROLLER}/test_node.py"),
+    "services/controller/goals.py": (
+        f"{CONTROLLER}/test_goals.py",
+        f"{CONTROLLER}/test_node.py",
+        f"{CONTROLLER}/test_client_forces.py",
+        f"{CONTROLLER}/test_follow.py",
+        f"{CONTROLLER}/test_reaches.py",
+    ),
+    "services/controller/drives.py": (f"{CONTROLLER}/test_drives.py", f"{CONTROLLER}/test_node.py", f"{CONTROLLER}/test_lockstep.py"),
 }
 SAMPLE = 200
 

@@ -42,7 +42,7 @@ class FakeSim:
         self.frozen = False  # the motors do not follow
         self.silent: set[str] = set()  # parts that send no state
         self.refuses_to_arm: set[str] = set()
-        self.takes: list[str] = []
+        self.takes: list[str] = []  # parts of all calls
         self.answers = threading.Event()  # cleared: drive calls are heard and not answered
         self.answers.set()
         self.gates = {part: FakeGate(velocity=np.zeros(len(p)), epoch=100) for part, p in rig.robot.parts.items()}
@@ -146,11 +146,11 @@ class FakeSim:
 
     def _take(self, request: Take, key: str) -> Taken:
         part = key.split("/")[0]
+        self.takes.append(part)
         self.answers.wait()
         with self._lock:
             gate = self.gates[part]
             gate.epoch, gate.owner, gate.state = gate.epoch + 1, request.instance, "hold"
-            self.takes.append(part)
             return Taken(v=VERSION, epoch=gate.epoch)
 
     def _arm(self, request: WithEpoch, key: str) -> Driven:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from mobee import Model
-from tests.services.controller.stage import ROBOT, Stage, refused
+from mobee.control.forces import LARGEST_FORCE
+from tests.services.controller.stage import PARTS, ROBOT, Stage, refused
 
 
 def test_a_push_at_a_marker_moves_the_arm_until_it_is_cleared(run: Stage) -> None:
@@ -43,6 +44,7 @@ def test_forces_of_any_size_leave_the_law_with_numbers(run: Stage) -> None:
     for part, epoch in owned.items():
         refused("force", lambda part=part, epoch=epoch: run.force(part, epoch, marker="left_palm", push=[1.7e308, 0.0, 0.0]))
         refused("force", lambda part=part, epoch=epoch: run.force(part, epoch, f=[-1e300] * len(ROBOT.part(part))))
+        run.force(part, epoch, f=[LARGEST_FORCE / len(PARTS)] * len(ROBOT.part(part)))
         run.force(part, epoch, marker="left_palm", push=[1e8, -1e8, 1e8])
         run.force(part, epoch, f=[-1e8] * len(ROBOT.part(part)))
     run.ticks(20)

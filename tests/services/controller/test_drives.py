@@ -52,6 +52,8 @@ def test_a_part_that_the_gate_drops_is_armed_again_at_rest_and_its_action_contin
     run.play(lambda: run.motion("left_arm").status == "suspended", "the hold", ticks=50)
     assert run.motion("left_arm").action_id == "dropped"
     refused("held", lambda: run.goal("left_arm", epoch, near("left_arm")))
+    takes = len(run.sim.takes)
+    run.play(lambda: run.sim.takes[takes:].count("left_arm") >= 2, "a second attempt after the first one failed", ticks=1000)
     assert {run.motion(p).status for p in ("torso", "right_arm")} == {"idle"}
     run.sim.refuses_to_arm = set()
     run.play(lambda: run.motion("left_arm").status == "moving", "the part to come back", ticks=1000)
@@ -81,6 +83,20 @@ def test_while_one_part_waits_to_be_armed_the_others_get_their_commands(run: Sta
         run.sim.answers.set()
     run.play(lambda: run.motion("left_arm").status == "idle", "its return")
     assert len(run.sim.takes) - takes < 10  # a controller that waits for each answer asks anew every tick
+
+
+def test_an_attempt_of_the_run_before_does_not_count(run: Stage) -> None:
+    takes = len(run.sim.takes)
+    run.sim.answers.clear()
+    try:
+        run.sim.hold("left_arm")
+        run.play(lambda: len(run.sim.takes) > takes, "the attempt", ticks=1000)
+        run.sim.new_run()
+        run.sim.tick()
+    finally:
+        run.sim.answers.set()
+    run.under_control()
+    assert run.sim.takes[takes:].count("left_arm") == 2
 
 
 def test_a_part_whose_state_stands_still_is_not_under_control(run: Stage) -> None:

@@ -67,6 +67,12 @@ def test_a_goal_outside_the_limits_is_refused_with_motor_and_range(run: Stage) -
     assert (run.motion("left_arm").goal, run.motion("left_arm").status) == (before, "idle")
 
 
+def test_a_goal_at_the_limits_is_accepted_in_spite_of_rounding(run: Stage) -> None:
+    _, epoch = run.own("left_arm")
+    for limits, rounding in zip(ROBOT.limits[ROBOT.part("left_arm").slice].T, (-5e-10, 5e-10), strict=True):
+        run.goal("left_arm", epoch, limits + rounding)
+
+
 def test_when_an_agent_ends_its_part_stays_and_the_others_continue(run: Stage) -> None:
     who, other = "agent_left_arm", "agent_right_arm"
     dying, epoch = run.own("left_arm", who)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.messages import Event, Reach, Targets
+from bus_schema.messages import Event, Follow, Reach, Targets
 from bus_schema.rpc import ReachFor, Started
 from mobee import Model
 from mobee.arrays import Array
@@ -112,7 +112,7 @@ def test_a_reach_ends_when_its_target_is_gone(run: Stage, reports: list[Reach]) 
     np.testing.assert_allclose(palm(run.sim.q), at, atol=0.02)
 
 
-def test_a_reach_ends_without_outcome_in_hold_by_another_goal_and_with_its_owner(run: Stage, reports: list[Reach]) -> None:
+def test_a_reach_ends_without_outcome_in_hold_by_another_goal_or_attractor_and_with_its_owner(run: Stage, reports: list[Reach]) -> None:
     instance, epoch = run.own("right_arm")
     far = palm(run.sim.q) + [-0.1, 0.1, 0.3]
 
@@ -134,6 +134,11 @@ def test_a_reach_ends_without_outcome_in_hold_by_another_goal_and_with_its_owner
     wait_for(lambda: phase(reports) == "interrupted", "the end by a goal")
     run.play(lambda: run.motion("right_arm").status == "settled", "the goal")
     assert run.motion("right_arm").action_id == "goal"
+
+    begin("followed")
+    run.rig.bus.publisher(Follow, "right_arm").put(epoch=epoch, q=run.sim.of("right_arm").tolist(), dq=[0.0] * 16)
+    run.play(lambda: phase(reports) == "interrupted", "the end by an attractor that moves", ticks=20)
+    assert (run.motion("right_arm").status, run.motion("right_arm").action_id) == ("idle", "")
 
     begin("owner")
     run.leave("agent_test", instance)
