@@ -26,7 +26,8 @@ class _Thread:
 class Starvation:
     """Measures how long one of several processes has been without a processor, by the scheduler's numbers of their threads.
 
-    `total`: s since the start; of threads that wait at the same time, the longest wait counts.  0 where Linux does not report it.
+    `total`: s since the start; a call passes through several threads, which may all wait for a processor one after the other, so that
+    their waits are added up, to a period at most.  0 where Linux does not report it.
     """
 
     def __init__(self, pids: tuple[int, ...], now: float) -> None:
@@ -38,13 +39,14 @@ class Starvation:
         if now < self._at + PERIOD:
             return
         found: dict[int, _Thread] = {}
-        longest = 0.0
+        waits = 0.0
         for thread, ran, waited, is_ready in _threads(self._pids):
             before = self._threads.get(thread, _Thread(-1, waited, None))
             begun = (self._at if before.since is None else before.since) if is_ready and ran == before.ran else None
             found[thread] = _Thread(ran, waited, begun)
-            longest = max(longest, found[thread].waited_until(now) - before.waited_until(self._at))
-        self._threads, self._at, self.total = found, now, self.total + longest
+            waits += found[thread].waited_until(now) - before.waited_until(self._at)
+        self.total += min(waits, now - self._at)
+        self._threads, self._at = found, now
 
 
 def _threads(pids: tuple[int, ...]) -> Iterator[tuple[int, int, float, bool]]:

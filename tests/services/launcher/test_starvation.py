@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -27,26 +28,56 @@ def spinning() -> Iterator[subprocess.Popen[bytes]]:
     process.wait()
 
 
-def measured(pid: int) -> float:
+def measured(*pids: int) -> float:
+    """Seconds without a processor, as a share of the time."""
     begin = time.monotonic()
-    starvation = Starvation((pid,), begin)
+    starvation = Starvation(pids, begin)
     while time.monotonic() < begin + SECONDS:
         time.sleep(PERIOD / 4)
-        starvation.update(time.monotonic())
-    return starvation.total
+        starvation.update(now := time.monotonic())
+    return starvation.total / (now - begin)
 
 
-def test_a_process_that_others_keep_from_the_processor_is_starved(spinning: subprocess.Popen[bytes]) -> None:
+@contextmanager
+def busy_processor() -> Iterator[None]:
+    """Three other programs that want the processor."""
     others = [subprocess.Popen([sys.executable, "-c", SPIN]) for _ in range(3)]
     for other in others:
         os.sched_setaffinity(other.pid, {min(os.sched_getaffinity(0))})
     try:
         time.sleep(0.3)
-        assert measured(spinning.pid) > SECONDS / 2
+        yield
     finally:
         for other in others:
             other.kill()
             other.wait()
+
+
+def test_a_process_that_others_keep_from_the_processor_is_starved(spinning: subprocess.Popen[bytes]) -> None:
+    with busy_processor():
+        assert measured(spinning.pid) > 0.5
+        assert measured(spinning.pid, spinning.pid) <= 1.0  # what waits at the same time
+
+
+def test_waits_of_processes_one_after_the_other_add_up() -> None:
+    """Two processes send a byte to and fro, so that one of the two is waiting at every time."""
+    (one, other), (back, forth) = os.pipe(), os.pipe()
+    send = "import os\nwhile True: os.read({0}, 1); os.write({1}, b'x')"
+    pair = [subprocess.Popen([sys.executable, "-c", send.format(*ends)], pass_fds=ends) for ends in ((one, forth), (back, other))]
+    for process in pair:
+        os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
+    try:
+        os.write(other, b"x")
+        with busy_processor():
+            both, first = measured(*(process.pid for process in pair)), measured(pair[0].pid)
+    finally:
+        for process in pair:
+            process.kill()
+            process.wait()
+        for end in (one, other, back, forth):
+            os.close(end)
+    print(f"share of the time without a processor: both {both:.2f}, the first {first:.2f}")
+    assert both > 1.5 * first
 
 
 def test_a_stopped_process_is_not_starved(spinning: subprocess.Popen[bytes]) -> None:
