@@ -183,6 +183,7 @@ class CupNode:
         """Raise Paused unless the thing was seen a moment ago, is hidden by the hand and not withdrawn, or is in the hand."""
         if self._gripped:
             return
+        self._service.spin(time.monotonic())  # after a long computation a picture waits behind the clock
         seen, now = self._seen, self._service.bus.t
         if seen is None:
             raise Paused(f"no place of {self._config.target} yet")
