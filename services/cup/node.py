@@ -180,7 +180,10 @@ class CupNode:
         self._service.bus.event("warning", "cup_missed", f"{name} {where}")
 
     def _require_seen(self) -> None:
-        """Raise Paused unless the thing was seen a moment ago, is hidden by the hand and not withdrawn, or is in the hand."""
+        """Handle waiting messages, then raise Paused unless the thing was seen a moment ago, is hidden by the hand, or is in the hand.
+
+        A thing that vision has withdrawn does not count as hidden.
+        """
         if self._gripped:
             return
         self._service.spin(time.monotonic())  # after a long computation a picture waits behind the clock

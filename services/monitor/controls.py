@@ -163,14 +163,14 @@ class PageControls:
         with suppress(OSError):  # the bus remains
             StopRecord.of_endpoint(self._service.config.endpoint).stop(source, reason)
         while (now := time.monotonic()) < begin + STOP_PATIENCE:
-            if self._known.stopped > begin:  # never again after that: a release may follow at once
-                return "Stopped: all motors."
-            if self._released > begin:
-                raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
             if now >= repeat:
                 self._estop.put(set=True, source=source, reason=reason)
                 repeat = now + STOP_PERIOD
             time.sleep(STOP_CHECK)
+            if self._known.stopped > begin:  # never again after that: a release may follow at once
+                return "Stopped: all motors."
+            if self._released > begin:
+                raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
         raise Refused(f"the stop was sent for {STOP_PATIENCE:g} s, and not every part confirms it: use the robot's own emergency button")
 
     def _release_stop(self, given: dict[str, Any]) -> str:

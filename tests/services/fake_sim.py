@@ -42,7 +42,7 @@ class FakeSim:
         self.frozen = False  # the motors do not follow
         self.silent: set[str] = set()  # parts that send no state
         self.refuses_to_arm: set[str] = set()
-        self.takes: list[str] = []  # parts of all calls
+        self.takes: list[str] = []  # the part of each call `take`
         self.answers = threading.Event()  # cleared: drive calls are heard and not answered
         self.answers.set()
         self.gates = {part: FakeGate(velocity=np.zeros(len(p)), epoch=100) for part, p in rig.robot.parts.items()}

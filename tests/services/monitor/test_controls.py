@@ -17,6 +17,7 @@ from services.common.service import Service
 from services.monitor.controls import STOP_PERIOD, Known, PageControls
 from services.monitor.web.board import Board
 from services.monitor.web.server import Refused
+from tests.services.harness import wait_for
 from tests.services.stage import Stage
 
 
@@ -56,6 +57,13 @@ def test_a_stop_is_repeated_until_all_parts_have_reported_it_and_never_after_tha
     assert stopped.controls.do("p", "stop", {}) == "Stopped: all motors."
     time.sleep(2.0 * STOP_PERIOD)
     assert stopped.sent == repeated + 1
+
+
+def test_a_stop_is_sent_although_all_parts_seem_to_report_it_already(stopped: Stopped) -> None:
+    """Their newest states can be older than a release a moment ago."""
+    stopped.known.stopped = float("inf")
+    assert stopped.controls.do("p", "stop", {}) == "Stopped: all motors."
+    wait_for(lambda: stopped.sent == 1, "the stop")
 
 
 def test_a_release_ends_the_repetition_of_a_stop_that_was_not_confirmed(stopped: Stopped) -> None:
