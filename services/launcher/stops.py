@@ -13,6 +13,7 @@ from services.common.service import Service
 
 PERIOD = 0.05  # s between two checks for a stop, and between two repetitions
 JUST_RELEASED = 0.2  # s after a release in which a stop may be older than it: it is left to robot_sim, and to its sender, who repeats it
+JUST_CONFIRMED = 0.2  # s after a stop that robot_sim has published, which it repeats twice in that time, if it is stopped
 
 
 class EmergencyStops:
@@ -27,6 +28,7 @@ class EmergencyStops:
         self._service, self._record, self._announce = service, record, announce
         self._publisher = service.bus.publisher(EStop)
         self._waiting: Stop | None = None  # for robot_sim's confirmation
+        self._confirmed = -JUST_CONFIRMED  # s, monotonic clock: when robot_sim last published a stop
         self._line = StopLine(service.bus.session)
         self._watch()
 
@@ -50,8 +52,8 @@ class EmergencyStops:
 
     def _note(self, message: EStop) -> None:
         if message.src == "robot_sim":
-            self._waiting = None
-        elif not self._is_launcher(message.src) and not self._was_just_released():
+            self._waiting, self._confirmed = None, time.monotonic()
+        elif not self._is_launcher(message.src) and not self._was_just_confirmed() and not self._was_just_released():
             stop = Stop(message.source, message.reason, time.time())
             if replaces(stop, self._waiting):
                 self._keep(stop)
@@ -59,6 +61,10 @@ class EmergencyStops:
     def _is_launcher(self, who: str) -> bool:
         """Return whether a launcher has sent a stop: each repeats its own, and two would repeat each other's without end."""
         return who == self._service.who or who == BY_LAUNCHER or who.startswith(HOST_LAUNCHER)
+
+    def _was_just_confirmed(self) -> bool:
+        """Return whether robot_sim is stopped, or was a moment ago: a stop that it knows could be repeated after its release."""
+        return time.monotonic() - self._confirmed < JUST_CONFIRMED
 
     def _was_just_released(self) -> bool:
         """Return whether robot_sim has recorded a release a moment ago, by the clock of this host, which is also robot_sim's."""

@@ -17,7 +17,7 @@ from mobee.robot.load import load_robot
 from services.common.config import ServiceConfig
 from services.common.emergency_stop import StopRecord
 from services.common.service import Service
-from services.launcher.stops import JUST_RELEASED, EmergencyStops
+from services.launcher.stops import JUST_CONFIRMED, JUST_RELEASED, PERIOD, EmergencyStops
 from tests.services.harness import Rig, rig
 
 HOUR = 3_600_000_000_000  # ns
@@ -38,13 +38,18 @@ def launcher(bus: Rig) -> Iterator[Service]:
         signal.signal(number, handler)
 
 
+def put(bus: Rig, who: str, tw: int = 0) -> None:
+    """Publish a stop of `who`."""
+    header: dict[str, Any] = {"v": VERSION, "run": "-", "src": who, "seq": 0, "k": 0, "t": 0, "tw": tw}
+    stop = EStop(**header, set=True, source=who, reason="a hand in the way")
+    bus.session.put(EStop.stream.key(), encode(stop), encoding=encoding_of(EStop))
+
+
 def said(launcher: Service, bus: Rig, record: StopRecord | None, *, who: str = "mobee_1", tw: int = 0) -> str:
     """What the launcher waits for after a stop by `who`, sent at `tw` of its clock."""
     stops = EmergencyStops(launcher, record, lambda text: None)
     launcher.spin(time.monotonic() + 0.05)  # the subscription reaches the router
-    header: dict[str, Any] = {"v": VERSION, "run": "-", "src": who, "seq": 0, "k": 0, "t": 0, "tw": tw}
-    stop = EStop(**header, set=True, source=who, reason="a hand in the way")
-    bus.session.put(EStop.stream.key(), encode(stop), encoding=encoding_of(EStop))
+    put(bus, who, tw)
     launcher.spin(time.monotonic() + 0.5, lambda: bool(stops.waiting))
     return stops.waiting
 
@@ -70,6 +75,20 @@ def test_a_stop_that_may_be_older_than_the_release_is_left_to_robot_sim(launcher
     record.release()
     assert said(launcher, bus, record, tw=time.monotonic_ns() + HOUR) == ""
     assert record.read() is None
+
+
+def test_a_stop_that_robot_sim_has_confirmed_first_is_not_kept(launcher: Service, bus: Rig) -> None:
+    """robot_sim obeys the record of stops before the message arrives; a release at once must not be followed by a repetition."""
+    stops = EmergencyStops(launcher, None, lambda text: None)
+    launcher.spin(time.monotonic() + 0.05)
+    put(bus, "robot_sim")
+    put(bus, "page")
+    launcher.spin(time.monotonic() + 3.0 * PERIOD)
+    assert stops.waiting == ""
+    launcher.spin(time.monotonic() + JUST_CONFIRMED)
+    put(bus, "page")  # a new one
+    launcher.spin(time.monotonic() + 0.5, lambda: bool(stops.waiting))
+    assert stops.waiting
 
 
 def test_launchers_do_not_repeat_each_others_stops(launcher: Service, bus: Rig) -> None:
