@@ -72,8 +72,10 @@ def pytest_collection_finish() -> None:
 def pytest_runtest_setup() -> None:
     """Handle signals as a new process does, before a test and its fixtures start programs, which would inherit that they are ignored.
 
-    A shell has the programs that it starts in the background ignore Ctrl-C, and a service of ours ignores signals from its end on.
+    A shell has the programs that it starts in the background ignore Ctrl-C, and a service of ours ignores signals from its end on.  A
+    session of lockstep restricts Zenoh to one thread, also in the programs that later tests would start.
     """
+    os.environ.pop("ZENOH_RUNTIME", None)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
