@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -30,18 +31,19 @@ MIN_RATE = RATES[-1]
 
 @dataclass
 class _Decisions:
-    """The level of the intervals that decide, and whether one was computed."""
+    """The level of the intervals that decide, whether one was computed, and the statistics of bootstrap samples that are known."""
 
     level: float = LEVEL
     used: bool = False
+    samples: dict[tuple[object, ...], Array] = field(default_factory=dict)
 
 
 _decisions: ContextVar[_Decisions] = ContextVar("decisions")
 
 
 @contextmanager
-def _deciding_at(level: float) -> Iterator[_Decisions]:
-    made = _Decisions(level)
+def _deciding_at(level: float, samples: dict[tuple[object, ...], Array]) -> Iterator[_Decisions]:
+    made = _Decisions(level, samples=samples)
     token = _decisions.set(made)
     try:
         yield made
@@ -67,9 +69,10 @@ def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lam
     This rate is a p value of the decision, rounded up to RATES: of several intervals that must all decide, the largest counts.  None if
     `decide` computes no interval.
     """
+    samples: dict[tuple[object, ...], Array] = {}  # intervals of all levels are quantiles of the same samples
 
     def found_at(rate: float) -> tuple[Found, bool]:
-        with _deciding_at(1.0 - rate) as made:
+        with _deciding_at(1.0 - rate, samples) as made:
             return decide(), made.used
 
     first, has_interval = found_at(RATES[0])
@@ -123,10 +126,24 @@ def interval(
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
     if labels.shape != given.shape:
         raise InvalidValue(f"strata of shape {labels.shape}: give one label for each of the {len(given)} values.")
-    found = statistic(given[_drawn(labels, resamples, seed)])
+    return _quantiles(_sampled(given, statistic, labels, seed, resamples, statistic), level)
+
+
+def _quantiles(found: Array, level: float | None) -> tuple[float, float]:
     share = decision_level() if level is None else level
     low, high = np.quantile(found, [(1.0 - share) / 2.0, (1.0 + share) / 2.0])
     return float(low), float(high)
+
+
+def _sampled(values: Array, statistic: Statistic, labels: Array, seed: int, resamples: int, name: object) -> Array:
+    """Return the statistic, known by its `name`, of each bootstrap sample; an `error_rate` computes it once for all levels."""
+    samples = _decisions.get(_Decisions()).samples
+    _, stratum = np.unique(labels, return_inverse=True)
+    strata = stratum.tobytes()
+    key = (name, values.tobytes(), strata, seed, resamples)
+    if key not in samples:
+        samples[key] = statistic(values[_drawn(strata, resamples, seed)])
+    return samples[key]
 
 
 def estimate(values: ArrayLike, digits: int = 2) -> str:
@@ -135,12 +152,14 @@ def estimate(values: ArrayLike, digits: int = 2) -> str:
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
-def _drawn(labels: Array, resamples: int, seed: int) -> Ints:
-    """Draw indices of values within each label, (resamples, n)."""
-    _, stratum, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+@lru_cache(maxsize=8)  # groups of one size follow each other
+def _drawn(strata: bytes, resamples: int, seed: int) -> Ints:
+    """Draw indices of values within each stratum, (resamples, n); `strata` has the number of each value's stratum, (n,) intp."""
+    stratum = np.frombuffer(strata, dtype=np.intp)
+    sizes = np.bincount(stratum)
     order = np.argsort(stratum, kind="stable")
     first = (np.cumsum(sizes) - sizes)[stratum[order]]
-    chosen = np.empty((resamples, len(labels)), dtype=np.intp)
+    chosen = np.empty((resamples, len(stratum)), dtype=np.intp)
     chosen[:, order] = order[first + np.random.default_rng(seed).integers(sizes[stratum[order]], size=chosen.shape)]
     return chosen
 
@@ -152,12 +171,20 @@ def ratio(above: ArrayLike, below: ArrayLike) -> float:
 
 def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval of `ratio`; both groups are resampled.  `level`: as in `interval`."""
-    return _of_both(above, below, lambda first, second: interquartile_means(first) / interquartile_means(second), level)
+    return _of_both(above, below, _ratios, level)
 
 
 def difference_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval of the difference of the interquartile means of two groups; both are resampled."""
-    return _of_both(first, second, lambda one, other: interquartile_means(one) - interquartile_means(other), level)
+    return _of_both(first, second, _differences, level)
+
+
+def _ratios(above: Array, below: Array) -> Array:
+    return interquartile_means(above) / interquartile_means(below)
+
+
+def _differences(first: Array, second: Array) -> Array:
+    return interquartile_means(first) - interquartile_means(second)
 
 
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
@@ -188,7 +215,11 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
     groups = [_checked(first), _checked(second)]
     sizes = [len(group) for group in groups]
     labels = np.repeat([0, 1], sizes)
-    return interval(np.concatenate(groups), lambda drawn: compare(*np.split(drawn, sizes[:1], axis=-1)), labels, level=level)
+
+    def statistic(drawn: Array) -> Array:
+        return compare(*np.split(drawn, sizes[:1], axis=-1))
+
+    return _quantiles(_sampled(np.concatenate(groups), statistic, labels, 0, RESAMPLES, compare), level)
 
 
 def chi_squared(share: float, freedom: int) -> float:

@@ -66,7 +66,8 @@ def ends_of(space: Lattice, seen: Ints, source: int, goal: int) -> dict[int, int
 
 def outcome_counts(space: Lattice, seen: Ints) -> Ints:
     """Return the number of different states in which each action ended, (S, A)."""
-    return tries_of(space, np.unique(seen, axis=0))
+    number = np.ravel_multi_index(seen.T, (*space.goals.shape, len(space)))  # one number a transition: rows are compared much more slowly
+    return tries_of(space, seen[np.unique(number, return_index=True)[1]])
 
 
 def exists_in(space: Lattice) -> NDArray[np.bool_]:
