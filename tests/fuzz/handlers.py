@@ -15,6 +15,7 @@ import os
 import random
 import sys
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -45,7 +46,7 @@ MOST_BLOCKS = 20
 DRAWN, LENGTH = 400, 4  # seeds, and messages in each
 STRANGER = "client_7"  # the name of other processes in keys
 RUN = "r"  # of the messages among the seeds; the harness writes the present run in its place
-WAIT = 2.0  # s for the reply to a call
+WAIT = 30.0  # s for the reply to a call, long because the tests give this process the processor last
 TICK = 10_000_000  # ns
 ROBOT = cache(load_robot)
 _ALONE = {"mode": "peer", "scouting/multicast/enabled": False, "listen/endpoints": [], "timestamping/enabled": {"peer": True}}
@@ -202,9 +203,20 @@ def seeds_of(who: str) -> list[bytes]:
     return found
 
 
-if __name__ == "__main__":
+def main(number: int) -> None:
+    """Feed a number of seeds to each service, and print what it refused."""
     for name in SERVICES:
-        for seed in seeds_of(name)[: int(sys.argv[1])]:
+        for seed in seeds_of(name)[:number]:
             feeder(name)(seed, Path())
         print(name, dict(_system(name).service.bus.rejected), flush=True)
-    os._exit(0)  # an open session would keep the interpreter from exiting
+
+
+if __name__ == "__main__":
+    code = 1
+    try:
+        main(int(sys.argv[1]))
+        code = 0
+    except Exception:
+        traceback.print_exc()
+    sys.stderr.flush()
+    os._exit(code)  # an open session would keep the interpreter from exiting

@@ -12,7 +12,7 @@ from tests.fuzz.handlers import SERVICES
 
 def test_no_handler_fails_on_drawn_messages_and_calls() -> None:
     command = [sys.executable, "-m", "tests.fuzz.handlers", "60"]  # a process of its own: a service takes over the signals
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240)
     assert done.returncode == 0, done.stderr[-3000:]
     refused = {name: ast.literal_eval(counts) for name, counts in (line.split(" ", 1) for line in done.stdout.splitlines())}
     assert refused.keys() == SERVICES.keys()
