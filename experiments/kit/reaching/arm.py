@@ -163,6 +163,8 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         self.errors = Errors(np.zeros(len(plant.robot.motors)), np.zeros(3)) if errors is None else errors
         self._unseen = frozenset(unseen)
         self._target: ReachTarget | None = None
+        self.reached: Array = np.full(3, np.nan)
+        """The true position of the marker at the end of the last reach, (3,) m."""
 
     @property
     def time(self) -> float:
@@ -191,7 +193,7 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """See ReachPlant; the outcome has the true position of the marker and the true remaining error."""
         found = super().reach(part, marker, stay)
-        where = self.marker_at(marker, part, found.q)
+        self.reached = where = self.marker_at(marker, part, found.q)
         return replace(
             found, marker=where, missing=self._true.missing(where), touched=self._seen(found.touched), after=self._reported(found.after)
         )

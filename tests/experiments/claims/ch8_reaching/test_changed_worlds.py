@@ -9,18 +9,20 @@ from experiments.claims.ch8_reaching.changed_worlds import (
     CHANGES,
     CHECKPOINTS,
     CLAIMS,
-    DETECTORS,
+    LEARNERS,
     OURS,
     RADIUS,
     TURN,
     WITHOUT,
     FixedRate,
+    Hand,
     LikelihoodRatio,
     plant_of,
     targets,
 )
 from experiments.kit.experiment import judged
-from experiments.kit.reaching.arm import JudgedPlant
+from experiments.kit.learning.arm import RIGHT
+from experiments.kit.reaching.arm import MARKER, JudgedPlant, reach_space
 
 
 def test_the_balls_are_away_from_targets_and_robot():
@@ -52,11 +54,11 @@ def test_a_fixed_rate_reports_a_change_after_every_hundred_outcomes():
 
 
 def runs(score, failed, false=0):
-    """Five equal runs of each learner: the last score over the oracle's and failures, for those with a detector."""
+    """Five equal runs of each learner: the last score over the oracle's, failures, and false detections of the one that is judged."""
     ours, plain = np.full(len(CHECKPOINTS), score), np.ones(len(CHECKPOINTS))
     found = {}
     for change in CHANGES:
-        for name in DETECTORS:
+        for name in LEARNERS:
             found[change, name] = [
                 {
                     "score": 6.0 * (plain if change == "nothing" and name == WITHOUT else ours),
@@ -74,3 +76,19 @@ def test_claims_are_judged_by_scores_failures_and_the_unchanged_world():
     assert [claim["verdict"] for claim in good] == ["met"] * len(CLAIMS)
     assert [claim["verdict"] for claim in bad] == ["not met"] * len(CLAIMS)
     assert "0 changes detected in 5 runs" in good[-1]["ours"] and "5 changes detected" in bad[-1]["ours"]
+
+
+def test_a_hand_that_is_seen_corrects_joints_that_are_miscalibrated():
+    """The learner's plant finds the offsets, and the result is judged by the true place of the hand."""
+    hand, plant = Hand(0), plant_of("turn", -1, 0)
+    corrected = hand.correct(plant)
+    space = reach_space()
+    for state in (40, 41, 50, 31, 44, 13):
+        corrected.act(space.part, space.target(state))
+    turns = np.rad2deg(plant.errors.turns[[plant.robot.motor_index(name) for name in RIGHT]])
+    assert np.rad2deg(hand.offsets.offsets) == pytest.approx(turns, abs=3.0) and len(hand.offsets.changes) == 1
+    hand.is_seen, before = False, hand.offsets.observations
+    corrected.present(targets()[13])
+    found = corrected.reach(space.part, MARKER)
+    assert hand.offsets.observations == before
+    assert found.missing == pytest.approx(targets()[13].missing(plant.reached)) and (found.marker == plant.reached).all()
