@@ -47,7 +47,7 @@ arm = [f"r_shoulder_{axis}" for axis in ("pitch", "roll", "yaw")] + ["r_elbow"]
 space, plant = mobee.Lattice(robot, joints=arm), mobee.OfflinePlant(model, seed=0)
 beliefs = mobee.TransitionModel(space)
 target = mobee.ReachTarget([-0.3, 0.2, 0.1])
-targets = [target]
+targets, see = [target], lambda: None
 goal, poses = plant.measure("right_arm"), robot.home + np.zeros((3, 1))
 """,
     "docs/vision.md": "",
