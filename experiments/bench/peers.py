@@ -84,10 +84,11 @@ def load_quantecon() -> Any:
 
 
 class DecisionProblem:
-    """A decision problem as SciPy and quantecon take it: one sparse matrix of all state-actions, made before anything is timed.
+    """A decision problem in the form that SciPy and quantecon need: a sparse matrix with a row for each state-action.
 
-    Every state has an action.  Holds the rewards (N,) and next states (N, S) of all N state-actions.  Of quantecon's methods the exact
-    one, policy iteration, is left out: it does not end where two actions are equal but for rounding.
+    It is made before the timing begins.  Every state must have at least one action.  It holds the rewards (N,) and the transition
+    probabilities (N, S) of all N state-actions.  quantecon's policy iteration, which is exact, is not measured: it does not end if the
+    values of two actions differ only by rounding errors.
 
     Args:
         model, reward, discount, tolerance: as of `mobee.value_iteration`.

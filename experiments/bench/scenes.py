@@ -47,9 +47,13 @@ class Scene:
 
 @cache
 def upper_body(role: Literal["field", "solid"] = "field", primitives: int | None = None) -> Robot:
-    """Return the upper body with its first `primitives` shapes (None: all 129) as fields, so that they make forces, or as solids.
+    """Return the benchmark's upper body of 41 motors, which is like the iCub's.
 
-    The base's own shapes are not tested against the world, as neither moves.
+    Pairs of a shape of the base and a world object are not tested, because neither moves.
+
+    Args:
+        role: "field": the shapes cause forces; "solid": they do not.
+        primitives: number of shapes, the first ones; None: all 129.
     """
     data = _file_content()
     joints = tuple(_joint_of(entry) for entry in data["joints"])

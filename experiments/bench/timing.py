@@ -75,7 +75,7 @@ class Contestant:
 def rates(contestants: Mapping[str, Contestant], rounds: int) -> dict[str, Array]:
     """Return units of work per second of processor time for each contestant, (rounds,).
 
-    In each round all contestants run once, one after the other; each round begins with another one.
+    In each round all contestants run once, one after the other.  The order rotates: the next contestant begins the next round.
     """
     names = list(contestants)
     measured: dict[str, list[float]] = {name: [] for name in names}

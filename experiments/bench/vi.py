@@ -147,7 +147,7 @@ def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem
 
 
 def random_problem(seed: int) -> tuple[Tables, float]:
-    """Return a problem and a discount; it has empty bins, rewards of either sign, and states and actions that do not exist."""
+    """Return a random problem and a discount; some outcome bins are empty, some actions do not exist, and some states have none."""
     rng = np.random.default_rng(seed)
     shape = tuple(int(rng.integers(2, high)) for high in (40, 9, 7))
     weights = rng.exponential(size=shape) * (rng.random(shape) < 0.7)

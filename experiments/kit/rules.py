@@ -45,7 +45,13 @@ def of_each(groups: Mapping[Key, Iterable[Run]], number: Callable[[Run], float])
 
 
 def texts(values: Mapping[Any, ArrayLike], digits: int = 2, form: str = "{} {}") -> str:
-    """Return the estimate of each group as text; `form`: of its key and the estimate."""
+    """Return the estimates of all groups as text, separated by commas.
+
+    Args:
+        values: the numbers of each group, by its key.
+        digits: decimals of an estimate.
+        form: format of each entry; the first {} is the key, the second the estimate.
+    """
     return ", ".join(form.format(str(key).replace("_", " "), estimate(group, digits)) for key, group in values.items())
 
 

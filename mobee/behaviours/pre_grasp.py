@@ -78,9 +78,13 @@ class Planner(Protocol):
     """Plans motions to pre-grasps."""
 
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
-        """Return a path (K, n) rad from a posture to the pre-grasp (n,) rad, whose azimuth [rad] is given; None without one.
+        """Return a path (K, n) rad from a posture to a pre-grasp, or None if there is no path.
 
-        The palm must go around or over the places `blocked` (B, 3) m, where the arm has bumped into something.
+        Args:
+            start: posture (n,) rad.
+            goal: posture (n,) rad of the pre-grasp.
+            azimuth: direction that the palm faces in `goal`, rad about the vertical axis.
+            blocked: positions (B, 3) m of the palm at earlier bumps, root frame; the palm must move around or over them.
         """
         ...
 

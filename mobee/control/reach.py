@@ -110,9 +110,14 @@ def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> Ma
 
 
 def bend_bound(jacobian: Array, error: Array) -> float:
-    """Return a bound on the stiffness [m^2] that the curvature of the marker's path adds to a pull by the error.
+    """Return an upper bound on the stiffness [m^2 per rad^2] that the curvature of the marker's path adds to a pull by J^T error.
 
-    For a joint i nearer to the base than a joint j, the path's second derivative is the cross product of i's axis and j's column.
+    For a joint i nearer to the base than a joint j, the second derivative of the marker's position is the cross product of the axis of i
+    and the linear column of j.  So the norms of the error, of all columns and of all axes bound the sum.
+
+    Args:
+        jacobian: (6, n), linear rows first.
+        error: (3,) m, or (6,) m with a rotation times ARM as the last three.
     """
     levers, axes = np.linalg.norm(jacobian[:3]), np.linalg.norm(jacobian[3:])
     return float(np.linalg.norm(error[:3]) * levers * axes + ARM * np.linalg.norm(error[3:]) * axes * axes)

@@ -67,7 +67,7 @@ class EnvPlant(InstantPlant):
 
     @property
     def q(self) -> Array:
-        """The number of the state, and the number that means no action, shape (2,)."""
+        """The number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0."""
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:

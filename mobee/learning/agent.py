@@ -134,7 +134,7 @@ class CuriousAgent(CuriousLearner):
         return transition.reward
 
     def interrupt(self) -> None:
-        """Forget the action just decided, which ended without an outcome; the state is measured again."""
+        """Discard the action just decided, which ended without an outcome; nothing is learned, and the next use of `state` measures it."""
         self._state = self._pending = None
         self._plans.undo()
 

@@ -127,7 +127,7 @@ class Space:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the resulting space, as plain JSON values: `space_from` makes it again."""
+        """The constructor's arguments and a digest of the space, as JSON values, from which `mobee.learning.record.space_from` makes it."""
         return self._made | {"kind": "space", "samples": self.samples.tolist(), "goals": self.goals.tolist()}
 
     @cached_property

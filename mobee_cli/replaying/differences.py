@@ -23,7 +23,10 @@ _LEFT_OUT = ("Clock", "StepDone", "Turn", "Served", "State")  # of them, those t
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference of two messages of the same key and tick; `missing` stands for a message or field that one of them lacks."""
+    """A difference of two messages with the same key and tick.
+
+    `field`: path of the field.  `first`, `second`: its value in each recording, or MISSING where the message or field is absent.
+    """
 
     tick: int
     key: str

@@ -75,7 +75,15 @@ class Action:
         self._set_status("moving", k)
 
     def update(self, k: int, t: float, speeds: Array, accelerations: Array, continues: Callable[[], bool] = lambda: False) -> None:
-        """Test whether the motion has settled; an action whose motion has settled is still "moving" while `continues` is true."""
+        """Test whether the motion has settled, and set the status.
+
+        Args:
+            k: tick.
+            t: its time, s.
+            speeds: commanded speeds of the part's motors, (n_part,) rad/s; of motors that slide, in their fine units.
+            accelerations: likewise, (n_part,) rad/s^2.
+            continues: if it returns True, as for a reach that still comes nearer, a settled motion still counts as "moving".
+        """
         if self._test is not None and self.status == "moving":
             verdict = self._test.update(t, speeds, accelerations)
             self._set_status("moving" if verdict == "settled" and continues() else verdict, k)

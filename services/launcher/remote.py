@@ -24,7 +24,7 @@ SERVICES = "services"  # word in the status of the launcher of another host: the
 
 @dataclass
 class Remote:
-    """A service of another host."""
+    """The state of a service that another host runs, as this launcher sees it by liveliness tokens and `stat` calls."""
 
     who: str
     vital: bool = True

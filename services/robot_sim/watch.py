@@ -37,7 +37,14 @@ class Stops:
     _commanded: dict[str, tuple[int, Array]] = field(default_factory=dict)  # ns and q at the last tick under command, of parts that moved
 
     def note_command(self, part: str, now: int, q: Array, moves: bool) -> None:
-        """Note that the part follows a command at time `now` [ns] and q (n,) rad, an unchanging array; `moves`: it is not at rest."""
+        """Record that the part follows a command.
+
+        Args:
+            part: the part.
+            now: time, ns.
+            q: measured position (n,) rad; the array is kept, so the caller must not change it afterwards.
+            moves: whether the part moves; if it rests, its record is removed.
+        """
         if moves:
             self._commanded[part] = (now, q)
         else:

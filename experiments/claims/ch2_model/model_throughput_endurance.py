@@ -237,7 +237,10 @@ def resident_mb() -> float | None:
 
 
 def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) -> float | None:
-    """Return the slope of a line through the samples after WARM_UP; None for less than MIN_SECONDS of samples."""
+    """Return the slope of a line through the samples, MB/min, or None if they cover less than MIN_SECONDS.
+
+    The first WARM_UP share of the time is left out.  `seconds`: times of the samples since the start.
+    """
     settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > WARM_UP * seconds[-1]]
     if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < MIN_SECONDS:
         return None

@@ -100,8 +100,8 @@ def palm_down() -> Example:
 def raise_glass() -> Example:
     """Raise a glass: the held object stays upright at every position of the hand (thesis fig. 3.3).
 
-    The thumb points up, and the hand may turn about that line as a glass may; the task space is the place of the hand.  For picking and
-    placing objects that must not be tipped over.
+    The thumb points up (root frame).  The hand may turn about the vertical axis, because this does not tilt the glass.  The task space is
+    the position of the hand, (x, y, z) in m.  The map serves to pick and place objects that must stay upright.
     """
     model = at_table()
     carry(model, "glass", mobee.cylinder(0.03, 0.12), RIGHT, 0.045, THUMB)

@@ -146,7 +146,7 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each condition, and the claims about the published graph."""
+    """Return a row for each graph, world and agent, and the claims about the graph "nearest", as published, if it was run."""
     grouped = by_agent(found)
     results: dict[str, Any] = {"runs": {" ".join(key): row(runs) for key, runs in sorted(grouped.items())}}
     published = {key[1:]: runs for key, runs in grouped.items() if key[0] == "nearest"}

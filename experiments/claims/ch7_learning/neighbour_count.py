@@ -120,7 +120,7 @@ def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, 
 
 
 def groups(found: Cells) -> Groups:
-    """Return the runs of each graph, by seed."""
+    """Return the finished runs of each graph, sorted by seed; the graphs are in the order of GRAPHS."""
 
     def of(result: CellResult) -> Run:
         return {**result.values, "budgets": result.cell.settings["budgets"]}

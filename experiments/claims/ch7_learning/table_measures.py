@@ -261,7 +261,7 @@ def of_arms(run: Run, ghost: Run) -> Array:
 
 
 def by_goal(ratios: Array) -> Array:
-    """Return means of (2, S, A) over the actions with the same goal, (2, S)."""
+    """Return the ratios (2 arms, S, A) averaged over all actions with the same goal state: (2, S) by goal, 0 where no action leads."""
     goals = spaces()[ARMS[0]].goals
     count = np.bincount(goals.ravel(), minlength=len(goals))
     return np.array([np.bincount(goals.ravel(), weights=ratio.ravel(), minlength=len(goals)) / np.maximum(count, 1) for ratio in ratios])

@@ -34,7 +34,10 @@ class Original:
 
 
 def find_originals(folders: list[Path]) -> list[Original]:
-    """Return every distinct file below the folders and in the histories of the repositories there, robots first, the oldest first.
+    """Return every distinct robot or world file in the histories of the Git repositories below the folders.
+
+    Where a folder has no repository with such files, those below the folder itself are returned.  Robots come before worlds, and older
+    files before newer ones.
 
     Raises InvalidValue for a folder that does not exist, and if Git is not installed.
     """

@@ -62,7 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Load every file, compare every robot with the program's reading, and write the table; returns the results."""
+    """Load every file, compare each robot with the result of `program_2014`, which follows that program's source, and write the table.
+
+    Files that the records in `folder` contain already are skipped.  Returns the results.
+    """
     originals = [one for one in find_originals(arguments.checkouts) if arguments.only in one.name]
     if not originals:
         raise InvalidValue(f"no file of 2010 to 2014 is below {', '.join(map(str, arguments.checkouts))}, or none matches --only.")

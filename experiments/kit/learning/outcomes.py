@@ -23,7 +23,7 @@ UNCERTAIN = (0.1, 0.9)  # shares of failures between which the outcome of an act
 
 
 def in_order(seen: Ints) -> Ints:
-    """Return the transitions sorted by state, action and outcome: a record from which only counts are computed is much smaller so."""
+    """Return the transitions (T, 3) sorted by state, action and outcome; sorted records are much smaller, and suffice for counts."""
     return seen[np.lexsort(seen.T[::-1])]
 
 

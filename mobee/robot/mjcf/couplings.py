@@ -59,7 +59,7 @@ def held_joints(compiled: Compiled) -> dict[int, float]:
 
 
 def actuated(compiled: Compiled) -> dict[int, list[int]]:
-    """Return the actuators of each joint that has one of its own."""
+    """Return the numbers of the actuators that drive a joint directly, by the number of the joint."""
     found: dict[int, list[int]] = defaultdict(list)
     for actuator, kind in enumerate(compiled.transmissions):
         if kind in ("joint", "jointinparent"):

@@ -67,7 +67,7 @@ class Scale:
 
     @classmethod
     def of(cls, rows: Array) -> Scale:
-        """Return those of rows (N, d); a constant column has a deviation of 1."""
+        """Return the mean and the standard deviation of each column of `rows` (N, d); the deviation of a constant column is set to 1."""
         deviation = rows.std(axis=0)
         return cls(rows.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 

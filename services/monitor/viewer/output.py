@@ -45,7 +45,7 @@ class NoControls:
 
 
 class LaterControls:
-    """Passes calls on to controls that are made later."""
+    """Forwards the commands of the page to `real`, which the monitor sets when it is on the bus; until then all are refused."""
 
     def __init__(self) -> None:
         self.real: Controls = NoControls()
