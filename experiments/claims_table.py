@@ -70,8 +70,8 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 ## Terms
 
 **state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
-once and to succeed once; **60-40**: to succeed twice. **constrained**, **free**: the left arm with its cable constraints and
-self-contacts, and without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first
+once and to succeed once; **60-40**: to fail once and to succeed twice. **constrained**, **free**: the left arm with its cable constraints
+and self-contacts, and without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first
 is better than a run of the other, with ties counted half.
 
 Where states have 16 neighbours, many samples have the same distance, and it is drawn at random which become neighbours. In

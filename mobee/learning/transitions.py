@@ -144,7 +144,7 @@ class TransitionModel(Tabled):
 
     Args:
         space: the states and actions.
-        initial: "50-50" (each action is imagined to fail once and succeed once) or "60-40" (to succeed twice).
+        initial: "50-50" (each action is imagined to fail once and to succeed once) or "60-40" (to fail once and to succeed twice).
         divergence: the reward of an observation: "kail" (Algorithm 6: KL divergence over the bins of the state-action), "kl" (thesis
             6.4.2: over all states, each imagined once), a function of the distributions over the bins after and before the
             observation, or `module:name` of one, see `Divergence`.  The probabilities are the same with all.
