@@ -46,7 +46,7 @@ class Vision:
         self._session = open_client(watcher.endpoint)
         self._bus = Bus(self._session, "vision", logging.getLogger("vision"))
         self._places = self._bus.publisher(WorldObject, "cup")
-        self._ends = threading.Event()
+        self._ends, self._lock = threading.Event(), threading.Lock()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -65,10 +65,16 @@ class Vision:
             covariance=[0.0] * 9, role="target", t_capture=clock.t, valid_until=clock.t + valid if valid else 0,
         )  # fmt: skip
 
+    def fail(self) -> None:
+        """See nothing from now on: no place that was on its way is published after this call."""
+        with self._lock:
+            self.sees = False
+
     def _run(self) -> None:
         while not self._ends.wait(0.1):
-            if self.sees:
-                self.put(VALID)
+            with self._lock:
+                if self.sees:
+                    self.put(VALID)
 
 
 @contextmanager
@@ -86,7 +92,7 @@ def test_the_hand_stops_when_the_cameras_fail_and_continues_when_they_see_the_cu
     with running(tmp_path, str(scenario)) as (_, watcher), vision_of(watcher) as vision:
         for valid, reason in ((None, "no picture of cup for 1 s"), (0, "cup is stale")):
             until(lambda: watcher.speed("right_arm") > 0.1, 60.0, "the hand moves")
-            vision.sees = False
+            vision.fail()
             last = watcher.k
             if valid is not None:  # as vision does when pictures are dark, frozen or late
                 vision.put(valid)
