@@ -15,9 +15,9 @@ The oracle of the new world plans as the learners do, but with the rewards of on
 transitions that failed in two tries without a target; failures due to targets it has learned in three tries of each.  As its rewards are
 single samples, a learner can exceed it.  Its encoders are as wrong as the learners'.  The learners have no detector; a fixed rate, by
 which a change is assumed after every 100 outcomes; a generalised likelihood ratio of two windows; or the posterior over run lengths.  A
-fifth one has that detector, too, and sees where its hand is after each action, with an error of 5 mm along each axis (standard deviation),
-by which its plant corrects the encoders (`mobee.vision.calibration.self_calibration`); not during evaluations, which measure what was known
-before.  All are judged by the true place of the hand.
+fifth one has that detector, too, and sees where its hand is after each action.  What it sees has an error of 5 mm along each axis (standard
+deviation).  Its plant corrects the encoders by it (`mobee.vision.calibration.self_calibration`).  During evaluations the hand is not seen,
+because they measure what was known before.  All are judged by the true place of the hand.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ OURS, WITHOUT = "run length, sees its hand", "no detector"
 
 
 class Hand:
-    """What is known of the encoders by seeing the hand, in all worlds of a run.
+    """The offsets of the encoders that were found by seeing the hand; they are kept when the world changes.
 
     `is_seen`: whether the hand is seen at present.
     """
@@ -423,7 +423,7 @@ def plot(found: Cells) -> Any:
 
 
 EXPERIMENT = Experiment(
-    claim="a reach learner that detects changes and sees its hand is soon as good as before, and loses nothing where nothing changes",
+    claim="a reach learner that detects changes and sees its hand soon has an oracle's score, and loses nothing where nothing changes",
     source="aim of this reproduction, to thesis 7.2.6",
     method=Sweep(conditions, trial, findings, plot, seeds=SEEDS),
     claims=CLAIMS,

@@ -17,8 +17,9 @@ from mobee.plant import Described, Outcome
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 
 NOISE = 0.005  # m: standard deviation of a seen place along each axis
-KNOWN, UNKNOWN = np.deg2rad(0.3), np.deg2rad(10.0)  # rad: standard deviations of an offset as a rule, and after a change
-SURPRISE = 21.1  # squared distance of a seen place, in standard deviations, which chance exceeds once in 10 000 (chi-squared, 3 degrees)
+KNOWN, UNKNOWN = np.deg2rad(0.3), np.deg2rad(10.0)  # rad: standard deviations of an offset at the start; added when a change is detected
+SURPRISE = 21.1  # squared distance of a seen place, in standard deviations; a correct one exceeds it once in 10 000 (chi-squared)
+LARGEST = 3.0 * UNKNOWN  # rad: changes of an offset beyond this are taken for wrong measurements
 ITERATIONS = 5  # of the linearisation in each observation
 STIFFNESS = 0.02  # m/rad: weight of the joints' motion where the end of a reach is predicted
 STEPS = 20  # of that prediction
@@ -27,19 +28,20 @@ STEPS = 20  # of that prediction
 class JointOffsets:
     """Estimates by how much encoders of a robot are wrong, from places where a marker is seen: true minus measured angle of each motor.
 
-    An extended Kalman filter whose state is constant.  Two seen places in a row that are improbable under the estimate mean that the
-    offsets have changed: the filter becomes uncertain, and both places count.  A single one is taken for an error of the eyes, and
-    ignored.  So there is no rate of forgetting, and an estimate without a change becomes more certain with every place.
+    An extended Kalman filter whose state is constant.  If two seen places in a row are improbable under the estimate, and changed offsets
+    explain both, the offsets have changed: the filter becomes uncertain, and both places count.  Other improbable places are taken for
+    wrong measurements, and ignored.  Old places keep their weight until a change is detected.  A change that displaces the marker by less
+    than about five times `noise` may not be detected; the estimate then follows slowly, and its covariance is too small.
 
     Args:
         model: the robot; its world does not matter.
         marker: what is seen.
-        motors: names of the motors with unknown offsets.  Only offsets that move the marker can be found; others stay as they are.
+        motors: names of the motors with unknown offsets, each of which must move the marker.  Offsets of all others are taken as 0.
         noise: m, standard deviation of a seen place along each axis.
 
     Raises:
         UnknownName: no such marker or motor.
-        InvalidValue: no motor, a motor that does not move the marker, or a noise that is not positive.
+        InvalidValue: no motor, a motor that does not move the marker or is named twice, or a noise that is not positive.
     """
 
     def __init__(self, model: Model, marker: str, motors: Sequence[str], noise: float = NOISE) -> None:
@@ -49,6 +51,8 @@ class JointOffsets:
         self.model, self.marker, self.motors = model, marker, tuple(motors)
         self._where = [robot.motor_index(name) for name in motors]
         movers = [robot.motors[index] for index in np.flatnonzero(model.jacobian(robot.home, marker).any(axis=0))]
+        if len(set(motors)) != len(motors):
+            raise InvalidValue(f"motors {list(motors)}: name each motor once")
         if not motors or not set(motors) <= set(movers):
             raise InvalidValue(f"motors {list(motors)}: name one or more of those that move {marker!r}: {', '.join(movers)}")
         if not 0.0 < noise < np.inf:
@@ -79,25 +83,32 @@ class JointOffsets:
             seen: place (3,) m, root frame.
 
         Raises:
-            InvalidValue: a place that is not three finite numbers.
+            InvalidValue: encoder values or a place that are not finite numbers of these shapes.
         """
-        measured, place = np.array(q, dtype=np.float64), real_array("seen", seen)
-        if place.shape != (3,) or not np.isfinite(place).all():
-            raise InvalidValue(f"seen {place.tolist()}: must be three finite numbers, in m in the root frame")
+        measured, place = _finite("q", q, len(self.model.robot.motors)), _finite("seen", seen, 3)
         self.observations += 1
         if self._distance(measured, place) <= SURPRISE:
             self._surprise = None
             self._update(measured, place)
             return False
-        if self._surprise is None:
-            self._surprise = (measured, place)
+        before, self._surprise = self._surprise, (measured, place)
+        if before is None or not self._is_change(before, (measured, place)):
             return False
-        self.covariance = self.covariance + UNKNOWN**2 * np.eye(len(self.offsets))
-        self._update(*self._surprise)
-        self._update(measured, place)
         self._surprise = None
         self.changes.append(self.observations)
         return True
+
+    def _is_change(self, first: tuple[Array, Array], second: tuple[Array, Array]) -> bool:
+        """Count two improbable observations if changed offsets explain both; else leave the estimate as it was."""
+        offsets, covariance = self.offsets, self.covariance
+        self.covariance = covariance + UNKNOWN**2 * np.eye(len(offsets))
+        self._update(*first)
+        if self._distance(*second) <= SURPRISE:
+            self._update(*second)
+            if max(self._distance(*first), self._distance(*second)) <= SURPRISE and np.abs(self.offsets - offsets).max() <= LARGEST:
+                return True
+        self.offsets, self.covariance = offsets, covariance
+        return False
 
     def _predicted(self, q: Array, offsets: Array) -> tuple[Array, Array]:
         """Return the place (3,) m of the marker with these offsets, and its derivatives (3, d) by them."""
@@ -113,7 +124,7 @@ class JointOffsets:
         return float((seen - place) @ np.linalg.solve(spread, seen - place))
 
     def _update(self, q: Array, seen: Array) -> None:
-        """Count an observation, linearised at the estimate that includes it (iterated extended Kalman filter)."""
+        """Count an observation, linearised repeatedly, each time at the newest estimate (iterated extended Kalman filter)."""
         before, estimate = self.offsets, self.offsets
         for _ in range(ITERATIONS):
             place, jacobian = self._predicted(q, estimate)
@@ -124,16 +135,17 @@ class JointOffsets:
 
 
 class SelfCalibratingPlant:
-    """A ReachPlant whose encoders are corrected by where its hand is seen, so that an agent finds its states where they were.
+    """A ReachPlant whose encoders are corrected by where its hand is seen.
 
-    After each action that leaves the robot at rest, the marker is looked for once.  Encoder values of outcomes are corrected, and
-    targets of actions are given in corrected values.  For a reach, the target is presented to the plant where the plant's uncorrected
-    kinematics must pull the marker; the outcome's marker and remaining error follow from the corrected ones.
+    A state of an agent is then the same true posture as before the encoders became wrong.  After each action that leaves the robot at
+    rest, the marker is looked for once, also while an agent is evaluated.  Targets and results of actions are in corrected values.  For a
+    reach, the target is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted place.  Forces of
+    contacts and limits follow from uncorrected values.
 
     Args:
         plant: whose encoders may be wrong, offline or live.
-        offsets: what is known of them.
-        see: returns where the marker is seen at present, (3,) m in the root frame, or None if it is not seen.
+        offsets: the estimated offsets of its encoders.
+        see: returns where the marker is seen at present, (3,) m in the root frame; None or NaN if it is not seen.
 
     Raises:
         InvalidValue: `offsets` of another robot.
@@ -160,41 +172,49 @@ class SelfCalibratingPlant:
         return self.plant.measure(part) + self._of(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; the target, as all values, is corrected; where it is beyond an uncorrected limit, the motor stops there."""
-        low, high = self.robot.limits[self.robot.part(part).slice].T
-        outcome = self.plant.act(part, np.clip(target - self._of(part), low, high))
+        """See Plant; `target` is in corrected values.  A motor whose uncorrected target is beyond its limits moves to the limit.
+
+        Raises InvalidValue as the plant does, also for a corrected target beyond the limits.
+        """
+        offsets = self._of(part)
+        if offsets.any():
+            low, high = self.robot.limits[self.robot.part(part).slice].T
+            wanted = _finite("target", target, len(low))
+            if (wanted < low).any() or (wanted > high).any():
+                raise InvalidValue(f"target of {part}: beyond the limits of its motors; give values within robot.limits")
+            target = np.clip(wanted - offsets, low, high)
+        outcome = self.plant.act(part, target)
         self._look(outcome.settled)
         return self._corrected(part, outcome)
 
     def present(self, target: ReachTarget | None) -> None:
         """See ReachPlant."""
-        self._target = target
         self.plant.present(target)
+        self._target = target
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant."""
+        """See ReachPlant; for a target with a direction of the marker's normal, raises InvalidValue while offsets are not 0."""
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")
-        target, offsets = self._target, self.offsets.all_offsets
-        if offsets.any():
-            end = self._end_of_reach(part, marker, target.position)
-            aim = target.position + self._place(marker, end - offsets) - self._place(marker, end)
-            self.plant.present(replace(target, position=aim))
-        try:
+        offsets = self.offsets.all_offsets
+        if not offsets.any():
             found = self.plant.reach(part, marker, stay)
-        finally:
-            self.plant.present(target)
-        posture = self.plant.q + offsets
-        posture[self.robot.part(part).slice] = found.q + offsets[self.robot.part(part).slice]
-        place = self._place(marker, posture)
+        else:
+            if self._target.faces or self._target.normal is not None:
+                raise InvalidValue("the target has a direction of the marker's normal, which is not corrected: give a target without")
+            self.plant.present(replace(self._target, position=self._aim(part, marker, self._target, offsets)))
+            try:
+                found = self.plant.reach(part, marker, stay)
+            finally:
+                self.plant.present(self._target)
         self._look(found.after.settled)
-        return replace(
-            found,
-            marker=place,
-            q=posture[self.robot.part(part).slice],
-            missing=target.missing(place),
-            after=self._corrected(part, found.after),
-        )
+        if not self.offsets.all_offsets.any():
+            return found
+        where = self.robot.part(part).slice
+        posture = self.q
+        posture[where] = found.q + self._of(part)
+        place = self._place(marker, posture)
+        return replace(found, marker=place, q=posture[where], missing=self._target.missing(place), after=self._corrected(part, found.after))
 
     def _of(self, part: str) -> Array:
         return self.offsets.all_offsets[self.robot.part(part).slice]
@@ -203,18 +223,36 @@ class SelfCalibratingPlant:
         return replace(outcome, q=outcome.q + self._of(part))
 
     def _look(self, rests: bool) -> None:
-        if rests and (seen := self._see()) is not None:
+        if rests and (seen := self._see()) is not None and np.isfinite(seen).all():
             self.offsets.observe(self.plant.q, seen)
 
     def _place(self, marker: str, posture: Array) -> Array:
         return self.offsets.model.evaluate(posture).position(marker)
 
-    def _end_of_reach(self, part: str, marker: str, target: Array) -> Array:
+    def _aim(self, part: str, marker: str, target: ReachTarget, offsets: Array) -> Array:
+        """Return the position (3,) m to which the plant, with uncorrected values, must reach."""
+        end = self._end_of_reach(part, marker, target)
+        aim: Array = target.position + self._place(marker, end - offsets) - self._place(marker, end)
+        return aim
+
+    def _end_of_reach(self, part: str, marker: str, target: ReachTarget) -> Array:
         """Return the corrected posture (n,) rad in which a reach from the present one will about end: damped least squares."""
         begin, where, model = self.q, self.robot.part(part).slice, self.offsets.model
-        posture, damping = begin.copy(), STIFFNESS**2
+        posture, damping, (low, high) = begin.copy(), STIFFNESS**2, self.robot.limits[where].T
         for _ in range(STEPS):
+            away = target.position - self._place(marker, posture)
+            if target.aim == "surface":
+                away *= target.missing(target.position - away) / max(float(np.linalg.norm(away)), 1e-9)
             jacobian = model.jacobian(posture, marker)[:3, where]
-            pull = jacobian.T @ (target - self._place(marker, posture)) + damping * (begin - posture)[where]
-            posture[where] += np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(pull)), pull)
+            pull = jacobian.T @ away + damping * (begin - posture)[where]
+            step = np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(pull)), pull)
+            posture[where] = np.clip(posture[where] + step, low, high)
         return posture
+
+
+def _finite(what: str, given: ArrayLike, length: int) -> Array:
+    """Return a copy of finite numbers (length,); raises InvalidValue for anything else."""
+    value = real_array(what, given)
+    if value.shape != (length,) or not np.isfinite(value).all():
+        raise InvalidValue(f"{what} of shape {value.shape}: must be {length} finite numbers")
+    return value

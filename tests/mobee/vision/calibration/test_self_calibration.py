@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from scipy.stats import chi2
 from mobee import InvalidValue, Lattice, Model, OfflinePlant, ReachTarget, UnknownName
 from mobee.arrays import Array
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.reach import ReachOutcome
+from mobee.plant import Outcome
+from mobee.reach import Aim, ReachOutcome
 from mobee.robot.load import load_robot
 from mobee.vision.calibration.self_calibration import KNOWN, NOISE, JointOffsets, SelfCalibratingPlant
 
@@ -88,12 +90,36 @@ def test_a_single_wrong_place_is_ignored() -> None:
     assert filtered.all_offsets[WHERE].tolist() == filtered.offsets.tolist() and np.count_nonzero(filtered.all_offsets) == 4
 
 
+@pytest.mark.parametrize("error", [0.05, 0.1, 0.3])
+def test_two_wrong_places_in_a_row_are_ignored_unless_offsets_explain_both(error: float) -> None:
+    for seed in range(20):
+        rng, filtered = np.random.default_rng(seed), JointOffsets(MODEL, MARKER, ARM)
+        observe(filtered, np.zeros(4), rng, 30)
+        for q in postures(rng, 2):
+            filtered.observe(q, MODEL.evaluate(q).position(MARKER) + rng.normal(0.0, error, 3))
+        assert np.abs(filtered.offsets).max() < np.deg2rad(30.0) and np.isfinite(filtered.covariance).all()
+        observe(filtered, np.zeros(4), rng, 30)
+        assert np.abs(filtered.offsets).max() < np.deg2rad(3.0)
+
+
+def test_only_improbable_places_in_a_row_are_a_change() -> None:
+    rng, filtered = np.random.default_rng(4), JointOffsets(MODEL, MARKER, ARM)
+    observe(filtered, np.zeros(4), rng, 10)
+    for _ in range(3):
+        observe(filtered, OFFSETS, rng, 1)
+        observe(filtered, np.zeros(4), rng, 1)
+    assert filtered.changes == []
+    observe(filtered, OFFSETS, rng, 2)
+    assert filtered.changes == [18]
+
+
 @pytest.mark.parametrize(
     ("motors", "noise", "error", "words"),
     [
         (["r_knee"], NOISE, UnknownName, "r_knee"),
         (["l_elbow"], NOISE, InvalidValue, "those that move 'right_palm'"),
         ([], NOISE, InvalidValue, "name one or more"),
+        (["r_elbow", "r_elbow"], NOISE, InvalidValue, "each motor once"),
         (ARM, 0.0, InvalidValue, "above 0"),
         (ARM, float("nan"), InvalidValue, "above 0"),
     ],
@@ -104,9 +130,9 @@ def test_wrong_arguments_are_refused(motors: Sequence[str], noise: float, error:
 
 
 @pytest.mark.parametrize("seen", [[0.0, 0.0], [0.0, 0.0, np.nan]])
-def test_a_place_that_is_none_is_refused(seen: list[float]) -> None:
+def test_a_place_without_three_finite_numbers_is_refused(seen: list[float]) -> None:
     filtered = JointOffsets(MODEL, MARKER, ARM)
-    with pytest.raises(InvalidValue, match="three finite numbers"):
+    with pytest.raises(InvalidValue, match="must be 3 finite numbers"):
         filtered.observe(ROBOT.home, seen)
     assert filtered.observations == 0
 
@@ -154,6 +180,89 @@ def test_actions_and_reaches_of_a_corrected_plant_end_where_they_should() -> Non
     right, believed = remaining()
     assert wrong > 0.02 > 0.008 > right
     assert believed == pytest.approx(right, abs=0.005)
+
+
+def known_offsets() -> JointOffsets:
+    """Right offsets, without any observation."""
+    offsets = JointOffsets(MODEL, MARKER, ARM)
+    offsets.offsets = OFFSETS.copy()
+    return offsets
+
+
+class Wrong(OfflinePlant):
+    """A plant that notes where the hand truly is at the end of a reach, and whose motions may time out."""
+
+    settles = True
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        found = super().reach(part, marker, stay)
+        self.end = true_place(self, found.q)
+        return found
+
+    def act(self, part: str, target: Array) -> Outcome:
+        return replace(super().act(part, target), settled=self.settles)
+
+
+@pytest.mark.parametrize("aim", ["surface", "centre"])
+def test_a_corrected_reach_ends_where_that_of_a_robot_with_right_encoders_ends(aim: Aim) -> None:
+    right, wrong = OfflinePlant(Model(ROBOT), 0, active=ARM), Wrong(Model(ROBOT), 0, active=ARM)
+    corrected = SelfCalibratingPlant(wrong, known_offsets(), lambda: None)
+    apart = []
+    for q in postures(np.random.default_rng(5), 8):
+        target = ReachTarget(np.array([-0.3, 0.2, 0.1]), aim=aim)
+        for plant in (right, corrected):
+            plant.present(None)
+            plant.act(PART, q[SLICE])
+            plant.present(target)
+        reached = right.reach(PART, MARKER)
+        found = corrected.reach(PART, MARKER)
+        apart.append(np.linalg.norm(wrong.end - reached.marker))
+        assert found.missing == pytest.approx(target.missing(wrong.end), abs=1e-6)
+    print(np.round(1e3 * np.array(apart), 1), "mm")
+    assert np.median(apart) < 0.01
+
+
+def test_the_outcome_of_a_reach_that_stays_is_of_one_posture_also_when_offsets_are_found() -> None:
+    rng, wrong = np.random.default_rng(6), Wrong(Model(ROBOT), 0, active=ARM)
+    corrected = SelfCalibratingPlant(wrong, JointOffsets(MODEL, MARKER, ARM, noise=0.001), lambda: true_place(wrong))
+    target = ReachTarget(np.array([-0.3, 0.2, 0.1]))
+    for number, q in enumerate(postures(rng, 3)):
+        corrected.act(PART, q[SLICE])
+        corrected.present(target)
+        found = corrected.reach(PART, MARKER, stay=True)
+        corrected.present(None)
+        assert found.q == pytest.approx(found.after.q, abs=1e-9), number
+        assert found.missing == pytest.approx(target.missing(found.marker))
+    assert len(corrected.offsets.changes) == 1
+
+
+def test_after_a_reach_the_plant_has_the_target_that_was_presented_and_nothing_is_seen_of_a_moving_robot() -> None:
+    wrong = Wrong(Model(ROBOT), 0, active=ARM)
+    corrected = SelfCalibratingPlant(wrong, known_offsets(), lambda: np.full(3, np.nan))
+    corrected.present(target := ReachTarget(np.array([-0.3, 0.2, 0.1])))
+    corrected.reach(PART, MARKER)
+    assert (wrong.model.world.objects["reach_target"].position == target.position).all()
+    corrected.act(PART, ROBOT.home[SLICE])
+    assert corrected.offsets.observations == 0  # a place of NaN is not seen
+    watched = SelfCalibratingPlant(wrong, JointOffsets(MODEL, MARKER, ARM), lambda: true_place(wrong))
+    wrong.settles = False
+    watched.act(PART, ROBOT.home[SLICE])
+    assert watched.offsets.observations == 0
+    wrong.settles = True
+    watched.act(PART, ROBOT.home[SLICE])
+    assert watched.offsets.observations == 1
+
+
+@pytest.mark.parametrize("offsets", [known_offsets, lambda: JointOffsets(MODEL, MARKER, ARM)])
+def test_targets_that_a_plant_refuses_are_refused(offsets: Callable[[], JointOffsets]) -> None:
+    corrected = SelfCalibratingPlant(OfflinePlant(Model(ROBOT), 0, active=ARM), offsets(), lambda: None)
+    for target in (np.array(0.3), np.array([0.3]), np.full(16, 10.0), np.full(16, np.nan)):
+        with pytest.raises(InvalidValue):
+            corrected.act(PART, target)
+    corrected.present(ReachTarget(np.array([-0.3, 0.2, 0.1]), faces=True))
+    if corrected.offsets.offsets.any():
+        with pytest.raises(InvalidValue, match="is not corrected"):
+            corrected.reach(PART, MARKER)
 
 
 def test_targets_beyond_an_uncorrected_limit_are_cut_off() -> None:
