@@ -136,7 +136,7 @@ def _quantiles(found: Array, level: float | None) -> tuple[float, float]:
 
 
 def _sampled(values: Array, statistic: Statistic, labels: Array, seed: int, resamples: int, name: object) -> Array:
-    """Return the statistic, known by its `name`, of each bootstrap sample; an `error_rate` computes it once for all levels."""
+    """Return the statistic of each bootstrap sample; an `error_rate` computes it once for all levels, and identifies it by `name`."""
     samples = _decisions.get(_Decisions()).samples
     _, stratum = np.unique(labels, return_inverse=True)
     strata = stratum.tobytes()
@@ -161,6 +161,7 @@ def _drawn(strata: bytes, resamples: int, seed: int) -> Ints:
     first = (np.cumsum(sizes) - sizes)[stratum[order]]
     chosen = np.empty((resamples, len(stratum)), dtype=np.intp)
     chosen[:, order] = order[first + np.random.default_rng(seed).integers(sizes[stratum[order]], size=chosen.shape)]
+    chosen.flags.writeable = False
     return chosen
 
 

@@ -46,7 +46,7 @@ MOST_BLOCKS = 20
 DRAWN, LENGTH = 400, 4  # seeds, and messages in each
 STRANGER = "client_7"  # the name of other processes in keys
 RUN = "r"  # of the messages among the seeds; the harness writes the present run in its place
-WAIT = 30.0  # s for the reply to a call, long because the tests give this process the processor last
+WAIT = 30.0  # s for the reply to a call, long because the tests run this process with the lowest priority
 TICK = 10_000_000  # ns
 ROBOT = cache(load_robot)
 _ALONE = {"mode": "peer", "scouting/multicast/enabled": False, "listen/endpoints": [], "timestamping/enabled": {"peer": True}}
@@ -128,7 +128,7 @@ class System:
             self._put(entry.key, payload, entry.cls)
             self.settle()
             return
-        replies = self._session.get(entry.key, payload=payload, encoding=encoding_of(entry.cls), attachment=entry.key, timeout=WAIT)
+        replies = self._session.get(entry.key, payload=payload, encoding=encoding_of(entry.cls), attachment=entry.key, timeout=2.0 * WAIT)
         answered, give_up = False, time.monotonic() + WAIT
         while not answered and time.monotonic() < give_up:
             self.settle()
@@ -218,5 +218,6 @@ if __name__ == "__main__":
         code = 0
     except Exception:
         traceback.print_exc()
-    sys.stderr.flush()
-    os._exit(code)  # an open session would keep the interpreter from exiting
+    finally:
+        sys.stderr.flush()
+        os._exit(code)  # an open session would keep the interpreter from exiting
