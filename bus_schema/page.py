@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import ModuleType
+from typing import Literal, get_args, get_origin
 
 from msgspec import Struct
 
@@ -31,7 +32,14 @@ def main() -> None:
 
 def with_tables(page: str) -> str:
     """Return the page with a new table between each pair of markers `begin NAME`, `end NAME`; raises KeyError for an unknown name."""
-    tables = {"deliveries": _deliveries, "streams": _streams, "calls": _calls, "messages": _messages, "requests": _requests}
+    tables = {
+        "deliveries": _deliveries,
+        "streams": _streams,
+        "calls": _calls,
+        "literals": _literals,
+        "messages": _messages,
+        "requests": _requests,
+    }
     return _MARKED.sub(lambda match: f"{match[1]}{tables[match[2]]()}{match[3]}", page)
 
 
@@ -54,7 +62,7 @@ def _streams() -> str:
     rows = ((f"`{cls.stream.pattern}`", f"[`{cls.__name__}`](#{_anchor(cls)})", cls.stream) for cls in streams())
     return _table(
         ("key", "message", "who may write it", "when", "who reads it", "delivery"),
-        ((key, name, _listed(s.writers), s.when, _listed(s.readers), s.delivery) for key, name, s in rows),
+        ((key, name, _listed(s.writers), s.when or "-", _listed(s.readers) or "-", s.delivery) for key, name, s in rows),
     )
 
 
@@ -70,6 +78,24 @@ def _calls() -> str:
 
 def _listed(parties: Sequence[Party]) -> str:
     return "all" if parties == EVERYONE else ", ".join("agents" if party == "agent" else party for party in parties)
+
+
+def _literals() -> str:
+    """Return a table of the aliases whose values are fixed words, and the fields that have them."""
+    rows = []
+    for name, alias in vars(messages).items():
+        if get_origin(alias) is Literal:
+            values = ", ".join(f"`{value}`" for value in get_args(alias))
+            fields = [f"`{cls.__name__}.{field}`" for cls, field, kind in _annotations() if kind == name]
+            if fields:
+                rows.append((f"`{name}`", values, ", ".join(fields)))
+    return _table(("type", "values", "fields"), rows)
+
+
+def _annotations() -> list[tuple[type[Struct], str, str]]:
+    """Return the structs with the fields that each declares itself, and the type of each field as in the source."""
+    every = (*structs(messages), *structs(rpc))
+    return [(cls, field, str(kind)) for cls in every for field, kind in vars(cls).get("__annotations__", {}).items()]
 
 
 def _messages() -> str:
