@@ -61,7 +61,7 @@ ELSEWHERE = {
     "docs/learning.md": "test_documentation.py",
     "docs/plant.md": "test_documentation.py",
     "docs/robots.md": "test_documentation.py",
-    "docs/bus.md": "not run: two lines of a service, whose own names stand for any",
+    "docs/bus.md": "not run: part of a service, whose own names stand for any",
 }
 
 RUN_HERE = (

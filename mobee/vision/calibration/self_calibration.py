@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, real_array
-from mobee.errors import InvalidValue, UnknownName
+from mobee.arrays import Array
+from mobee.control.forces import checked
+from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.plant import Described, Outcome
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
@@ -19,7 +20,7 @@ from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 NOISE = 0.005  # m: standard deviation of a seen place along each axis
 KNOWN, UNKNOWN = np.deg2rad(0.3), np.deg2rad(10.0)  # rad: standard deviations of an offset at the start; added when a change is detected
 SURPRISE = 21.1  # squared distance of a seen place, in standard deviations; a correct one exceeds it once in 10 000 (chi-squared)
-LARGEST = 3.0 * UNKNOWN  # rad: changes of an offset beyond this are taken for wrong measurements
+LARGEST_CHANGE = 3.0 * UNKNOWN  # rad: changes of an offset beyond this are taken for wrong measurements
 ITERATIONS = 5  # of the linearisation in each observation
 STIFFNESS = 0.02  # m/rad: weight of the joints' motion where the end of a reach is predicted
 STEPS = 20  # of that prediction
@@ -75,7 +76,7 @@ class JointOffsets:
         found[self._where] = self.offsets
         return found
 
-    def observe(self, q: ArrayLike, seen: ArrayLike) -> bool:
+    def observe(self, q: Array, seen: Array) -> bool:
         """Learn from where the marker is seen; return whether a change of the offsets was detected.
 
         Args:
@@ -85,7 +86,7 @@ class JointOffsets:
         Raises:
             InvalidValue: encoder values or a place that are not finite numbers of these shapes.
         """
-        measured, place = _finite("q", q, len(self.model.robot.motors)), _finite("seen", seen, 3)
+        measured, place = checked("q", q, len(self.model.robot.motors)), checked("seen", seen, 3)
         self.observations += 1
         if self._distance(measured, place) <= SURPRISE:
             self._surprise = None
@@ -105,12 +106,12 @@ class JointOffsets:
         self._update(*first)
         if self._distance(*second) <= SURPRISE:
             self._update(*second)
-            if max(self._distance(*first), self._distance(*second)) <= SURPRISE and np.abs(self.offsets - offsets).max() <= LARGEST:
+            if max(self._distance(*first), self._distance(*second)) <= SURPRISE and np.abs(self.offsets - offsets).max() <= LARGEST_CHANGE:
                 return True
         self.offsets, self.covariance = offsets, covariance
         return False
 
-    def _predicted(self, q: Array, offsets: Array) -> tuple[Array, Array]:
+    def _predicted_place(self, q: Array, offsets: Array) -> tuple[Array, Array]:
         """Return the place (3,) m of the marker with these offsets, and its derivatives (3, d) by them."""
         posture = q.copy()
         posture[self._where] += offsets
@@ -119,7 +120,7 @@ class JointOffsets:
 
     def _distance(self, q: Array, seen: Array) -> float:
         """Return the squared distance of a seen place from the predicted one, in standard deviations of both."""
-        place, jacobian = self._predicted(q, self.offsets)
+        place, jacobian = self._predicted_place(q, self.offsets)
         spread = jacobian @ self.covariance @ jacobian.T + self._noise
         return float((seen - place) @ np.linalg.solve(spread, seen - place))
 
@@ -127,7 +128,7 @@ class JointOffsets:
         """Count an observation, linearised repeatedly, each time at the newest estimate (iterated extended Kalman filter)."""
         before, estimate = self.offsets, self.offsets
         for _ in range(ITERATIONS):
-            place, jacobian = self._predicted(q, estimate)
+            place, jacobian = self._predicted_place(q, estimate)
             gain = np.linalg.solve(jacobian @ self.covariance @ jacobian.T + self._noise, jacobian @ self.covariance).T
             estimate = before + gain @ (seen - place - jacobian @ (before - estimate))
         rest = np.eye(len(before)) - gain @ jacobian
@@ -179,7 +180,7 @@ class SelfCalibratingPlant:
         offsets = self._of(part)
         if offsets.any():
             low, high = self.robot.limits[self.robot.part(part).slice].T
-            wanted = _finite("target", target, len(low))
+            wanted = checked("target", target, len(low))
             if (wanted < low).any() or (wanted > high).any():
                 raise InvalidValue(f"target of {part}: beyond the limits of its motors; give values within robot.limits")
             target = np.clip(wanted - offsets, low, high)
@@ -206,7 +207,8 @@ class SelfCalibratingPlant:
             try:
                 found = self.plant.reach(part, marker, stay)
             finally:
-                self.plant.present(self._target)
+                with suppress(ActionInterrupted):  # a live model that does not answer has no target either; the reach has ended and counts
+                    self.plant.present(self._target)
         self._look(found.after.settled)
         if not self.offsets.all_offsets.any():
             return found
@@ -248,11 +250,3 @@ class SelfCalibratingPlant:
             step = np.linalg.solve(jacobian.T @ jacobian + damping * np.eye(len(pull)), pull)
             posture[where] = np.clip(posture[where] + step, low, high)
         return posture
-
-
-def _finite(what: str, given: ArrayLike, length: int) -> Array:
-    """Return a copy of finite numbers (length,); raises InvalidValue for anything else."""
-    value = real_array(what, given)
-    if value.shape != (length,) or not np.isfinite(value).all():
-        raise InvalidValue(f"{what} of shape {value.shape}: must be {length} finite numbers")
-    return value

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from mobee import InvalidValue, Lattice, Model, OfflinePlant, ReachTarget, UnknownName
+from mobee import ActionInterrupted, InvalidValue, Lattice, Model, OfflinePlant, ReachTarget, UnknownName
 from mobee.arrays import Array
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.plant import Outcome
@@ -58,7 +58,7 @@ def test_offsets_that_appear_are_detected_at_once_and_found_within_the_reported_
     assert chi2.ppf(0.001, 160) < sum(squared) < chi2.ppf(0.999, 160)
 
 
-def test_without_a_change_none_is_detected_and_the_estimate_becomes_more_certain() -> None:
+def test_if_the_offsets_do_not_change_no_change_is_detected_and_the_estimate_becomes_more_certain() -> None:
     rng, filtered = np.random.default_rng(0), JointOffsets(MODEL, MARKER, ARM)
     observe(filtered, np.zeros(4), rng, 3000)
     assert filtered.changes == [] and filtered.observations == 3000
@@ -146,42 +146,6 @@ def true_place(plant: OfflinePlant, q: Array | None = None) -> Array:
     return MODEL.evaluate(posture).position(MARKER)
 
 
-def test_actions_and_reaches_of_a_corrected_plant_end_where_they_should() -> None:
-    rng, ends = np.random.default_rng(2), list[Array]()
-
-    class Seen(OfflinePlant):
-        def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-            found = super().reach(part, marker, stay)
-            ends.append(true_place(self, found.q))
-            return found
-
-    plant = Seen(Model(ROBOT), 0, active=ARM)
-    corrected = SelfCalibratingPlant(
-        plant, JointOffsets(MODEL, MARKER, ARM, noise=0.001), lambda: true_place(plant) + rng.normal(0.0, 0.001, 3)
-    )
-    home = ROBOT.home[SLICE]
-    target = ReachTarget(MODEL.evaluate(ROBOT.home).position(MARKER) + [-0.05, 0.05, 0.05], aim="surface")
-
-    def remaining() -> tuple[float, float]:
-        corrected.present(target)
-        found = corrected.reach(PART, MARKER)
-        corrected.present(None)
-        return target.missing(ends[-1]), found.missing
-
-    wrong, _ = remaining()
-    for q in postures(rng, 12):
-        corrected.act(PART, q[SLICE])
-    assert np.abs(corrected.offsets.offsets - OFFSETS).max() < np.deg2rad(1.0)
-    outcome = corrected.act(PART, home)
-    assert np.abs(outcome.q - home).max() < np.deg2rad(1.5)  # where an action counts as settled
-    assert corrected.measure(PART) == pytest.approx(corrected.q[SLICE])
-    assert corrected.q == pytest.approx(plant.q + corrected.offsets.all_offsets)
-    assert np.linalg.norm(true_place(plant) - MODEL.evaluate(ROBOT.home).position(MARKER)) < 0.015
-    right, believed = remaining()
-    assert wrong > 0.02 > 0.008 > right
-    assert believed == pytest.approx(right, abs=0.005)
-
-
 def known_offsets() -> JointOffsets:
     """Right offsets, without any observation."""
     offsets = JointOffsets(MODEL, MARKER, ARM)
@@ -201,6 +165,34 @@ class Wrong(OfflinePlant):
 
     def act(self, part: str, target: Array) -> Outcome:
         return replace(super().act(part, target), settled=self.settles)
+
+
+def test_actions_and_reaches_of_a_corrected_plant_end_where_they_should() -> None:
+    rng, plant = np.random.default_rng(2), Wrong(Model(ROBOT), 0, active=ARM)
+    corrected = SelfCalibratingPlant(
+        plant, JointOffsets(MODEL, MARKER, ARM, noise=0.001), lambda: true_place(plant) + rng.normal(0.0, 0.001, 3)
+    )
+    home = ROBOT.home[SLICE]
+    target = ReachTarget(MODEL.evaluate(ROBOT.home).position(MARKER) + [-0.05, 0.05, 0.05], aim="surface")
+
+    def remaining() -> tuple[float, float]:
+        corrected.present(target)
+        found = corrected.reach(PART, MARKER)
+        corrected.present(None)
+        return target.missing(plant.end), found.missing
+
+    wrong, _ = remaining()
+    for q in postures(rng, 12):
+        corrected.act(PART, q[SLICE])
+    assert np.abs(corrected.offsets.offsets - OFFSETS).max() < np.deg2rad(1.0)
+    outcome = corrected.act(PART, home)
+    assert np.abs(outcome.q - home).max() < np.deg2rad(1.5)  # where an action counts as settled
+    assert corrected.measure(PART) == pytest.approx(corrected.q[SLICE])
+    assert corrected.q == pytest.approx(plant.q + corrected.offsets.all_offsets)
+    assert np.linalg.norm(true_place(plant) - MODEL.evaluate(ROBOT.home).position(MARKER)) < 0.015
+    right, believed = remaining()
+    assert wrong > 0.02 > 0.008 > right
+    assert believed == pytest.approx(right, abs=0.005)
 
 
 @pytest.mark.parametrize("aim", ["surface", "centre"])
@@ -253,6 +245,25 @@ def test_after_a_reach_the_plant_has_the_target_that_was_presented_and_nothing_i
     assert watched.offsets.observations == 1
 
 
+def test_a_reach_counts_also_if_the_target_cannot_be_put_back() -> None:
+    """A live plant interrupts what it does while the model does not answer."""
+
+    class WithoutModel(Wrong):
+        presented = 0
+
+        def present(self, target: ReachTarget | None) -> None:
+            self.presented += 1
+            if self.presented == 3:
+                raise ActionInterrupted("the model does not answer")
+            super().present(target)
+
+    wrong = WithoutModel(Model(ROBOT), 0, active=ARM)
+    corrected = SelfCalibratingPlant(wrong, known_offsets(), lambda: None)
+    corrected.present(target := ReachTarget(np.array([-0.3, 0.2, 0.1])))
+    assert corrected.reach(PART, MARKER).missing == pytest.approx(target.missing(wrong.end))
+    assert wrong.presented == 3
+
+
 @pytest.mark.parametrize("offsets", [known_offsets, lambda: JointOffsets(MODEL, MARKER, ARM)])
 def test_targets_that_a_plant_refuses_are_refused(offsets: Callable[[], JointOffsets]) -> None:
     corrected = SelfCalibratingPlant(OfflinePlant(Model(ROBOT), 0, active=ARM), offsets(), lambda: None)
@@ -265,7 +276,7 @@ def test_targets_that_a_plant_refuses_are_refused(offsets: Callable[[], JointOff
             corrected.reach(PART, MARKER)
 
 
-def test_targets_beyond_an_uncorrected_limit_are_cut_off() -> None:
+def test_a_target_beyond_an_uncorrected_limit_moves_the_motor_to_the_limit() -> None:
     offsets = JointOffsets(MODEL, MARKER, ARM)
     offsets.offsets = OFFSETS.copy()
     plant = OfflinePlant(Model(ROBOT), 0, active=ARM)
