@@ -420,7 +420,7 @@ def plot(found: Cells) -> Any:
         ticks_at(panels[1, column], CHECKPOINTS)
     panels[0, 0].set_ylabel("score over the new oracle's")
     panels[1, 0].set_ylabel("failed transitions per evaluation")
-    panels[0, 0].legend(fontsize=8, title="learner", loc="center right")
+    panels[1, 0].legend(fontsize=8, title="learner", loc="upper right")
     return drawing
 
 
