@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`MoBeE/Reach-v0`: reach places with a hand; actions move the attractor of an arm, and the controller prevents collisions."""
+"""`MoBeE/Reach-v0`: reach positions with a hand. Actions move the attractor of an arm, and the controller prevents collisions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import ArrayLike, NDArray
 
 from mobee.arrays import Array, Ints
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.gymnasium.registration import REACH_STEPS
 from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, guarded, model_of, plant_settings
 from mobee.gymnasium.vector import RobotVectorEnv
@@ -38,14 +38,14 @@ class ReachTask(Settings):
     """Settings of `MoBeE/Reach-v0`.
 
     Args:
-        robot: a shipped name, the path of an XML or URDF file, or a Robot.
+        robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
         joints: motor names, all of one part; the part's other motors keep their attractors at home.
-        marker: the robot's marker that is to reach the goals.
-        world: a shipped name, the path of an XML file, or a World; None: nothing but the robot.
+        marker: the marker of the robot that must reach the goals.
+        world: name of a shipped world, path of an XML file, or a World; None: nothing but the robot.
         plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
-        period: s, of a step; a whole number of ticks.
-        step: rad, how far an action of 1 moves the attractor of a joint.
-        tolerance: m, distance at which a goal counts as reached.
+        period: duration of a step, s, rounded to whole ticks.
+        step: largest motion of a joint's attractor in one step (action 1), rad.
+        tolerance: distance at which a goal counts as reached, m.
         reward: "sparse": 0 at the goal and -1 elsewhere; "dense": the negative distance in m.
     """
 
@@ -128,7 +128,10 @@ class _Reaching:
 
 
 def extent(robot: Robot, marker: str) -> float:
-    """Return a distance from the origin that the marker cannot exceed, in m: the sum of the lengths and strokes of the chain to it."""
+    """Return an upper bound [m] on the distance of the marker from the origin of the root frame.
+
+    It is the sum of the lengths, and of the largest strokes, of the chain from the base to the marker.
+    """
     point, link, total = robot.markers[marker].position, robot.markers[marker].link, 0.0
     while link > 0:
         joint = robot.joints[link - 1]
@@ -139,25 +142,26 @@ def extent(robot: Robot, marker: str) -> float:
 
 
 class ReachEnv(Env[Any, Any]):
-    """The task is to reach places with a hand; the controller of MoBeE moves the arm to an attractor and prevents collisions on the way.
+    """A Gymnasium environment: reach positions with a hand, while the controller of MoBeE prevents collisions.
 
-    An action (d,) in [-1, 1] moves the attractor of each joint by up to `step` rad; then `period` seconds are simulated.  During every
-    action of the agent, contact fields, joint limits and cable constraints act on the robot as always.  `info` has the deepest contacts of
-    the step, in m: `solid_depth`, 0 if nothing collided, and `field_depth`.  Solids are tested against the world and, within the robot, for
-    those pairs of links whose fields are tested against each other.
+    An action (d,) in [-1, 1] moves the attractor of each of the d joints by up to `step` rad, within the joint's limits; then `period`
+    seconds are simulated. Contacts of fields, joint limits and cable constraints cause forces during every step.
 
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
-    controller's own velocities [rad/s]; `achieved_goal` (3,): the marker's position, `desired_goal` (3,): its goal, in m in the
-    root frame.  A goal is the marker's place in a random posture in which no force acts on the joints.  An episode never
-    terminates; if the environment is made by its id, it is truncated after 50 steps.  `info["is_success"]` says whether the
-    marker is at the goal now.
+    controller's own velocities [rad/s]; `achieved_goal` (3,): position of the marker, and `desired_goal` (3,): its goal, both in m in the
+    root frame. A goal is the position of the marker in a random posture in which no force acts on the joints. An episode never terminates;
+    an environment that was made by its id truncates it after 50 steps.
 
-    `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`.
+    `info["is_success"]`: whether the marker is at the goal now. `info["solid_depth"]` and `info["field_depth"]`: m, the deepest contact of
+    solids and of fields during the step, 0 without a contact. Solids are tested against the world; within the robot, only pairs of links
+    whose fields are tested too.
+
+    `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`, m, root frame.
 
     Args:
-        render_mode: "rgb_array", or None.
-        settings: None: the defaults.
-        **changes: fields of `ReachTask` by keyword, in place of those in `settings`.
+        render_mode: "rgb_array", or None: no pictures.
+        settings: the task; None: the defaults.
+        **changes: fields of `ReachTask` by keyword, in place of the values in `settings`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
@@ -178,28 +182,36 @@ class ReachEnv(Env[Any, Any]):
         return self._robots.plants[0]
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
-        """Put the robot at home and draw a goal; `seed` determines the noise and the goals of this and all later episodes."""
+        """Put the robot at home and draw a goal; return observation and info.
+
+        `seed`: determines the noise and the goals of this and all later episodes. `options={"goal": (x, y, z)}`: use this goal, m, root
+        frame.
+        """
         super().reset(seed=seed)
         self.plant.restart(int(self.np_random.integers(SEEDS)))
-        drawn = self._reaching.draw_goal(self.np_random, self.plant)
-        given = (options or {}).get("goal")
-        self._goal = drawn if given is None else np.array(given, dtype=np.float64).reshape(3)
+        self._goal = _chosen_goals(options, self._reaching.draw_goal(self.np_random, self.plant))
         seen = self._observed()
         return seen, {"is_success": bool(self._reaching.judge(seen["achieved_goal"], self._goal)[1])}
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Move the attractor by an action (d,), and simulate `period` seconds."""
+        """Move the attractors of the joints by an action (d,) in [-1, 1], times `step` rad, and simulate `period` seconds.
+
+        Return observation, reward, False (never terminated), False (never truncated here), and info.
+        """
         ((solid, field),) = self._reaching.move(self._robots, _ONLY, np.asarray(action, dtype=np.float64)[None])
         seen = self._observed()
         reward, reached = self._reaching.judge(seen["achieved_goal"], self._goal)
         return seen, float(reward), False, False, {"is_success": bool(reached), "solid_depth": float(solid), "field_depth": float(field)}
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Any:
-        """Return the rewards (...) of achieved and desired places (..., 3) m, as hindsight experience replay needs them."""
+        """Return the rewards (...) for achieved and desired positions (..., 3) m, as hindsight experience replay needs them.
+
+        `info` is not used.
+        """
         return self._reaching.judge(np.asarray(achieved_goal), np.asarray(desired_goal))[0]
 
     def render(self) -> Picture | None:
-        """Return a picture (H, W, 3) of the robot in its world, with the goal as a red ball, in "rgb_array" mode."""
+        """Return a picture (H, W, 3) of the robot in its world, with the goal as a red ball, or None if there is no render mode."""
         if self.render_mode is None:
             return None
         if self._portrait is None:
@@ -211,17 +223,32 @@ class ReachEnv(Env[Any, Any]):
         return {name: rows[0] for name, rows in self._reaching.observe(self._robots, self._goal[None]).items()}
 
 
+def _chosen_goals(options: dict[str, Any] | None, drawn: Array) -> Array:
+    """Return the goals of the options of a reset, in the shape of the drawn ones, (3,) or (num_envs, 3) m; without any, the drawn ones."""
+    given = (options or {}).get("goal")
+    if given is None:
+        return drawn
+    try:
+        goals = np.broadcast_to(np.asarray(given, dtype=np.float64), drawn.shape).copy()
+    except (TypeError, ValueError):
+        raise InvalidValue(f"goal: {given!r} is not a position, three numbers in m, or one position for each robot") from None
+    if not np.isfinite(goals).all():
+        raise InvalidValue(f"goal: {given!r} has numbers that are not finite")
+    return goals
+
+
 class ReachVectorEnv(RobotVectorEnv):
     """Several robots that reach, simulated together; the results of each are bit-equal to those of a separate `ReachEnv`.
 
-    An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
+    In the step after the end of a robot's episode, its action is ignored and a new episode begins (`AutoresetMode.NEXT_STEP`).
 
     Args:
-        num_envs: how many robots.
-        max_episode_steps: after which an episode is truncated.
-        threads: of the simulation.
-        settings: None: the defaults.
-        **changes: fields of `ReachTask` by keyword.
+        num_envs: number of robots.
+        max_episode_steps: number of steps after which an episode is truncated.
+        threads: number of threads of the simulation.
+        render_mode: only None is supported.
+        settings: the task; None: the defaults.
+        **changes: fields of `ReachTask` by keyword, in place of the values in `settings`.
     """
 
     @accepts(ReachTask)
@@ -243,21 +270,30 @@ class ReachVectorEnv(RobotVectorEnv):
 
     @property
     def plants(self) -> list[OfflinePlant]:
-        """The simulated robots."""
+        """The simulated robots, one for each environment."""
         return self._robots.plants
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Put all robots at home and draw a goal for each; `seed`: one for each, or the first of consecutive ones."""
+        """Put all robots at home and draw a goal for each; return observations and infos, each entry (num_envs, ...).
+
+        `seed`: a list with one seed for each robot, or the first of consecutive seeds. `options={"goal": (x, y, z)}`: use this goal, m,
+        root frame, or one goal for each robot, (num_envs, 3); in later episodes goals are drawn.
+        """
         self._restart_all(seed)
         for number in range(self.num_envs):
             self._begin(number)
+        self._goals = _chosen_goals(options, self._goals)
         seen = self._reaching.observe(self._robots, self._goals)
         return seen, self._infos(self._reaching.judge(seen["achieved_goal"], self._goals)[1])
 
     def step(self, actions: Array) -> tuple[Observation, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Move the attractors by actions (num_envs, d), and simulate `period` seconds; an episode that was over begins again."""
+        """Move the attractors by actions (num_envs, d) and simulate `period` seconds.
+
+        A robot whose episode has ended ignores its action and begins a new episode. Return observations, rewards, False (never terminated),
+        whether episodes are truncated, each (num_envs, ...), and infos.
+        """
         begun, depths = self._over, np.zeros((self.num_envs, 2))
         going = np.flatnonzero(~begun)
         depths[going] = self._reaching.move(self._robots, going, np.asarray(actions, dtype=np.float64)[going])

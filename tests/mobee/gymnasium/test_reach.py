@@ -12,7 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import mobee
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.gymnasium import ReachEnv, ReachTask
 from mobee.gymnasium.reach import extent
 from mobee.gymnasium.robots import guarded
@@ -89,6 +89,17 @@ def test_each_robot_of_a_vector_is_an_environment_of_its_own() -> None:
                 assert (rewards[number], cut[number]) == (reward, over)
             assert all(np.array_equal(seen[name][number], alone_seen[name]) for name in alone_seen)
             assert infos["is_success"][number] == info["is_success"]
+
+
+def test_a_vector_begins_with_the_goals_of_its_options() -> None:
+    vector = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=2, period=0.02)
+    goals = np.array([[-0.3, 0.1, 0.1], [-0.2, 0.2, 0.0]])
+    assert vector.reset(seed=0, options={"goal": goals})[0]["desired_goal"].tolist() == goals.tolist()
+    assert vector.reset(seed=0, options={"goal": goals[1]})[0]["desired_goal"].tolist() == goals[[1, 1]].tolist()
+    with pytest.raises(InvalidValue, match=r"goal: \[0.0, 1.0\] is not a position"):
+        vector.reset(options={"goal": [0.0, 1.0]})
+    with pytest.raises(InvalidValue, match="not finite"):
+        ReachEnv().reset(options={"goal": [0.0, np.nan, 0.0]})
 
 
 def test_episodes_of_one_step_begin_again_all_at_once() -> None:
