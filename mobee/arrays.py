@@ -34,7 +34,7 @@ def real_array(what: str, given: ArrayLike) -> Array:
 
 
 def checked_threads(threads: int) -> int:
-    """Return the number of threads; raises InvalidValue if it is no whole number from 1 to MAX_THREADS."""
+    """Return the given number of threads unchanged; raises InvalidValue if it is not a whole number from 1 to MAX_THREADS (1024)."""
     if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
         raise InvalidValue(f"threads={threads!r}: give a whole number from 1 to {MAX_THREADS}.")
     return threads

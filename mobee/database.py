@@ -37,11 +37,11 @@ REMEDIES = {
 
 
 def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connection:
-    """Open the file, and create its tables if it is new; a damaged file, or one of another program or schema, is refused and not changed.
+    """Open the SQLite file of a run and return the connection; a new file gets its tables.
 
-    `read_only`: nothing is written, neither to the file nor beside it, and a file without tables is refused too. `durable`: a commit
-    waits for the disk, and survives a power cut; else it survives the end of the process only.
-    Every error is a MobeeError of one line.
+    A file that is damaged, or was written by another program or with another schema, is refused and not changed. `read_only`: nothing
+    is written to the file or beside it, and a file without tables is refused too. `durable`: True: a commit waits for the disk and
+    survives a power cut; False: a commit survives the end of the process, but not a power cut. Every error is a MobeeError of one line.
     """
     with explained(path):
         database = sqlite3.connect(
@@ -62,7 +62,7 @@ def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connect
 
 @contextmanager
 def transaction(database: sqlite3.Connection) -> Iterator[None]:
-    """Run the body of a `with` statement as one transaction, which excludes other writers."""
+    """Run the body of a `with` statement as one transaction; no other process can write meanwhile. An error in the body undoes it."""
     database.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -74,7 +74,10 @@ def transaction(database: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Convert SQLite's errors into one line with the file and the remedy."""
+    """Convert SQLite errors in the body of a `with` statement into a MobeeError of one line, with the file `path` and the remedy.
+
+    If the disk refuses a write, the error is a NoRoom.
+    """
     try:
         yield
     except UnicodeDecodeError as error:
@@ -87,12 +90,15 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def damaged(path: Path, what: str) -> MobeeError:
-    """Return the error for a file whose content was changed by something else."""
+    """Return the error for a damaged file, to be raised by the caller. `what`: what is wrong with the file, for the message."""
     return MobeeError(f"{path}: {what}: {DAMAGED}.")
 
 
 def json_of(path: Path, what: str, text: object) -> Any:
-    """Return the value of a JSON text in the file; raises MobeeError if it is not JSON. `what`: name of the value for the message."""
+    """Return the value of a JSON text that was read from the file `path`; raises MobeeError if `text` is not JSON.
+
+    `what`: name of the value in the message.
+    """
     try:
         if isinstance(text, str):
             return json.loads(text)

@@ -12,7 +12,7 @@ class MobeeError(Exception):
 
 
 class RobotFileError(MobeeError):
-    """A robot or world file that cannot be read: file, line, field and remedy are in the message."""
+    """Raised for a robot or world file that cannot be read; the message has file, line, field and remedy."""
 
 
 class OlderVersion(UserWarning):
@@ -20,15 +20,15 @@ class OlderVersion(UserWarning):
 
 
 class Simplified(UserWarning):
-    """Warns that a robot file has an element that this library does not model; the message says how it is read."""
+    """Warns that a robot file has an element that this library does not model; the message says how the element is simplified."""
 
 
 class InvalidValue(MobeeError, ValueError):
-    """An argument with the wrong shape, unit or range."""
+    """Raised for an argument with a wrong type, shape or range."""
 
 
 class UnknownName(MobeeError, KeyError):
-    """A name that the robot, the world or a table does not have."""
+    """Raised for a name that the robot, the world or a table does not have; the message has the nearest name and all valid names."""
 
     def __init__(self, kind: str, given: object, valid: Iterable[object]) -> None:
         names = sorted(map(str, valid))
@@ -59,7 +59,7 @@ class ActionInterrupted(MobeeError):
 class BatchInterrupted(ActionInterrupted):
     """Raised if some plants of a batch were interrupted or failed; the other plants ended normally.
 
-    `results`: the result of each plant, in the order of the plants, or the exception that ended it.  The first exception is the cause.
+    `results`: the result of each plant, or the exception that ended it, in the order of the plants.
     """
 
     def __init__(self, results: Sequence[object]) -> None:

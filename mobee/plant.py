@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Plant: the interface through which agents act, offline and live."""
+"""The Plant: the interface through which agents act, offline and live, and the outcome of an action."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """How an action ended.
+    """The outcome of an action: what the plant measures when the action ends.
 
-    `q`: (n_part,) rad, as the encoders measure it.  `settled`: False if the action timed out; agents learn from that outcome too.
-    `duration`: s, by the plant's clock.  `touched`: names of world objects in contact (fields included) at the end.
-    `perceived`: places (3,) m of the objects that the plant perceives at the end, by name, in the root frame.
+    `q`: (n_part,) rad, encoder values of the part's motors.  `settled`: False if the action timed out; agents learn from that outcome
+    too.  `duration`: s, by the plant's clock.  `touched`: names of the world objects that touch a solid or field of a link that the part
+    moves.  `perceived`: position (3,) m, root frame, of each object that the plant perceives, by name.
     """
 
     q: Array
@@ -38,13 +38,13 @@ class Plant(Protocol):
         ...
 
     def measure(self, part: str) -> Array:
-        """Return the present encoder values of the part's motors, shape (n_part,), in [rad]."""
+        """Return the present encoder values of the motors of the named part, shape (n_part,), in [rad]."""
         ...
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor and wait until it settles or times out (thesis 6.1).
+        """Set the part's attractor to `target` (n_part,) rad and wait until the part has settled, or a time limit is over (thesis 6.1).
 
-        `target`: (n_part,) rad, all motors of the part.  Raises ActionInterrupted on hold, fault or a new run.
+        Raises ActionInterrupted if the action ends without an outcome: by a hold, a fault or a new run of the robot.
         """
         ...
 
@@ -55,30 +55,30 @@ class Described(Protocol):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings that determine how actions end, without the seed, as plain JSON values."""
+        """The settings on which the outcomes of actions depend, except the seed, by name, as plain JSON values."""
         ...
 
 
 @runtime_checkable
 class Perceiving(Protocol):
-    """A plant that perceives objects."""
+    """A plant that perceives objects and reports their positions."""
 
     def perceive(self) -> Mapping[str, Array]:
-        """Return the present places (3,) m of the objects that are perceived, by name, in the root frame."""
+        """Return the present position (3,) m, root frame, of each perceived object, by name."""
         ...
 
 
 def present_outcome(plant: Plant, part: str) -> Outcome:
-    """Return what a plant measures and perceives at present, as the outcome of an action that has just ended."""
+    """Return what a plant measures and perceives at present, in the form of an outcome: settled, duration 0, nothing touched."""
     return Outcome(plant.measure(part), True, 0.0, perceived=plant.perceive() if isinstance(plant, Perceiving) else {})
 
 
 class PerceivingPlant:
-    """A plant that also perceives objects, by a function: for agents whose states hold where an object is.
+    """A plant with a function that perceives objects, for agents whose states include the position of an object.
 
     Args:
-        plant: on which the actions are performed, offline or live.
-        perceive: returns the present places (3,) m of the objects that are perceived, by name; called at the end of every action.
+        plant: the plant that performs the actions, offline or live.
+        perceive: returns the present position (3,) m, root frame, of each perceived object, by name; called at the end of every action.
     """
 
     def __init__(self, plant: Plant, perceive: Callable[[], Mapping[str, Array]]) -> None:
@@ -86,22 +86,25 @@ class PerceivingPlant:
 
     @property
     def q(self) -> Array:
-        """See Plant."""
+        """The present encoder values of all motors, shape (n,), in [rad], in the order of `robot.motors`."""
         return self.plant.q
 
     def measure(self, part: str) -> Array:
-        """See Plant."""
+        """Return the present encoder values of the motors of the named part, shape (n_part,), in [rad]."""
         return self.plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; the outcome holds what is perceived at the end."""
+        """Perform an action, as in `mobee.plant.Plant.act`, and add the objects that are perceived at its end to its outcome.
+
+        `target`: (n_part,) rad, the attractor of the part's motors. Raises ActionInterrupted on a hold, a fault or a new run.
+        """
         return replace(self.plant.act(part, target), perceived=self.perceive())
 
     def perceive(self) -> Mapping[str, Array]:
-        """See Perceiving."""
+        """Return the present position (3,) m, root frame, of each perceived object, by name."""
         return self._perceive()
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the plant, if it has any; see Described."""
+        """The settings of the inner plant (`mobee.plant.Described.settings`); empty if that plant has none."""
         return self.plant.settings if isinstance(self.plant, Described) else {}

@@ -24,9 +24,10 @@ MAX_DISTANCE = 1e3  # m, of a target; larger squares could overflow
 class ReachTarget:
     """A sphere as a target for a marker; it repels all links except the reaching hand.
 
-    `position`: (3,) m, root frame, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker is to come to its "centre" (thesis 8.2) or
-    to its "surface".  `normal`: (3,), root frame, desired direction of the marker's normal; None: any.  `faces`: the desired direction is
-    that from the marker to the target's centre, as for a palm that is turned towards its target.
+    `position`: (3,) m, root frame, centre of the sphere, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker has to reach the
+    "centre" (thesis 8.2) or the "surface" of the sphere.  `normal`: (3,), root frame, desired direction of the marker's normal, scaled to
+    length 1; None: any.  `faces`: True: the desired direction of the normal is the direction from the marker to the centre, so that a
+    palm turns towards its target.
     """
 
     position: Array
@@ -36,7 +37,7 @@ class ReachTarget:
     faces: bool = False
 
     def __post_init__(self) -> None:
-        """Check all fields; raises InvalidValue, UnknownName."""
+        """Check all fields and scale the normal to length 1; raises InvalidValue, or UnknownName for an unknown `aim`."""
         where = _triple(self.position, "position")
         if np.abs(where).max() > MAX_DISTANCE:
             raise InvalidValue(f"position {where.tolist()} of the target: must be within {MAX_DISTANCE:g} m of the root frame's origin")
@@ -55,7 +56,10 @@ class ReachTarget:
             object.__setattr__(self, "normal", normal / length)
 
     def missing(self, marker: Array) -> float:
-        """Return the distance [m] that remains from a marker's position (3,) m to the centre or surface: |x - x*| of thesis eq. 8.4."""
+        """Return the remaining distance [m] from a marker at `marker` (3,) m, root frame, to the target: |x - x*| of thesis eq. 8.4.
+
+        With the aim "surface" it is the distance to the surface, and 0 inside the sphere.
+        """
         distance = float(np.linalg.norm(self.position - marker))
         return max(distance - self.radius, 0.0) if self.aim == "surface" else distance
 
@@ -64,10 +68,10 @@ class ReachTarget:
 class ReachOutcome:
     """The outcome of a reach in two phases: a force pulls the marker to the target, then the attractor pulls the part back.
 
-    `q`: (n_part,) rad, encoder values at the end of the force.  `marker`: (3,) m, root frame, position of the marker that the model
-    computes from `q`.  `missing`: m, remaining error.  `settled`: False if the first phase timed out.  `duration`: s of both phases,
-    by the plant's clock.  `touched`: world objects in contact (fields included) at the end of the force.
-    `after`: outcome of the second phase.
+    `q`: (n_part,) rad, encoder values at the end of the first phase.  `marker`: (3,) m, root frame, position of the marker that the model
+    computes from `q`.  `missing`: m, remaining distance to the target (`ReachTarget.missing`).  `settled`: False if the first phase timed
+    out.  `duration`: s of both phases, by the plant's clock.  `touched`: names of the world objects that touch a solid or field of a link
+    that the part moves, at the end of the first phase.  `after`: outcome of the second phase.
     """
 
     marker: Array
@@ -83,21 +87,25 @@ class ReachPlant(Plant, Protocol):
     """A Plant that can reach for targets."""
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world as `TARGET`, role "target", or move it there; None removes it."""
+        """Add the target to the world as the object `TARGET` ("reach_target") with role "target", or move that object; None removes it."""
         ...
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Apply a force that pulls the marker to the presented target until the part has settled or timed out, then end it (thesis 8.2).
+        """Pull the named marker by a force to the presented target until the part has settled or a time limit is over (thesis 8.2).
 
-        The attractor stays at the target of the part's last action, and pulls the part back when the force has ended.  `stay`: the
-        attractor moves to the pose in which the reach ended, and `after` is that end.
-        Raises InvalidValue if nothing is presented or the part does not move the marker; ActionInterrupted as `act`.
+        Meanwhile the attractor stays at the target of the part's last action; when the force has ended, it pulls the part back.  `stay`:
+        True: the attractor moves to the pose in which the force ended, so that the part stays there; `after` is then the outcome there.
+        Raises InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted on a hold, a fault or a new
+        run.
         """
         ...
 
 
 def reward_of(missing: float, scale: float = 0.01) -> float:
-    """Return the reward 1 / (1 + missing / scale) of a reach (thesis eq. 8.4); `scale` [m]: the unit, which the thesis does not give."""
+    """Return the reward 1 / (1 + missing / scale) of a reach (thesis eq. 8.4).
+
+    `missing`: m, final distance of the marker from the target. `scale`: m, the unit of the distance, which the thesis does not state.
+    """
     return 1.0 / (1.0 + missing / scale)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings: named fields with defaults and valid values, and the functions and classes that some of them name."""
+"""Settings of agents and plants: named fields with defaults and valid values; a value may be the name of a function or class."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ C = TypeVar("C", bound=Callable[..., Any])
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Valid values of a number, as an annotation: `Annotated[float, Range(ge=0, lt=1)]`; NaN and infinities are never valid."""
+    """The valid values of a number, for an annotation: `Annotated[float, Range(ge=0, lt=1)]`; NaN and infinities are never valid.
+
+    `ge`, `gt`: lower bound that is included, excluded. `le`, `lt`: upper bound that is included, excluded. None: no such bound.
+    """
 
     ge: float | None = None
     gt: float | None = None
@@ -27,7 +30,7 @@ class Range:
     lt: float | None = None
 
     def holds(self, value: float | np.integer | np.floating) -> bool:
-        """Return whether a number is valid."""
+        """Return whether a number is finite and within all bounds."""
         return bool(
             np.isfinite(value)
             and (self.ge is None or value >= self.ge)
@@ -43,11 +46,12 @@ class Range:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Base of the settings of an agent or a plant: a subclass states each field once, with its type, default and meaning.
+    """The base class of the settings of an agent or a plant: a subclass states each field once, with its type, default and meaning.
 
-    The signature of the constructor (`accepts`), the fields of a scenario file (`services.agents.config`) and the record of a run are
-    made from these fields.  Values are checked against `Range` and `Literal` annotations; a field whose type allows a string beside another
-    type takes a name, `module:name`, or the object itself, see `named`.
+    Three things are made from these fields: the signature of the constructor that takes the settings (`mobee.settings.accepts`), the
+    fields of a scenario file (`services.agents.config`) and the record of a run.  Values are checked against `Range` and `Literal`
+    annotations.  A field for a function or class can be set by its short name, by `module:name`, or by the function or class itself
+    (`mobee.settings.named`).
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -59,7 +63,10 @@ class Settings:
 
     @classmethod
     def made(cls, settings: Self | None, changes: Mapping[str, Any]) -> Self:
-        """Return the given settings, or the defaults if None, with some values replaced; raises UnknownName for a name that is no field."""
+        """Return a copy of `settings`, or the default settings if None, with the values in `changes` (by name of the field) replaced.
+
+        Raises UnknownName for a name that is not a field, InvalidValue for a value out of range.
+        """
         valid = [field.name for field in fields(cls)]
         for name in changes:
             if name not in valid:
@@ -68,13 +75,13 @@ class Settings:
 
 
 def hints_of(settings: type[Settings]) -> dict[str, Any]:
-    """Return the type of each field of a class of settings by name, with its `Range` if it has one."""
+    """Return the type of each field of a settings class, by the field's name; the type includes the `Range` annotation, if any."""
     hints = get_type_hints(settings, include_extras=True)
     return {field.name: hints[field.name] for field in fields(settings)}
 
 
 def accepts(settings: type[Settings]) -> Callable[[C], C]:
-    """Decorate a constructor that ends in `**changes`: `inspect.signature` and `help` then list the fields of these settings."""
+    """Return a decorator for a constructor that ends in `**changes`: `inspect.signature` and `help` then list the fields of `settings`."""
 
     def decorate(constructor: C) -> C:
         own = inspect.signature(constructor)
@@ -98,10 +105,10 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
     """Return the name under which a function or class is recorded, and the function or class itself.
 
     Args:
-        kind: used in messages: "explorer", "strategy".
-        given: a name in the table; `module:name` of an object that can be imported; or the object itself, which is recorded as the
-            `module:name` where it was defined.
-        table: the objects that have a name.
+        kind: what is named, for the messages: "explorer", "strategy".
+        given: a name in the table; or `module:name` of a function or class that can be imported; or the function or class itself,
+            which is recorded as the `module:name` where it was defined.
+        table: the functions and classes that have a short name, by this name.
 
     Raises:
         UnknownName: the table has no such name.
@@ -120,13 +127,19 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
 
 
 def require_name(kind: str, given: str, table: Mapping[str, object]) -> None:
-    """Raise UnknownName if the name is neither in the table nor of the form `module:name`; imports nothing."""
+    """Raise UnknownName if `given` is neither a name in the table nor of the form `module:name`; nothing is imported.
+
+    `kind`: what is named, for the message.
+    """
     if ":" not in given and given not in table:
         raise UnknownName(kind, given, (*table, "module:name of your own"))
 
 
 def imported(kind: str, path: str) -> Any:
-    """Import the object `module:name`; raises InvalidValue if it cannot be imported."""
+    """Import and return the object that `path` names as `module:name`; raises InvalidValue if it cannot be imported.
+
+    `kind`: what the object is, for the message.
+    """
     module, _, name = path.partition(":")
     try:
         return getattr(importlib.import_module(module), name)

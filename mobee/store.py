@@ -19,14 +19,14 @@ from mobee.write_locks import lock, unlock
 
 
 class AgentFile:
-    """The data of one agent in the file of a run; the processes of several agents may share the file.
+    """The data of one agent in the SQLite file of a run; the processes of several agents may share the file.
 
-    Write-ahead log with full synchronisation: written data survive a kill and a power cut. One process at a time may write the data
-    of an agent.
+    The file has a write-ahead log with full synchronisation: written data survive a kill and a power cut. Only one process at a time
+    may write the data of an agent.
 
     Args:
-        path: the SQLite file; made if missing, its folder must exist.
-        agent: the name under which this agent's share is kept.
+        path: the SQLite file; it is created if missing, but its folder must exist.
+        agent: the name of the agent in the file.
         read_only: open the file for reading only, also in a write-protected folder; nothing is created or changed.
         durable: False: a commit does not wait for the disk, so that it survives a kill but not a power cut; for learning offline.
 
@@ -48,7 +48,7 @@ class AgentFile:
             self._release = weakref.finalize(self, unlock, self.path, agent)  # a store that nobody closes releases its lock too
 
     def bind(self, settings: dict[str, Any]) -> None:
-        """Record the agent's settings (plain JSON values); raises MobeeError if different ones are on record."""
+        """Record the agent's settings (JSON values, by name), or compare them with the record; raises MobeeError if they differ from it."""
         given = _texts(settings)
         with explained(self.path), transaction(self._db):
             known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
@@ -78,13 +78,13 @@ class AgentFile:
                 )
 
     def settings(self, agent: str | None = None) -> dict[str, Any]:
-        """Return the recorded settings of this agent, or of another one in the file; empty if there are none."""
+        """Return the recorded settings of the named agent, by name; None: of this agent. Empty if none are recorded."""
         with explained(self.path):
             rows = self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self._named(agent),)).fetchall()
         return {key: json_of(self.path, f"the setting {key}", value) for key, value in rows}
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file and release the lock on the agent's data."""
         self._db.close()
         if self._release is not None:
             self._release()
@@ -119,7 +119,7 @@ STORE = "transitions.sqlite"  # of a run, in its folder
 
 
 def store_of(run: Path) -> Path:
-    """Return the file of transitions of a run: `run` itself if it is a file, else the file in that folder."""
+    """Return the file of transitions of a run: STORE ("transitions.sqlite") in `run` if that is a folder, else `run` itself."""
     return run / STORE if run.is_dir() else run
 
 
@@ -134,8 +134,9 @@ PLANT = "plant"  # key of the plant's settings
 class Transition:
     """One observed transition (s, a, s'), with its reward and the end of its action.
 
-    `n`: its number, 1, 2, ... for each agent.  `reward`: nats.  `settled`, `touched`: see `Outcome`.  `duration`: s, by the plant's
-    clock.  `q`: rad at the end, all motors of the part.
+    `n`: its number, 1, 2, ... for each agent.  `s`, `a`, `s_next`: indices of the state, of the action and of the state after it.
+    `reward`: intrinsic reward, nats.  `settled`: False if the action timed out.  `duration`: s, by the plant's clock.  `q`: rad, encoder
+    values of the part's motors at the end.  `touched`: names of the world objects that touched the part at the end (`Outcome.touched`).
     """
 
     n: int
@@ -153,7 +154,13 @@ class TransitionStore(AgentFile):
     """The transitions of one agent in the file of a run; each survives a kill and a power cut as soon as `append` has returned.
 
     Args:
-        path, agent, read_only, durable: see `AgentFile`, also for the errors.
+        path: the SQLite file; it is created if missing, but its folder must exist.
+        agent: the name of the agent in the file.
+        read_only: open the file for reading only; nothing is created or changed.
+        durable: False: a transition survives a kill but not a power cut; for learning offline.
+
+    Raises:
+        MobeeError: from every method; InUse and NoRoom as in `mobee.store.AgentFile`.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
@@ -161,7 +168,7 @@ class TransitionStore(AgentFile):
         self._last = self._newest()
 
     def append(self, transition: Transition) -> None:
-        """Commit one transition; it is on disk when this returns."""
+        """Commit one transition; it is on disk when this method returns. Raises MobeeError unless its number follows the last one."""
         if transition.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} transitions: append number {self._last + 1}, not {transition.n}.")
         row = (
@@ -182,10 +189,11 @@ class TransitionStore(AgentFile):
         self._last = transition.n
 
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
-        """Begin with a copy of this agent's transitions in another file; nothing is done if this file has a record of the agent.
+        """Copy this agent's transitions from the file `source`; nothing is done if this file already has a record of the agent.
 
-        They must have been made with the same settings, except those of the plant: transitions made offline may be continued live. The
-        record keeps, as "continued", their number and the settings of their plant. Raises MobeeError.
+        They must have been recorded with `settings`, except the settings of the plant: a record that was made offline may be continued
+        live. The number of copied transitions and the settings of their plant are recorded in the setting "continued". Raises MobeeError
+        if `source` has no transitions of the agent, or other settings.
         """
         if self._last or self.settings():
             return
@@ -206,20 +214,23 @@ class TransitionStore(AgentFile):
             self.change_explorer(n, explorer)
 
     def change_explorer(self, n: int, explorer: str) -> None:
-        """Record by which explorer actions are chosen after `n` transitions; it is on disk when this returns."""
+        """Record the name of the explorer that chooses the actions after the first `n` transitions; it is on disk on return."""
         with explained(self.path), transaction(self._db):
             self._db.execute(EXPLORERS)
             self._db.execute("INSERT OR REPLACE INTO explorers VALUES (?, ?, ?)", (self.agent, n, explorer))
 
     def explorers(self, agent: str | None = None) -> dict[int, str]:
-        """Return the changes of the explorer of this agent, or of another one in the file: its name, by the transitions made before."""
+        """Return the recorded changes of the explorer of the named agent (None: this agent).
+
+        Keys: the number of transitions before the change. Values: the name of the new explorer.
+        """
         with explained(self.path):
             if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'explorers'").fetchone() is None:
                 return {}
             return dict(self._db.execute("SELECT n, explorer FROM explorers WHERE agent = ? ORDER BY n", (self._named(agent),)).fetchall())
 
     def load(self, agent: str | None = None) -> list[Transition]:
-        """Return all transitions of this agent, or of another one in the file, in order."""
+        """Return all transitions of the named agent (None: this agent), in order; raises MobeeError if one is missing or damaged."""
         name = self._named(agent)
         query = "SELECT n, s, a, s_next, reward, settled, duration, q, touched FROM transitions WHERE agent = ? ORDER BY n"
         with explained(self.path):
@@ -245,13 +256,13 @@ class TransitionStore(AgentFile):
         return Transition(n, s, a, s_next, reward, bool(settled), duration, tuple(pose), tuple(names))
 
     def times(self, agent: str | None = None) -> list[float]:
-        """Return the time at which each transition of this agent, or of another one in the file, was committed: s since 1970, in order."""
+        """Return the time at which each transition of the named agent (None: this agent) was committed: s since 1970, in order."""
         with explained(self.path):
             rows = self._db.execute("SELECT t FROM transitions WHERE agent = ? ORDER BY n", (self._named(agent),)).fetchall()
         return [t for (t,) in rows]
 
     def agents(self) -> tuple[str, ...]:
-        """Return the names of the agents that have transitions in the file."""
+        """Return the names of the agents that have transitions in the file, sorted."""
         with explained(self.path):
             return tuple(name for (name,) in self._db.execute("SELECT DISTINCT agent FROM transitions ORDER BY agent"))
 

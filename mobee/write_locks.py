@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Locks by which one process alone writes the data of an agent into a file; a lock ends with its process at the latest.
+"""Locks that let only one process write the data of an agent into a file; a lock ends with its process at the latest.
 
-A lock covers one byte of a file beside the data.  Such locks belong to a process: the same process may lock twice, and all its locks
-on a file end when it closes any descriptor of that file.  Therefore a process opens the file once and counts its locks.
+A lock covers one byte of a second file, named as the data file with "-lock" appended.  Such locks belong to a process: the same process
+may lock twice, and all its locks on a file end when it closes any descriptor of that file.  Therefore a process opens the file once and
+counts its locks.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ _open: dict[Path, _LockFile] = {}
 
 
 def lock(path: Path, name: str) -> None:
-    """Lock the data of `name` in a file against other processes.
+    """Lock the data of the agent `name` in the file `path` against other processes.
 
     Raises InUse while another process holds the lock, NoRoom if the disk is full, MobeeError if no lock can be made for another reason.
+    On a system without such locks (no module fcntl) nothing is done.
     """
     if fcntl is None:
         return
@@ -61,7 +63,7 @@ def lock(path: Path, name: str) -> None:
 
 
 def unlock(path: Path, name: str) -> None:
-    """Release a lock."""
+    """Undo one call of `lock` with the same arguments; the data are unlocked after as many calls of `unlock`. Never raises an error."""
     where = path.with_name(path.name + "-lock").absolute()
     file = _open.get(where)
     if file is None or fcntl is None or not file.held[name]:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The native core: a shared library, built from the sources in core/, called through ctypes.
 
-Each module here declares the functions of the source files that its first line names. The core is given addresses, and checks no
-array: the callers do.
+Each module here declares the functions of the C++ files that its first line names. The core receives addresses of arrays and does not
+check the arrays: the callers do.
 """
 
 from __future__ import annotations
@@ -33,29 +33,34 @@ from mobee.errors import NotInstalled, UnknownName
 
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
-"""The type of an argument that is an array's `tobytes()`, for reading only: for a few numbers faster than passing an address."""
+"""The ctypes type of an argument that is given as `array.tobytes()` and only read by the core; for a few numbers it is faster than an
+address."""
 
 _NOTHING: Any = ctypes.c_char * 0
 
 ABI = 4
-"""The version of the interface that is declared here; `mobee_abi` of a library must return the same. See core/interface.hpp."""
+"""The version of the interface between Python and the core (core/interface.hpp); the function `mobee_abi` of a library must return it."""
 
 FORCED = "MOBEE_CORE"
-"""The environment variable that names the build to use."""
+"""The environment variable with the name of the build to use, such as x86-64-v3."""
 
 
 class CoreUnavailable(NotInstalled):
-    """The native library is missing, was built from other sources, or does not run on this processor."""
+    """Raised if the native library is missing, was built from other sources, or does not run on this processor."""
 
 
 @cache
 def library() -> ctypes.CDLL:
-    """Return the shared library for this processor; it is loaded at the first call."""
+    """Return the core's shared library for this processor; it is loaded at the first call. Raises CoreUnavailable."""
     return load(choose(os.environ.get(FORCED, ""), processor_flags()))
 
 
 def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
-    """Return the name of the build to load: `forced`, or if empty the highest one in the folder that runs with these processor flags."""
+    """Return the name of the build of the core to load.
+
+    `forced`: name of the requested build; "": the build of the highest level in `folder` that runs on a processor with these `flags`.
+    Raises CoreUnavailable if the requested build is unknown or does not run here, or if no build runs here.
+    """
     flags = frozenset(flags)
     known, possible = machine_levels(), possible_levels(flags)
     if forced:
@@ -74,7 +79,11 @@ def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
 
 
 def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
-    """Load a build; raises CoreUnavailable unless it was made from the sources beside it and has the interface declared here."""
+    """Load the build of the core for a level, such as "x86-64-v3", and return the library.
+
+    Raises CoreUnavailable if the file is missing, cannot be loaded, was built from other sources than those of this checkout, or has
+    another interface than the one declared here.
+    """
     file = library_file(level, folder)
     if not file.exists():
         raise CoreUnavailable(f"there is no {file}: {_remedy(level)}")
@@ -91,14 +100,20 @@ def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
 
 
 def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., Any]:
-    """Return a function of the core by its name without the prefix `mobee_`; ctypes releases the GIL while it runs."""
+    """Return a function of the core; `name`: without the prefix `mobee_`.
+
+    `arguments`, `result`: the ctypes types of its arguments and its result. Python's global lock (GIL) is released while it runs.
+    """
     found = library()[f"mobee_{name}"]
     found.argtypes, found.restype = arguments, result
     return found
 
 
 def address(array: NDArray[Any]) -> int:
-    """Return the address of the first number of a C-contiguous array; the caller keeps the array alive."""
+    """Return the memory address of the first number of an array; the caller must keep the array alive while the core uses it.
+
+    Raises ValueError if the array is not C-contiguous and aligned.
+    """
     flags = array.flags
     if flags.carray:  # writable: this gives the same address as `array.ctypes.data`, in a quarter of the time
         return ctypes.addressof(_NOTHING.from_buffer(array))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks straight motions between poses; declares core/edges.cpp."""
+"""Checks straight motions between poses for contacts; declares core/edges.cpp."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ _sweep = function("sweep", ADDRESS, result=INTEGER)
 
 
 def sweep(near: Sequence[int], q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
-    """Return which edges (E, 2) between poses q (V, n) are free of contact, (E,), and how many poses were checked.
+    """Return for each edge, a straight motion between two poses, whether it is free of contacts, (E,), and how many poses were checked.
 
-    `near`: addresses of neighbour lists, see `Following`, one for each thread, all in one world; the caller keeps them alive.
-    `between` (E,): how many poses to check between the ends; the ends themselves are not checked.
+    `near`: addresses of neighbour lists (`mobee._core.engine.Following.at`), one for each thread, all in the same world; the caller keeps
+    the lists alive. `q`: (V, n) rad, poses. `edges`: (E, 2) indices of poses. `between` (E,): number of poses to check between the two
+    ends, which are not checked.
     """
     free = np.empty(len(edges), dtype=np.bool_)
     users = (ADDRESS * len(near))(*near)

@@ -26,7 +26,7 @@ MANY = 128  # contacts for which a new room has space
 
 
 class Handle:
-    """The owner of an object of the core."""
+    """The owner of an object of the core, which is freed together with this object; `at`: the memory address of the core's object."""
 
     __slots__ = ("__weakref__", "_free", "_kept", "at")
 
@@ -111,7 +111,8 @@ _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 evaluate_one = function("evaluate_one", result=INTEGER)
-"""Evaluate one pose, given `Room.asked` and the bytes of q (n,); returns the number of contacts. Undeclared arguments pass faster."""
+"""Evaluate one pose and return the number of its contacts. Arguments: `Room.asked`, and the pose q (n,) rad as bytes of float64. The
+contacts are written into `Room.rows`, the projection into `Room.torque`. The argument types are not declared, because this is faster."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -129,37 +130,51 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
 def robot(numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]) -> Handle:
-    """Return a robot of the core, made from tables that the core copies; see mobee/model/robot_tables.py."""
+    """Make a robot of the core from tables, which the core copies, and return its handle.
+
+    `numbers`, `arrays`: by name, as `mobee.model.robot_tables.RobotTables.for_core` returns them.
+    """
     tables = _RobotTables(**numbers, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 
 def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
-    """Return a scene of the core: a robot and the objects of a world.
+    """Make a scene of the core, a robot and the objects of a world, and return its handle.
 
-    `volumes` and `roles`: of each object. `carried`: indices of the objects that the robot carries. `side`: number of grid cells along the
-    longest side, see mobee/model/engine.py.
+    `of`: handle of the robot. `volumes` (N,) and `roles` (N,): of the world's objects, as in `mobee.model.snapshot.Snapshot`. `carried`:
+    indices of the objects that the robot carries. `side`: number of cells along the longest side of the grid into which the free objects
+    are sorted.
     """
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
 
 
 def link_poses(of: Handle, q: Array, links: int) -> Array:
-    """Return the transforms (B, L, 4, 4) of all links to the root frame, in the poses q (B, n) [rad]."""
+    """Return the transforms (B, L, 4, 4) of all links in the poses q (B, n) rad, root frame.
+
+    A transform maps a point's position at zero pose to its position at q. `of`: handle of the robot. `links`: their number L.
+    """
     out = np.empty((len(q), links, 4, 4))
     _link_poses(of.at, q.tobytes(), len(q), address(out))
     return out
 
 
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
-    """Return the Jacobians (B, 6, n) of a point of a link in the poses q (B, n) [rad]; `point` (3,) [m]: root frame, at zero pose."""
+    """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular, root frame.
+
+    `of`: handle of the robot. `link`: index. `point` (3,) m: position of the point in the root frame at zero pose.
+    """
     out = np.empty((len(q), 6, q.shape[1]))
     _jacobians(of.at, q.tobytes(), len(q), link, point.tobytes(), address(out))
     return out
 
 
 class Room:
-    """The buffers of an evaluation; they are reused, since allocating memory takes longer than evaluating a pose."""
+    """The buffers of an evaluation, for one thread at a time; they are reused, because allocating memory takes longer than one pose.
+
+    `rows`: buffer for the contacts of `evaluate_one`, at most `most` of them. `torque`: buffer for their projection. `asked`: the first
+    argument of `evaluate_one`.
+    """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
 
@@ -167,16 +182,18 @@ class Room:
         self._handle = Handle(_room_new(), _room_free)
         self._at = self._handle.at
         self.torque = np.empty(motors)
-        """The projection of the contacts to the motors that `evaluate_one` writes, (n,)."""
+        """The projection of the contacts of fields to the motors, (n,) m^2/rad, into which `evaluate_one` writes."""
         self._request = _RequestOfOne(room=self._at, torque=address(self.torque))
         self.asked = ctypes.byref(self._request)
-        """The arguments of `evaluate_one`, see `ask`."""
+        """The first argument of `evaluate_one`: scene, hands and buffers, set by `ask` and `make_space`."""
         self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
-        """Return the rows of all contacts in the poses q (B, n), (c, NUMBERS) and (c, REALS), and their projection to the motors (B, n).
+        """Return the contacts in the poses q (B, n) rad, and the projection of the contacts of fields to the motors, (B, n) m^2/rad.
 
-        `hands`: the links that are reaching; targets do not repel them. `cut`: a contact acts only on the motors of its own part.
+        The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. `scene`: its
+        handle. `hands`: four links of reaching hands (`mobee.model.snapshot.hand_numbers`), which targets do not repel. `cut`: whether a
+        contact acts only on the motors of its own part. `threads`: their number.
         """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
@@ -184,20 +201,24 @@ class Room:
         return *_rows(_room_rows, self._at, count), torque
 
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        """Set the arguments of the next calls of `evaluate_one`, see `evaluate`; the caller keeps the scene alive."""
+        """Set scene, hands and `cut` for the next calls of `evaluate_one`; they have the meanings as in `evaluate`.
+
+        The caller keeps the scene alive.
+        """
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
     def make_space(self, most: int) -> None:
-        """Allocate the buffer in which `evaluate_one` writes up to `most` contacts."""
+        """Allocate the buffer `rows`, into which `evaluate_one` writes up to `most` contacts."""
         self.most, self.rows = most, bytearray(most * ROW_BYTES)
         self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:
-    """A neighbour list of a robot in a scene, which is reused from pose to pose; for one thread at a time.
+    """A neighbour list of a robot in a scene: the pairs of volumes that are near each other, for consecutive poses; for one thread.
 
-    `at` is the address of the list in the core, which a plant of the core uses. It is valid after `enter`, while this object exists.
-    `skin`: distance [m] that volumes may move before the list is made again. `cut`: see `Room.evaluate`.
+    `skin`: m; pairs nearer than this are in the list, which is made again when two volumes may have approached each other by the skin.
+    `cut`: whether a contact acts only on the motors of its own part. `at`: address of the list in the core, which a plant of the core uses;
+    it is valid after `enter`, while this object exists.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -206,19 +227,25 @@ class Following:
         self._scene: Handle | None = None
 
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
-        """Set the scene and the reaching hands; targets do not repel these hands."""
+        """Set the scene, by its handle, and the reaching hands, four links as in `Room.evaluate`, which targets do not repel."""
         self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)
         _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
-        """Return contacts and their projection to the motors as `Room.evaluate` does, for consecutive poses q (B, n) [rad]."""
+        """Return the contacts in the consecutive poses q (B, n) rad, and the projection of those of fields to the motors, (B, n) m^2/rad.
+
+        The contacts are numbers (c, 6) and reals (c, 7), as in `Room.evaluate`.
+        """
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return the list's state (0 empty, 1 pose, 2 list, 3 pose with outdated list), the pairs in it, and the poses it was used for."""
+        """Return three numbers, for tests: the state of the list, the number of pairs in it, and for how many poses it was used.
+
+        States: 0 empty, 1 only the last pose is stored, 2 a list, 3 the last pose, and the list is outdated.
+        """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
         remembered, listed, served = found.tolist()
@@ -226,28 +253,39 @@ class Following:
 
 
 def sines_cosines(angles: Array) -> tuple[Array, Array]:
-    """Return the sine and 1 - cosine of angles (n,) rad."""
+    """Return the sine and 1 - cosine of angles (n,) rad, two arrays (n,), as the core computes them."""
     sines, cosines = np.empty(len(angles)), np.empty(len(angles))
     _sines_cosines(address(angles), len(angles), address(sines), address(cosines))
     return sines, cosines
 
 
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
-    """Return bounds (S, L) m of how far each shape moves relative to each link, from the joint angles `then` (J,) to `now` (J,)."""
+    """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
+
+    Column k is the motion as seen from the link that carries both the shape and link k. `of`: handle of the robot. `then`, `now`: (J,)
+    joint positions [rad or m]. `shapes`: their number S.
+    """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
     return out
 
 
 def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
-    """Return all shapes (S,), `VOLUME` of mobee._core.narrow, at q (n,), in the order of the robot's tables."""
+    """Return all shapes of a robot at q (n,) rad, (S,) rows of `mobee._core.narrow.VOLUME`, in the order of the robot's tables.
+
+    `of`: handle of the robot. `shapes`: their number S.
+    """
     out = np.zeros(shapes, dtype=VOLUME)
     _place(of.at, address(q), address(out))
     return out
 
 
 class Grid(NamedTuple):
-    """The grid of a scene, in which objects are sorted by cell; large objects come first."""
+    """The grid of a scene, in which the free objects of the world are sorted by cell.
+
+    `large`: number of large objects, which come first and are in no cell. `cells`: number of cells along x, y and z. `starts`: (cells + 1,)
+    first object of each cell. `objects`: (N, 2), index of each object in the world, and whether it is a target. `centers`: (N, 3) m.
+    """
 
     large: int
     cells: tuple[int, ...]  # along x, y and z
@@ -257,7 +295,7 @@ class Grid(NamedTuple):
 
 
 def grid_of(scene: Handle) -> Grid:
-    """Return the grid of a scene."""
+    """Return the grid of a scene, for tests; `scene`: its handle."""
     counts = np.empty(5, dtype=np.int64)
     _scene_counts(scene.at, address(counts))
     objects, large, *cells = counts.tolist()
@@ -267,9 +305,9 @@ def grid_of(scene: Handle) -> Grid:
 
 
 def span(offset: float, along: float, per_metre: float, cells: int) -> tuple[int, int]:
-    """Return the first cell that an object overlaps in a row of `cells` grid cells, and the cell after the last one.
+    """Return the index of the first cell that an object overlaps in a row of `cells` grid cells, and the index after the last such cell.
 
-    `offset`: of the object's centre from the start of the row [m]; `along`: half its size [m]; `per_metre`: cells in 1 m.
+    `offset`: distance of the object's centre from the start of the row [m]; `along`: half the object's size [m]; `per_metre`: cells in 1 m.
     """
     out = np.empty(2, dtype=np.int64)
     _span(offset, along, per_metre, cells, address(out))

@@ -19,17 +19,17 @@ MOTOR_GAINS = columns(
 CLAUSE_ROW = np.dtype([("offset", "f8"), ("zone", "f8"), ("entries", INTERVAL)])
 CLAUSE_ENTRY = np.dtype([("motor", WHOLE), ("factor", "f8"), ("normal", "f8")])
 STATE = columns("velocity", "acceleration", "commanded", "reference", "feedforward", "goal_velocity", "goal_time")
-"""The state of a motor under the law: velocity, acceleration, last velocity command, position reference, feedforward torque [N m]; the
-velocity of an attractor that moves, and the time for which it is valid [s]."""
+"""The type of the state of a motor under the law: velocity [rad/s], acceleration [rad/s^2], last velocity command [rad/s], position
+reference [rad], feedforward torque [N m]; the velocity of an attractor that moves [rad/s], and the time for which it is valid [s]."""
 SETTLE = ("speed", "acceleration", "first_check", "interval", "timeout")
 
 TERM_GAINS = ("max_constraint", "contact_gain", "contact_slope", "max_contact")
-"""The numbers of the terms that are common to all motors, by their names in `Gains`."""
+"""The gains that are common to all motors, by their names in `mobee.control.gains.Gains`."""
 MODALITIES = ("position", "velocity", "torque")
 
 
 class Settle(ctypes.Structure):
-    """The thresholds of the settle test."""
+    """The thresholds and times of the settle test, as the core has them (`mobee.control.gains`): speed, acceleration, and times [s]."""
 
     _fields_ = tuple((name, REAL) for name in SETTLE)
 
@@ -41,7 +41,7 @@ class SettleTest(ctypes.Structure):
 
 
 class Law(ctypes.Structure):
-    """A law with its gains; the caller keeps the tables alive."""
+    """The control law with its gains, as the core has it (core/law.hpp); the caller keeps the tables alive to which it points."""
 
     _fields_ = (
         *((name, View) for name in ("motors", "active", "constrained", "parts", "clauses", "rows", "entries")),
@@ -71,7 +71,7 @@ _VECTOR, _TWIST = 3 * REAL, 6 * REAL
 
 
 class Reach(ctypes.Structure):
-    """A reach in progress; the caller keeps the tables alive."""
+    """A reach in progress, as the core has it (core/reach.hpp); the caller keeps the tables alive to which it points."""
 
     _fields_ = (
         *((name, INTEGER) for name in ("part", "to_surface", "turns_normal", "faces_target", "joint_count")),
@@ -85,7 +85,7 @@ class Reach(ctypes.Structure):
 
 
 class Calls:
-    """The compiled functions of core/law.cpp and core/reach.cpp."""
+    """The compiled functions of core/law.cpp and core/reach.cpp, as attributes; the C++ files document their arguments."""
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
@@ -97,18 +97,18 @@ class Calls:
 
 
 calls = cache(Calls)
-"""Return the functions; the library is loaded at the first call."""
+"""Return the compiled functions of the law and of reaching (`Calls`); the library is loaded at the first call."""
 
 
 @cache
 def term_names() -> tuple[str, ...]:
-    """Return the names of the forces, in the order in which the core fills and adds them."""
+    """Return the names of the forces of the law, in the order in which the core computes and adds them."""
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
     return tuple(term.decode() for term in takewhile(bool, map(name, count())))
 
 
 @cache
 def state_term_names() -> tuple[str, ...]:
-    """Return the names of the forces that depend on the law's state."""
+    """Return the names of the forces that depend on the state of the law (STATE), such as its velocity, not only on q and the contacts."""
     needs_state = function("law_needs_state", INTEGER, result=INTEGER)
     return tuple(name for index, name in enumerate(term_names()) if needs_state(index))

@@ -19,7 +19,10 @@ BAD_REWARD, BAD_OUTCOME, BAD_START = -1, -2, -3  # instead of the number of swee
 
 
 class Table(ctypes.Structure):
-    """`TransitionTable` of core/transitions.hpp; the caller keeps the arrays alive."""
+    """The addresses and sizes of the arrays of a transition model: `TransitionTable` of core/transitions.hpp.
+
+    The caller keeps the arrays alive.
+    """
 
     _fields_ = (
         *((name, ADDRESS) for name in ("probability", "outcome", "used")),
@@ -28,9 +31,11 @@ class Table(ctypes.Structure):
 
 
 class TransitionTable:
-    """A `Table` that keeps its arrays alive: probabilities and outcomes (S, A, B), C-contiguous.
+    """A transition model for the core: a `Table`, and the arrays to which it points, which are kept alive.
 
-    `used` (S, A): number of bins in use of each state-action; the bins after them have probability 0. None: all are in use.
+    `probabilities`, `outcomes`: (S, A, B), C-contiguous, probability and outcome (a state) of each bin of each state-action. `used` (S, A):
+    number of bins in use of each state-action; the bins after them have probability 0. None: all are in use. `at`: address of the `Table`.
+    `rows`: the shape (S, A).
     """
 
     def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
@@ -44,16 +49,20 @@ class TransitionTable:
 solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
     "value_iteration", ADDRESS, ADDRESS, ADDRESS, ADDRESS, REAL, REAL, INTEGER, INTEGER, result=INTEGER
 )
-"""Sweep until no value changes by the tolerance; returns the number of sweeps over all actions, or one of the error codes above.
+"""Compute values by sweeps until no value changes by the tolerance or more; return the number of sweeps over all actions, or an error.
 
 Arguments: the addresses of a `Table`, of the rewards (S, A), of the values (S,), which change in place, and of the action values (S, A),
 which are filled; the discount; the tolerance; whether the tolerance is in units of the largest reward; whether to run modified policy
-iteration.
+iteration. Errors: BAD_REWARD (-1), BAD_OUTCOME (-2) and BAD_START (-3).
 """
 
 
 class DebiasedCounts(ctypes.Structure):
-    """`DebiasedCounts` of core/observations.cpp; it keeps the arrays to which it points alive."""
+    """The debiased probabilities of a transition model for the core, `DebiasedCounts` of core/observations.cpp.
+
+    It keeps the arrays to which it points alive. `probabilities`: (S, A, B), which `believe` computes. `prior`: the weights of the weak
+    prior; `total`: their sum. `at`: address of the structure.
+    """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
 
@@ -64,9 +73,11 @@ class DebiasedCounts(ctypes.Structure):
 
 
 class OutcomeCounts(ctypes.Structure):
-    """`OutcomeCounts` of core/observations.cpp; it keeps the arrays to which it points alive. Observations write into these arrays.
+    """The counts of a transition model for the core, `OutcomeCounts` of core/observations.cpp; observations write into its arrays.
 
-    States, actions and outcomes are not checked here.
+    It keeps the arrays to which it points alive. `arrays`: by name of the field. `over_states`: number of states over which the reward is
+    computed, each imagined once; 0: over the bins of the state-action. `forgetting`: factor on earlier counts. `at`: address of the
+    structure. States, actions and outcomes are not checked.
     """
 
     _fields_ = (
@@ -91,29 +102,39 @@ class _NextCounts(ctypes.Structure):
 
 Observation = Callable[[int, int, int, int], float]
 gain: Observation = function("gain", ADDRESS, INTEGER, INTEGER, INTEGER, result=REAL)
-"""Return the reward [nats] of observing an outcome, without counting it; arguments: address of the counts, state, action, outcome."""
+"""Return the reward [nats] that the observation of an outcome would have, without counting it.
+
+Arguments: the address of the `OutcomeCounts`, and the indices of state, action and outcome.
+"""
 observe: Observation = function("observe", ADDRESS, INTEGER, INTEGER, INTEGER, result=REAL)
-"""Observe an outcome and return its reward; below 0 if it was not counted because the table needs one more bin."""
+"""Count an outcome and return its reward [nats]; a value below 0 means that it was not counted, because the arrays need one more bin.
+
+Arguments: the address of the `OutcomeCounts`, and the indices of state, action and outcome.
+"""
 believe: Callable[[int, int, int, int], None] = function("believe", ADDRESS, ADDRESS, INTEGER, INTEGER)
-"""Compute debiased probabilities anew from counts; arguments: addresses of `OutcomeCounts` and `DebiasedCounts`, state, action."""
+"""Compute the debiased probabilities of a state-action from its counts.
+
+Arguments: the addresses of the `OutcomeCounts` and of the `DebiasedCounts`, and the indices of state and action.
+"""
 _expected_gains = function("expected_gains", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 _deplete = function("deplete", ADDRESS, ADDRESS, ADDRESS, INTEGER, INTEGER, ADDRESS)
 
 
 def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: Ints, gains: Array) -> None:
-    """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try, in nats.
+    """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try [nats], in place.
 
-    `counts` (S, A, B): above 0 where the probability is above 0. `totals` (S, A): sums of `counts` over the bins. `tries` (S, A).
+    `counts` (S, A, B): the counts of the outcomes, above 0 wherever the probability is above 0. `totals` (S, A): sums of `counts` over the
+    bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
     """
     following = _NextCounts(address(counts), address(totals))
     _expected_gains(table.at, ctypes.addressof(following), address(tries), address(gains))
 
 
 def deplete(table: TransitionTable, counts: Array, totals: Array, action_values: Array, state: int, steps: int, gains: Array) -> None:
-    """Simulate `steps` best actions from a state, each with its most likely outcome, and reduce the `gains` (S, A) of these actions.
+    """Simulate the next `steps` best actions from a state, each with its most likely outcome, and reduce the gains of these actions.
 
-    Each gain is reduced as an observation of that outcome would reduce it. `action_values` (S, A): -inf where there is no action. For
-    the other arguments see `expected_gains`.
+    `gains` (S, A), nats, changes in place: each gain is reduced as an observation of that outcome would reduce it. `counts` (S, A, B),
+    `totals` (S, A): the counts of the outcomes, and their sums over the bins. `action_values` (S, A): -inf if there is no such action.
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))
@@ -136,11 +157,12 @@ _gaussian_sums = function("gaussian_sums", ADDRESS, INTEGER, INTEGER, ADDRESS, I
 def weighted_sums(
     targets: Array, keys: Ints, sums: Array, sizes: tuple[int, int], weighing: tuple[float, float], target: Array, out: Array
 ) -> None:
-    """Add to `out` (2, actions) the weighted sum of each action's values on targets near `target` (3,) m, and the sum of the weights.
+    """Sum the recorded values of each action, weighted by the distance of their targets from `target` (3,) m.
 
-    `targets` (..., 3) m; `keys` (..., 2): action and index of the target of each entry; `sums` (..., 2): sum and number of its values;
-    `sizes`: number of targets and of entries.  `weighing`: a scale and a largest distance [m]: the weight of a target at a distance d is
-    1 / (1 + d / scale), and 0 beyond the largest distance.
+    `out` (2, actions): the sums of the weighted values, and the sums of the weights, are added to it. `targets` (..., 3) m: the targets of
+    the record. `keys` (..., 2): action and index of the target of each entry of the record; `sums` (..., 2): sum and number of the values
+    of each entry; `sizes`: number of targets and of entries.  `weighing`: a scale and a largest distance [m]: the weight of a target at a
+    distance d is 1 / (1 + d / scale), and 0 beyond the largest distance.
     """
     history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
     totals = address(out)
@@ -148,8 +170,9 @@ def weighted_sums(
 
 
 def gaussian_sums(asked: Array, events: Array, sums: Array) -> None:
-    """Add to `sums` (2, n), for each of the points `asked` (n, d), the weighted sum of the events' values, and the sum of the weights.
+    """Sum the values of events for each of the n points `asked` (n, d), weighted by their distances.
 
-    `events` (..., d + 1): rows of a point and a value.  The weight of an event at a distance r is exp(-r^2 / 2).
+    `events` (..., d + 1): each row is a point (d numbers) and a value.  The weight of an event at a distance r is exp(-r^2 / 2). `sums`
+    (2, n): the sum of the weighted values, and the sum of the weights, of each point are added to it.
     """
     _gaussian_sums(address(asked), *asked.shape, address(events), len(events), address(sums))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Least squares from many starts; declares core/least_squares.cpp."""
+"""Inverse kinematics by least squares from many starts; declares core/least_squares.cpp."""
 
 from __future__ import annotations
 
@@ -30,10 +30,12 @@ _descend = function("descend", ADDRESS, result=INTEGER)
 def descend(
     robot: Handle, aims: Ints, goals: Array, free: Ints, limits: tuple[Array, Array], steps: int, q: Array, threads: int
 ) -> tuple[int, Array]:
-    """Move the free motors (d,) of every start q (B, n), in place, towards the aims; return the poses evaluated and residuals (B, K).
+    """Move the free motors of every start pose so that it satisfies the aims, by least squares; `q` (B, n) rad changes in place.
 
-    `aims` (K, 4): `Aim` of core/aims.hpp. `goals`: `Goal`s of all aims, in one row for all starts, or one row for each. `limits`: the
-    lowest and the highest positions (d,) rad. `steps`: maximum number for one start.
+    Return the number of poses that were evaluated, and the residuals (B, K) of the K aims. `robot`: its handle. `aims` (K, 4): rows `Aim`
+    of core/aims.hpp (kind, first link, second link, motor). `goals`: `Goal`s of all aims (core/aims.hpp), in one row for all starts or in
+    one row for each start. `free` (d,): indices of the free motors. `limits`: their lowest and highest positions, each (d,) rad. `steps`:
+    largest number of steps for a start.
     """
     residuals = np.empty((len(q), len(aims)))
     low, high = limits

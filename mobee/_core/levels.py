@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The builds of the core, one for each x86-64 level and a generic one elsewhere, and which one runs on this processor.
+"""The builds of the core, one for each x86-64 level and a generic one on other machines, and the choice of one for this processor.
 
-It imports nothing but Python's own modules: core/build.py loads this file where the library's dependencies are not installed.
+This module imports only Python's own modules, because core/build.py loads it before the library's dependencies are installed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ FOLDER = Path(__file__).resolve().parent
 SOURCES = FOLDER.parents[1] / "core"  # in a checkout, and where a wheel is built; an installed library has none
 GENERIC = "generic"
 SANITIZED = "sanitized"
-"""The build that stops at the first wrong address or undefined operation; see core/build.py."""
+"""The name of the build that stops at the first wrong address or undefined operation, for tests; made by core/build.py --sanitize."""
 
 # What each level needs beyond the one before, as the kernel names it in /proc/cpuinfo.
 NEEDS = {
@@ -27,14 +27,14 @@ NEEDS = {
 
 
 def machine_levels() -> tuple[str, ...]:
-    """Return the names of the builds for this kind of machine, the lowest level first."""
+    """Return the names of the builds for this kind of machine, such as "x86-64-v2", the lowest level first; ("generic",) on others."""
     if sys.platform == "linux" and platform.machine() == "x86_64":
         return tuple(NEEDS)
     return (GENERIC,)
 
 
 def missing(level: str, flags: Iterable[str]) -> list[str]:
-    """Return the flags that a level needs and that are not among the processor's flags; empty if the level is unknown."""
+    """Return the processor flags that a level needs and that are not in `flags`, sorted; empty if the level is unknown."""
     if level not in NEEDS:
         return []
     needed = [flag for name in NEEDS if name <= level for flag in NEEDS[name]]
@@ -48,7 +48,7 @@ def possible_levels(flags: Iterable[str]) -> list[str]:
 
 
 def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
-    """Return the flags of this processor from /proc/cpuinfo; without that file, those of x86-64-v2."""
+    """Return the flags of this processor, as the kernel gives them in the file `cpuinfo`; without that file, the flags of x86-64-v2."""
     try:
         lines = cpuinfo.read_text().splitlines()
     except OSError:
@@ -61,17 +61,17 @@ def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
 
 
 def library_file(level: str, folder: Path = FOLDER) -> Path:
-    """Return the path of a build's file."""
+    """Return the path of the library file of a build in `folder`; `level`: name of the build."""
     return folder / f"core-{level}.{'dylib' if sys.platform == 'darwin' else 'so'}"
 
 
 def source_files() -> list[Path]:
-    """Return all files from which a build is made, sorted by name."""
+    """Return the paths of all files from which a build of the core is made, sorted by name."""
     return sorted([*SOURCES.rglob("*.hpp"), *SOURCES.rglob("*.cpp"), SOURCES / "build.py"])
 
 
 def fingerprint() -> str:
-    """Return a hash of the sources and of the build script; each library contains the hash of the sources from which it was built."""
+    """Return a hash (16 hexadecimal digits) of the core's sources and build script; each library contains the hash of its own sources."""
     digest = hashlib.sha256()
     for source in source_files():
         digest.update(source.relative_to(SOURCES).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")

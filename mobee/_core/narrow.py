@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Batches of volume pairs for tests and benchmarks of the narrow phase."""
+"""Overlaps and distances of many pairs of volumes, for tests and benchmarks of the core's narrow phase."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ VOLUME = np.dtype(
     ],
     align=True,
 )
-"""`Volume` of core/volume.hpp; the last four are its hull."""
+"""The type of a placed volume, `Volume` of core/volume.hpp; the last four members are the corners and edges of a hull."""
 
 TOUCH = np.dtype([("normal", np.float64, 3), ("point", np.float64, 3)])
 
@@ -53,7 +53,11 @@ class Volumes:
             raise RuntimeError("the library's volumes have another layout than these")
 
     def place(self, at: int, kind: str, half: Sequence[float] | Reals, position: Reals, rotation: Reals) -> None:
-        """Set the volume at index `at`; `half`: (radius,), (radius, half height), half edges (3,), or () for a hull, see `hull`."""
+        """Set the volume at index `at`, with `position` (3,) m and `rotation` (3, 3) in the root frame.
+
+        `kind`: "sphere", "capsule", "cylinder", "box" or "convex". `half` [m]: (radius,); (radius, half height); half edges (3,); () for a
+        hull, whose corners are set by `hull`.
+        """
         row = self.table[at]
         size = np.zeros(3)
         size[: len(half)] = half
@@ -66,7 +70,10 @@ class Volumes:
             row["inverse"] = 1.0 / row["squared"] if row["squared"] > 0.0 else 0.0
 
     def hull(self, at: int, corners: Reals, neighbours: Sequence[Sequence[int]] | None = None) -> None:
-        """Set the corners (v, 3) m of the hull at index `at`; `neighbours`: for each corner, those to which an edge joins it."""
+        """Set the corners (v, 3) m of the hull at index `at`, relative to its position, along its own axes.
+
+        `neighbours`: for each corner, the indices of the corners to which an edge joins it; None: no edges, the core tries all corners.
+        """
         corners = np.ascontiguousarray(corners, dtype=np.float64)
         row = self.table[at]
         row["corners"], row["count"], row["bound"] = address(corners), len(corners), np.linalg.norm(corners, axis=1).max()
@@ -78,7 +85,7 @@ class Volumes:
             self._kept += [starts, edges]
 
     def taken(self, at: NDArray[np.int64]) -> Volumes:
-        """Return the volumes at these indices, in this order."""
+        """Return a new array with the volumes at these indices, in this order."""
         taken = Volumes(0)
         taken.table, taken._kept = self.table[at], self._kept
         return taken
@@ -88,7 +95,10 @@ class Volumes:
 
 
 def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
-    """Return depths (p,) m and touches (p,) `TOUCH` of p pairs of volumes, first[i] with second[i]; NaN where a pair does not touch."""
+    """Return the depths (p,) m and the touches (p,) of p pairs of volumes, first[i] with second[i]; NaN for a pair that does not touch.
+
+    A touch is a row of TOUCH: normal (3,) and point (3,) m, root frame.
+    """
     depth, touch = np.empty(len(first)), np.zeros(len(first), dtype=TOUCH)
     touch["normal"] = touch["point"] = np.nan
     _overlap(*_pairs(first, second), address(depth), address(touch))
@@ -96,16 +106,16 @@ def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
 
 
 def distances(first: Volumes, second: Volumes) -> Reals:
-    """Return the distances (p,) m of p pairs of volumes, first[i] from second[i]."""
+    """Return the distances (p,) m of p pairs of volumes: of first[i] from second[i]."""
     apart = np.empty(len(first))
     _distance(*_pairs(first, second), address(apart))
     return apart
 
 
 def cut(points: Reals, line: Reals, room: int) -> Reals:
-    """Clip a convex polygon (n, 2) by a half-plane; return the clipped polygon, which has at most `room` corners.
+    """Clip a convex polygon `points` (n, 2) by a half-plane; return the clipped polygon (k, 2), k at most `room`, for tests.
 
-    `line` (4,): a point on the border of the half-plane, and its inward normal.
+    `line` (4,): a point (2 numbers) on the border of the half-plane, and the border's inward normal (2 numbers).
     """
     points, line, out = np.ascontiguousarray(points, float), np.ascontiguousarray(line, float), np.full((room + 8, 2), np.nan)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or line.shape != (4,):

@@ -29,13 +29,14 @@ STATE = columns(
 )
 MODES = ("position", "velocity", "torque", "hold")
 PART = np.dtype([("motors", INTERVAL), ("under_way", WHOLE), ("verdict", WHOLE), ("start", "f8"), ("next_check", "f8")])
-"""A part and its action, see `PartAction`."""
+"""The type of a part and its action, `PartAction` of core/plant.cpp: its motors, whether an action is under way, how the last action ended
+(`verdict`), and the times of the settle test [s]."""
 RECORD_DEPTHS = 2
 ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
 
 
 class Motors(ctypes.Structure):
-    """The motors; the caller keeps the tables alive."""
+    """The motors of a plant, as the core has them (core/motors.cpp); the caller keeps the tables alive to which it points."""
 
     _fields_ = (
         ("living", View), ("constants", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
@@ -44,7 +45,10 @@ class Motors(ctypes.Structure):
 
 
 class Braking(ctypes.Structure):
-    """Limits of references, each (n,), and the commanded velocities; the caller keeps the arrays alive."""
+    """The limits of the references of n motors, and their commanded velocities, each (n,), as the core has them.
+
+    The caller keeps the arrays alive.
+    """
 
     _fields_ = (
         ("count", INTEGER), ("lower", ADDRESS), ("upper", ADDRESS), ("fastest", ADDRESS), ("change", ADDRESS), ("velocity", ADDRESS),
@@ -53,7 +57,7 @@ class Braking(ctypes.Structure):
 
 
 class Plant(ctypes.Structure):
-    """A plant; the caller keeps alive everything that it points to."""
+    """A plant, as the core has it (core/plant.cpp); the caller keeps everything alive to which it points."""
 
     _fields_ = (
         *((name, ADDRESS) for name in ("neighbours", "law", "law_state", "attractor", "client", "forces")),
@@ -69,11 +73,11 @@ STRUCTURES = (
     law.MOTOR_GAINS, law.CLAUSE_ROW, law.CLAUSE_ENTRY, law.STATE, law.Law, law.DRIVE, law.JOINT, law.PULLED, law.Reach,
     CONSTANTS, STATE, Motors, PART, Plant,
 )  # fmt: skip
-"""All structures that are declared both here and in the core."""
+"""All structures that are declared both in Python and in the core; a test compares their sizes."""
 
 
 class Calls:
-    """The compiled functions that the plant calls."""
+    """The compiled functions of core/motors.cpp and core/plant.cpp, as attributes; the C++ files document their arguments."""
 
     def __init__(self) -> None:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER)
@@ -93,4 +97,4 @@ class Calls:
 
 
 calls = cache(Calls)
-"""Return the functions; the library is loaded at the first call."""
+"""Return the compiled functions of motors and plants (`Calls`); the library is loaded at the first call."""

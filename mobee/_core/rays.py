@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws convex volumes by one ray a pixel, and surfaces of triangles; declares core/rays.cpp and core/triangles.cpp."""
+"""Draws convex volumes by one ray for each pixel, and surfaces of triangles; declares core/rays.cpp and core/triangles.cpp."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ CONVEX = np.dtype(
     ],
     align=True,
 )
-"""`Convex` of core/picture.hpp; `planes` is an address, and the caller keeps the planes alive."""
+"""The type of a convex volume to be drawn, `Convex` of core/picture.hpp; `planes` is the address of the planes of a hull, which the caller
+keeps alive."""
 
 SURFACE = np.dtype(
     [
@@ -42,7 +43,8 @@ SURFACE = np.dtype(
     ],
     align=True,
 )
-"""`Surface` of core/picture.hpp; the addresses are of float32 (v, 3), float32 (v, 3) and int32 (t, 3), which the caller keeps alive."""
+"""The type of a surface of triangles to be drawn, `Surface` of core/picture.hpp. `corners`, `normals` and `triangles` are addresses of
+arrays float32 (v, 3), float32 (v, 3) and int32 (t, 3), which the caller keeps alive."""
 
 KINDS = ("sphere", "capsule", "cylinder", "box", "convex")
 
@@ -72,10 +74,10 @@ class _Light(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chosen:
-    """Some pixels of a picture, numbered row by row.
+    """K chosen pixels of a picture (H, W), numbered row by row.
 
-    `before` (H, W + 1): the number of chosen pixels before each pixel, and before the end of each row.  `columns` (K + 3,): that of each;
-    the last three are of no pixel.
+    `before` (H, W + 1): the number of chosen pixels before each pixel, and before the end of each row.  `columns` (K + 3,): the column of
+    each chosen pixel, then three zeros that belong to no pixel.
     """
 
     before: NDArray[np.int32]
@@ -83,7 +85,7 @@ class Chosen:
 
     @classmethod
     def of(cls, mask: NDArray[np.bool_]) -> Chosen:
-        """Return the pixels of a mask (H, W)."""
+        """Return the pixels that are True in a mask (H, W)."""
         before = np.zeros((mask.shape[0], mask.shape[1] + 1), np.int32)
         before[:, 1:] = np.cumsum(mask.ravel()).reshape(mask.shape)
         before[1:, 0] = before[:-1, -1]
@@ -99,8 +101,8 @@ class Chosen:
 class Lamp:
     """A lamp far away, in the direction `towards` (3,), a unit vector in the root frame.
 
-    `ambient`: brightness of a surface that is turned away from it; `diffuse`: how much brighter one is that faces it.  `nothing`: red,
-    green and blue, 0 to 255, of a pixel that shows nothing.
+    `ambient`: brightness, as a factor on the colour, of a surface that is turned away from the lamp; `diffuse`: what is added to it for a
+    surface that faces the lamp.  `nothing`: red, green and blue, 0 to 255, of a pixel that shows neither volume nor surface.
     """
 
     towards: tuple[float, float, float]
@@ -111,10 +113,11 @@ class Lamp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """The rays of a picture: through column i and row j, at x = left + i step and y = top + j step of the plane 1 m ahead of `origin`.
+    """The rays of a picture of height x width pixels, one for each pixel.
 
-    `axes` (3, 3): rows are right, down and ahead, in the root frame.  In a parallel picture all rays run along ahead, and x and y are
-    metres.  A surface nearer than `nearest` m is not drawn.
+    The ray of column i and row j passes through the point x = left + i step, y = top + j step of the plane 1 m ahead of `origin` (3,) m.
+    `axes` (3, 3): the rows are the directions right (x), down (y) and ahead of the camera, in the root frame.  `perspective`: True: all
+    rays begin at `origin`; False: all rays are parallel to ahead, and x and y are in m.  A surface nearer than `nearest` m is not drawn.
     """
 
     axes: Array
@@ -137,10 +140,11 @@ _surface_size = function("surface_size", result=INTEGER)
 def cast(
     volumes: NDArray[np.void], surfaces: NDArray[np.void], rays: Rays, chosen: Chosen | None = None
 ) -> tuple[Floats, NDArray[np.int32], Floats]:
-    """Return the first volume or surface that each ray hits, among volumes (N,) `CONVEX` and surfaces (M,) `SURFACE`.
+    """Find the first volume or surface that each ray hits; return three arrays: depths, indices and normals.
 
-    Depths (H, W) m along the axis ahead, infinite where there is nothing; indices of volumes, or numbers of surfaces, (H, W), -1 where
-    there is nothing; and outward normals (H, W, 3), root frame.  With `chosen` pixels the shapes are (K,) and (K, 3).
+    `volumes`: (N,) rows of CONVEX. `surfaces`: (M,) rows of SURFACE. Depths (H, W) m are along the axis ahead, infinite if the ray hits
+    nothing. Indices (H, W) are those of volumes, or the numbers of surfaces, -1 for nothing. Normals (H, W, 3) point outward, root frame.
+    With K `chosen` pixels only their rays are computed, and the shapes are (K,), (K,) and (K, 3).
     """
     for table, row, size in ((volumes, CONVEX, _convex_size()), (surfaces, SURFACE, _surface_size())):
         if table.dtype != row or row.itemsize != size:
@@ -159,9 +163,10 @@ def cast(
 
 
 def shade(which: NDArray[np.int32], normal: Floats, pixels: NDArray[np.int64], colors: Floats, lamp: Lamp, brightness: Floats) -> None:
-    """Add to the brightness (K, 3) of pixels, red, green and blue, 0 to 255, that of what their rays meet.
+    """Add the colours of what R rays hit to the brightness of K pixels, in place.
 
-    `which` (R,) and `normal` (R, 3): as of `cast`; `pixels` (K,): indices of rays; `colors` (N, 3): 0 to 255, by number.
+    `brightness` (K, 3): red, green and blue, 0 to 255. `which` (R,) and `normal` (R, 3): index of the hit volume or surface, and its
+    normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): 0 to 255, by index.
     """
     arrays = (address(array) for array in (which, normal, pixels, colors, brightness))
     towards, nothing = (REAL * 3)(*(float(np.float32(one)) for one in lamp.towards)), (ctypes.c_float * 3)(*lamp.nothing)

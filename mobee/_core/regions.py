@@ -26,7 +26,11 @@ _regions = function("regions", ADDRESS, result=INTEGER)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
-    """A region without holes: its outline (m, 2) px, column and row, by the angle about its middle; its area and that of its hull, px."""
+    """A region of a colour in a picture, without holes.
+
+    `outline`: (m, 2) px, column and row of its points, in the order of their angle about the middle of the region. `area`: number of
+    pixels. `hull`: area of the convex hull of the outline, in pixels.
+    """
 
     outline: NDArray[np.float64]
     area: int
@@ -34,12 +38,14 @@ class Region:
 
 
 def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Region]:
-    """Return the regions of a colour, those connected by corners one after the other, and within them those connected by sides.
+    """Return the regions of a colour in a picture: sets of pixels of this colour that are connected by their sides.
+
+    Regions that are connected with each other only by corners of pixels follow each other in the result.
 
     Args:
-        likeness: how much of the colour is in each pixel (H, W), 0 for none; linear in the share of the pixel that has the colour.
-        least: px, area of the smallest region.
-        around: px, odd, side of the square in which the colour of a whole pixel is looked up.
+        likeness: how much of the colour is in each pixel (H, W), 0 for none; proportional to the fraction of the pixel with the colour.
+        least: smallest area of a region, in pixels.
+        around: side, in pixels (odd), of the square in which the likeness of a pixel that is completely of the colour is searched.
     """
     likeness = np.ascontiguousarray(likeness, dtype=np.float32)
     smallest = max(1, int(np.ceil(least)))

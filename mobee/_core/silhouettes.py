@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distances of an outline's points from the silhouette of a shape, and their slopes; declares core/silhouettes.cpp."""
+"""Distances of an outline's points from the silhouette of a shape, and their derivatives; declares core/silhouettes.cpp."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _silhouette = function("silhouette", ADDRESS)
 
 
 class Silhouette:
-    """The outline of a shape in the picture of one camera, against which the shape's silhouette is compared again and again."""
+    """The outline of a shape in the picture of one camera, with which the computed silhouette of the shape is compared many times."""
 
     def __init__(
         self,
@@ -46,17 +46,19 @@ class Silhouette:
         turns: bool,
         shifts: tuple[float, float, float],
     ) -> None:
-        """Arrays as in core/silhouettes.cpp.
+        """Store the outline for the core; the arrays are those of core/silhouettes.cpp.
 
         Args:
-            camera: its origin (3,) m and rotation (3, 3), columns right, down and ahead, and the factors of its errors, noise and bias.
-            number: of this camera, and of all cameras.
-            flat: points (m, 2) of the outline in the plane at distance 1.
-            inverse: a step in that plane by a step of pixels, (m, 2, 2).
-            normals: of the lines that touch the silhouette, (K, 2).
-            length_of: which length each of the three axes of the shape has.
-            turns: the angle about the vertical is unknown, too.
-            shifts: px of an outline along column and row, outwards, and of those in all pictures together.
+            camera: the camera's origin (3,) m, its rotation (3, 3) with the columns right, down and ahead, and the factors (6, k) of its
+                errors, first of the noise, then of the bias: three displacements and three rotations for each unknown.
+            number: the index of this camera, and the number of cameras.
+            flat: points (m, 2) of the outline in the plane at distance 1 of the camera.
+            inverse: derivative of the points in this plane by their positions in pixels, (m, 2, 2).
+            normals: normals of the K lines that touch the silhouette, (K, 2).
+            length_of: for each of the three axes of the shape, the index of its length; axes may have the same length.
+            turns: whether the angle of the shape about the vertical is unknown.
+            shifts: standard deviations, px, of three errors of an outline: a shift along column and row, a shift outwards, and a shift
+                that is common to the outlines in all pictures.
         """
         origin, view, noise, bias = camera
         self._kept = tuple(np.ascontiguousarray(array, dtype=np.float64) for array in (flat, inverse, normals, noise, bias))
@@ -83,14 +85,17 @@ class Silhouette:
         )
 
     def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
-        """Return the residuals (m,) px, positive outside the silhouette, and their slopes (m, p), which the next call overwrites.
+        """Return the distances of the m points from the silhouette, (m,) px, positive outside, and their derivatives (m, p).
+
+        The p columns are of the position (3), the lengths of the shape, the angle about the vertical (if unknown), and the errors. The next
+        call overwrites both arrays.
 
         Args:
-            position: of the shape's middle (3,) m.
-            turn: rotation of the shape's axes (3, 3).
-            touching: points (K, 3) m where lines along the normals touch the shape, from its middle in the camera's axes, and how far
-                their images are along the normals (K,).
-            errors: of the cameras and outlines, in standard deviations.
+            position: position of the shape's middle, (3,) m, root frame.
+            turn: rotation of the shape's axes, (3, 3), root frame.
+            touching: the points (K, 3) m at which lines along the normals touch the shape, relative to its middle, in the camera's axes,
+                and the distances (K,) of their images along the normals.
+            errors: the errors of the cameras and outlines, in standard deviations.
         """
         given, (offsets, farthest) = self._given, (np.ascontiguousarray(array, dtype=np.float64) for array in touching)
         errors = np.ascontiguousarray(errors, dtype=np.float64)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torso assist: moves the base of an arm so that the target is where the arm reaches well (thesis 9.4.2).
+"""Torso assist: moves the base of an arm so that the target is at a place that the arm reaches well (thesis 9.4.2).
 
-How well it reaches is a function of the place in the frame of the arm's base link with that link at home: the map of a reach learner, which
-has learned with the torso at home, or the manipulability of the arm.
+The quality of a place is a function of its position relative to the arm's base link, with that link at home: the rewards that a reach
+learner predicts, which has learned with the torso at home, or the manipulability of the arm.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ from mobee.model.model import Model
 from mobee.robot.robot import Robot
 
 Worth = Callable[[Array], Array]
-"""How well an arm reaches for places (k, 3) m, with its base at home: (k,) numbers, at most 1; below 0 out of reach."""
+"""A function that takes places (k, 3) m, root frame, and returns how well an arm at home reaches them: (k,) numbers, at most 1.
+
+A number below 0 means out of reach.
+"""
 
 LEVELS = 7  # positions of each motor that are compared
 INSIDE = np.deg2rad(10.0)  # rad before each limit that are not used, at most a quarter of the range
@@ -32,7 +35,11 @@ SAMPLES, SPREAD = 4000, 0.05  # postures of the arm; m, over which the manipulab
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assistance:
-    """Where the part should be, `q` (n_part,) rad, and how well the arm reaches from there and from the present posture."""
+    """The result of `Assist.posture`.
+
+    `q`: (n_part,) rad, the posture to which the part should move. `worth`: how well the arm reaches the target from there. `worth_now`: how
+    well it reaches the target from the present posture. Both are at most 1, and below 0 out of reach.
+    """
 
     q: Array
     worth: float
@@ -40,12 +47,21 @@ class Assistance:
 
 
 class Assist:
-    """Chooses postures of a part that carries an arm."""
+    """Chooses postures of a part that carries an arm, from which the arm reaches a target well."""
 
     def __init__(self, model: Model, part: str, arm: str, worth: Worth, levels: int = LEVELS) -> None:
-        """`part`: that moves, such as "torso"; `arm`: the part that reaches; `levels`: positions of each motor that are compared.
+        """Prepare the postures that are compared: a grid over the motors of the part.
 
-        Raises InvalidValue if the part does not carry the arm, and UnknownName.
+        Args:
+            model: the robot in its world, for the contacts.
+            part: the part that carries the arm and may move, such as "torso".
+            arm: the part that reaches.
+            worth: how well the arm reaches places (k, 3) m with its base at home.
+            levels: number of positions of each motor in the grid.
+
+        Raises:
+            InvalidValue: the part does not carry the arm.
+            UnknownName: the robot does not have the part or the arm.
         """
         self.model, self.part = model, model.robot.part(part)
         self._worth, self._base = worth, base_link(model.robot, arm)
@@ -59,9 +75,10 @@ class Assist:
         self._postures = np.stack(np.meshgrid(*compared, indexing="ij"), axis=-1).reshape(-1, len(compared))
 
     def posture(self, q: Array, target: Array) -> Assistance:
-        """Return where the part should be for a target (3,) m, with all other motors at q (n,) rad.
+        """Return the best posture of the part for a target (3,) m, root frame; all other motors stay at q (n,) rad.
 
-        Postures in which solids touch are left out; the part stays where it is if no other is better by LEAST_GAIN.
+        Postures in which solids touch are left out. Large motions count as a disadvantage; the part stays at its present posture if no
+        other posture is better by at least 0.05.
         """
         span = self.part.slice
         postures = np.concatenate([q[None, span], self._postures])
@@ -79,30 +96,32 @@ class Assist:
 
 
 def base_link(robot: Robot, arm: str) -> int:
-    """Return the link that carries the first joint of a part; raises UnknownName."""
+    """Return the number of the link that carries the first joint of the part `arm`; raise UnknownName if there is no such part."""
     span = robot.part(arm).slice
     driven = (robot.coupling[0][:, span] != 0.0).any(axis=1)
     return robot.joints[int(np.flatnonzero(driven)[0])].parent
 
 
 def learned_worth(predictor: RewardPredictor) -> Worth:
-    """Return a function of places: the largest reward that a reach learner predicts for a target there, over all states of its space."""
+    """Return a function of places (k, 3) m: the largest reward that a reach learner predicts for a target at each place, (k,).
+
+    The maximum is over all states of the learner's space.
+    """
     return lambda places: np.array([float(predictor.mean(place).max()) for place in places])
 
 
 def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> Worth:
-    """Return a function of places (k, 3) m: the manipulability sqrt(det J J^T) of the arm near each, relative to the largest.
+    """Return a function of places (k, 3) m: the arm's manipulability sqrt(det J J^T) near each place, relative to the largest, (k,).
 
-    Unlike `learned_worth` it needs no learner.
-
-    It is taken from random postures; those in which the robot touches itself do not count.  A place that is near to none of them has
-    minus its distance [m] from the nearest one.
+    Unlike `learned_worth` it needs no learner. The manipulability is computed in random postures; postures in which the robot touches
+    itself are ignored. For a place that is not near to the marker in any posture, the value is minus the distance [m] from the nearest
+    position.
 
     Args:
         robot: the robot, whose other parts are at home.
         arm: the part that reaches.
-        marker: that it reaches with.
-        seed: of the postures.
+        marker: name of the marker with which the arm reaches.
+        seed: of the random postures.
     """
     model, span = Model(robot), robot.part(arm).slice
     q = np.repeat(robot.home[None], SAMPLES, axis=0)

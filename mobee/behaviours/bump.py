@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notices by the torques of the motors that a limb has bumped into something that the model does not know (thesis 4.3.3)."""
+"""Detects by the torques of the motors that a limb has bumped into something that the model does not know (thesis 4.3.3)."""
 
 from __future__ import annotations
 
@@ -18,24 +18,32 @@ START = 1.2  # s after the start of a motion, in which the limb is accelerated a
 
 
 class BumpWatch:
-    """Watches motors near the body, which the fingers' joints and the play of the wrist disturb least.
+    """Detects bumps of a limb by the torques of motors near the body.
 
-    What gravity does not explain changes slowly in a free motion, and at once in a bump.
+    The motion of the fingers and the play of the wrist disturb these motors least. The part of the torque that gravity does not explain
+    changes slowly in a free motion, and suddenly in a bump.
     """
 
     def __init__(self, robot: Robot, motors: Sequence[str], threshold: float = THRESHOLD) -> None:
-        """`motors`: those that are watched, such as the shoulder's.  `threshold`: N m."""
+        """Watch the named motors, such as those of the shoulder; `threshold`: change of the torques that counts as a bump [N m].
+
+        The change is the Euclidean norm over the watched motors.
+        """
         self._robot, self._threshold = robot, threshold
         self._columns = np.array([robot.motor_index(name) for name in motors])
         self.begin()
 
     def begin(self) -> None:
-        """Begin to watch a new motion."""
+        """Begin to watch a new motion; call it at the start of each motion."""
         self._mean: Array | None = None
         self._time, self._above = 0.0, 0
 
     def note(self, q: Array, torques: Array, dt: float) -> bool:
-        """Return whether the limb bumps into something, from positions (n,) rad and torques (n,) N m read dt s after the last ones."""
+        """Take the next measurement and return whether the limb has bumped into something.
+
+        `q`: (n,) rad, positions. `torques`: (n,) N m. `dt`: time since the last call [s]. In the first 1.2 s of a motion no bump is
+        detected.
+        """
         unexplained = (torques - gravity_torque(self._robot, q))[self._columns]
         self._time += dt
         if self._mean is None or self._time < START:

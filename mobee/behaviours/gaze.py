@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaze: neck and eyes keep a place in the middle of the pictures of all cameras.
 
-Motors that turn cameras but no shapes, the eyes, point the cameras at the target. Their goal is computed for the posture in which all other
-motors are about to be, so that they also compensate the motion of neck and torso (the vestibulo-ocular reflex).  The other motors of the
-part, the neck, move to the posture in which the eyes are in the middle of their range.  A `Reference` leads both there: at full speed while
-the target is far from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth pursuit).
+Motors that move cameras but no shapes, the eyes, point the cameras at the target. Their goal is computed for the posture that all other
+motors will have after the lag, so that the eyes also compensate the motion of neck and torso (the vestibulo-ocular reflex). The other
+motors of the part, the neck, move to the posture in which the eyes are in the middle of their range. A `Reference` moves both to their
+goals: at full speed while the target is far from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth
+pursuit).
 """
 
 from __future__ import annotations
@@ -36,7 +37,11 @@ FAR = 2.0  # m
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Movement:
-    """Where a part should be now, `q` (n_part,) rad, and how it should move, `velocity` (n_part,) rad/s: see `Controller.follow`."""
+    """How a part should move at present, in the form that `Controller.follow` needs.
+
+    `q`: (n_part,) rad, positions. `velocity`: (n_part,) rad/s. `phase`: "saccade" (fast motion to a far target) or "pursuit" (motion with a
+    near target). `error`: largest angle between a direction of view and the target now [rad].
+    """
 
     q: Array
     velocity: Array
@@ -45,7 +50,7 @@ class Movement:
 
 
 class Gaze:
-    """Aims the cameras of a robot at a target by the motors of one part; keeps its motion from call to call."""
+    """Points the cameras of a robot at a target, with the motors of one part; it keeps its reference motion between calls of `step`."""
 
     def __init__(
         self,
@@ -56,18 +61,18 @@ class Gaze:
         lag: float = LAG,
         movable: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Find the motors that turn cameras.
+        """Find the motors of the part that move cameras.
 
         Args:
             robot: the robot.
-            cameras: those to aim, by name, see `cameras_of`.
+            cameras: the cameras that are pointed at the target, by name, as `cameras_of` returns them.
             part: the part that may move.
-            margin: (n,) rad, kept free before each limit, at most a quarter of a motor's range.
-            lag: s, by which the motors' velocity is later than the commanded one.
-            movable: (n,) the motors that may be moved; None: all.
+            margin: (n,) rad, or one number, distance kept from each limit, at most a quarter of a motor's range.
+            lag: s, delay of the motors' velocity after the commanded velocity.
+            movable: (n,) whether each motor may be moved; None: all.
 
         Raises:
-            InvalidValue: the part turns none of the cameras.
+            InvalidValue: the part moves none of the cameras.
             UnknownName: the robot does not have the part.
         """
         self.robot, self.part, self.lag = robot, robot.part(part), lag
@@ -82,28 +87,34 @@ class Gaze:
         self._phase: Phase = "saccade"
 
     def reset(self) -> None:
-        """Start from rest with the next call."""
+        """Forget the present motion; the next call of `step` starts from rest."""
         self._reference = None
 
     def offsets(self, q: Array, target: Array) -> Array:
-        """Return the place of a target (3,) m in each camera at q (n,) rad, (cameras, 3) m: right, down and ahead."""
+        """Return the position of a target (3,) m, root frame, in the frame of each camera at posture q (n,) rad, (cameras, 3) m.
+
+        The axes of a camera's frame are right, down and ahead.
+        """
         transforms = link_transforms(self.robot, q)
         return np.array([_seen(camera, transforms, target) for camera in self._cameras])
 
     def error(self, q: Array, target: Array) -> float:
-        """Return the largest angle [rad] between a direction of view at q (n,) rad and the direction of a target (3,) m."""
+        """Return the largest angle [rad], over all cameras, between the direction of view at q (n,) rad and the direction to a target.
+
+        `target`: (3,) m, root frame.
+        """
         seen = self.offsets(q, target)
         return float(np.arctan2(np.hypot(seen[:, 0], seen[:, 1]), seen[:, 2]).max())
 
     def step(self, q: Array, velocity: Array, target: Array, target_velocity: Array, dt: float) -> Movement:
-        """Return how the part should move for the next dt [s] to keep a target in the middle of the pictures.
+        """Return how the part should move at present so that the target stays in the middle of the pictures.
 
         Args:
-            q: (n,) rad, positions of all motors, measured.
-            velocity: (n,) rad/s, velocities of all motors, as commanded.
-            target: (3,) m, root frame, at the same time as `q`.
-            target_velocity: (3,) m/s.
-            dt: s since the last call.
+            q: (n,) rad, measured positions of all motors.
+            velocity: (n,) rad/s, commanded velocities of all motors.
+            target: (3,) m, root frame, at the time of `q`.
+            target_velocity: (3,) m/s, root frame.
+            dt: time since the last call [s].
         """
         span, error = self.part.slice, self.error(q, target)
         self._phase = "saccade" if error > SACCADE_ABOVE else "pursuit" if error < PURSUIT_BELOW else self._phase
@@ -187,9 +198,10 @@ class Gaze:
 
 
 def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
-    """Return the motors of a part that turn one of the links: those that move no shape, and the others; of the `movable` (n,) ones.
+    """Return the indices of the motors of a part that move at least one of the links: the eyes and the neck.
 
-    Raises InvalidValue if there are none, and UnknownName.
+    The eyes are the motors that move no shape, the neck the others. `links`: numbers of the links that carry cameras. `movable`: (n,)
+    whether each motor may be moved; None: all. Raises InvalidValue if there are no such motors, and UnknownName for an unknown part.
     """
     span, matrix, ancestry = robot.part(part).slice, robot.coupling[0], tables(robot).ancestry
     turning, bodies = (np.zeros(len(robot.motors), dtype=bool) for _ in range(2))

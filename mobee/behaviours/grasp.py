@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A grasp from the side: where the palm is beside an upright thing, the postures there, and how the hand closes (thesis 4.3.3)."""
+"""A grasp from the side: the pose of the palm beside an upright thing, postures with this pose, and closing of the hand (thesis 4.3.3)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,21 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """Where a hand is when it closes around an upright thing, and how: numbers for a hand of the iCub, found in MuJoCo.
+    """The pose of a palm when its hand closes around an upright thing, and how it closes; the defaults are for the iCub.
 
-    The axes of a palm are x along its fingers, -y to its thumb, z its normal.  `along`: m from the palm's marker to the thing's axis, along
-    the fingers.  `gap`: m between palm and thing when the hand closes, `before` at the pre-grasp.  `height`: m of the palm above the
-    ground on which the thing stands, at which the fields of hand and forearm do not reach the ground.  `oppose`, `spread`: rad, of the
-    thumb's opposition and the fingers' spread.  `fingers`, `thumb`: shares of closing.  `squeeze`: rad, how far beyond the place where they
-    were stopped the fingers press.
+    The numbers were found in MuJoCo. The axes of a palm are x along its fingers, -y to its thumb, z its normal.
+
+    Attributes:
+        along: m, from the palm's marker to the thing's axis, along the fingers.
+        gap: m, between palm and thing when the hand closes.
+        before: m, between palm and thing at the pre-grasp.
+        height: m, of the palm above the ground on which the thing stands; at this height the fields of hand and forearm do not reach the
+            ground.
+        oppose: rad, opposition of the thumb.
+        spread: rad, spread of the fingers.
+        fingers: share by which the fingers close, 0 open to 1 closed.
+        thumb: share by which the thumb closes.
+        squeeze: rad, how far the goals of the fingers are beyond the positions at which the thing stopped them.
     """
 
     along: float = 0.047
@@ -48,17 +56,25 @@ class Grip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Palm:
-    """A pose of a palm: position (3,) m and rotation (3, 3), root frame."""
+    """A pose of a palm in the root frame.
+
+    `position`: (3,) m. `rotation`: (3, 3), columns along the fingers, away from the thumb, and the normal.
+    """
 
     position: Array
     rotation: Array
 
 
 def palm_beside(place: ArrayLike, radius: float, azimuth: float, gap: float, ground: float, grip: Grip) -> Palm:
-    """Return the pose of the palm beside an upright thing of this radius [m], the thumb up.
+    """Return the pose of the palm beside an upright thing, with the thumb up.
 
-    `place`: (2,) m, of the thing's axis.  `azimuth`: rad; at 0 the palm faces the left (-y), at pi / 2 the front (-x).
-    `gap`: m, between palm and thing.  `ground`: m, height of what the thing stands on.
+    Args:
+        place: (2,) m, x and y of the thing's axis, root frame.
+        radius: of the thing [m].
+        azimuth: direction that the palm faces, rad; 0: the left (-y), pi / 2: the front (-x).
+        gap: between palm and thing [m].
+        ground: height of the surface on which the thing stands [m].
+        grip: numbers of the hand.
     """
     x, y = np.asarray(place, dtype=np.float64)
     normal = np.array([-np.sin(azimuth), -np.cos(azimuth), 0.0])
@@ -71,11 +87,11 @@ class SideGrasp:
     """Palm poses and postures for grasps from the side with one hand.
 
     Args:
-        model: the robot in the world that it must not touch.
-        marker: of the palm.
+        model: the robot in a world with the objects that it must not touch.
+        marker: name of the palm's marker.
         motors: names of the parts and motors that move, without those of the fingers.
-        starts: (S, n) rad, postures from which inverse kinematics starts, and near which it stays.
-        pushing: the robot in the world whose fields push it, if the things of `model` do not; None: `model`.
+        starts: (S, n) rad, postures from which inverse kinematics starts, and near which its results stay.
+        pushing: the robot in the world whose fields push it, if this is another world than that of `model`; None: `model`.
     """
 
     def __init__(self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, pushing: Model | None = None) -> None:
@@ -92,17 +108,18 @@ class SideGrasp:
         self.starts = np.array([self.opened(start) for start in np.atleast_2d(np.asarray(starts, dtype=np.float64))])
 
     def opened(self, q: Array) -> Array:
-        """Return q (n,) rad with the hand open and the thumb opposed, so that a thing fits between thumb and fingers."""
+        """Return a copy of q (n,) rad with the hand open and the thumb opposed, so that a thing fits between thumb and fingers."""
         return self._closed(q, 0.0, 0.0)
 
     def closed(self, q: Array) -> Array:
-        """Return q (n,) rad with fingers and thumb closed farther than the thing lets them."""
+        """Return a copy of q (n,) rad with fingers and thumb closed; a thing in the hand stops them before they reach these positions."""
         return self._closed(q, self.grip.fingers, self.grip.thumb)
 
     def squeezed(self, q: Array) -> Array:
-        """Return the goals (m,) rad with which the fingers hold a thing: a little more closed than at q (n,) rad, where it stopped them.
+        """Return the goals (m,) rad of the finger motors with which the hand holds a thing.
 
-        With farther goals strong fingers would slowly push the thing out of the hand.
+        They are a little more closed (`Grip.squeeze`) than at q (n,) rad, the posture in which the thing stopped the fingers. With farther
+        goals, strong fingers would slowly push the thing out of the hand.
         """
         fingers = q[self.hand.motors]
         toward = np.clip(self.closed(q)[self.hand.motors] - fingers, -self.grip.squeeze, self.grip.squeeze)
@@ -110,9 +127,10 @@ class SideGrasp:
         return held
 
     def posture(self, palm: Palm, starts: Array | None = None) -> Array | None:
-        """Return the posture (n,) rad with the palm there in which the law pushes least, without contacts of solids; None if there is none.
+        """Return the posture (n,) rad with the given palm pose in which the law pushes least, without contacts of solids.
 
-        `starts`: (S, n) rad; None: those of the object.
+        `starts`: (S, n) rad, postures from which inverse kinematics starts; None: the `starts` of this object. None is returned if no
+        posture is found.
         """
         found: list[tuple[float, Array]] = []
         for start in self.starts if starts is None else starts:
@@ -130,20 +148,20 @@ class SideGrasp:
         return min(found, key=lambda one: one[0])[1] if found else None
 
     def push(self, q: Array) -> float:
-        """Return the largest of the `forces` at q (n,) rad, rad/s^2."""
+        """Return the largest absolute value of `forces` at q (n,) rad, over all motors [rad/s^2]."""
         return float(np.abs(self.forces(q)).max())
 
     def forces(self, q: Array) -> Array:
-        """Return the law's forces (n,) rad/s^2 at q (n,) rad, without spring and damping, on the motors that move.
+        """Return the control law's forces at q (n,) rad, without spring and damping, (n,) rad/s^2; 0 for motors that do not move.
 
-        The hand may be near its target, whose field does not push it.
+        The fields of targets do not push the hand of `marker`.
         """
         found = np.zeros(len(q))
         found[self._moved] = self._controller.forces(self._pushing.evaluate(q, reaching=self.marker)).total[self._moved]
         return found
 
     def attractor(self, q: Array) -> Array:
-        """Return the attractor (n,) rad with which the law holds q (n,) rad against its forces."""
+        """Return the attractor (n,) rad whose spring balances the law's other forces at q (n,) rad, so that the robot rests there."""
         return attractor_for(self.model.robot, self.gains, q, -self.forces(q))
 
     def _closed(self, q: Array, fingers: float, thumb: float) -> Array:

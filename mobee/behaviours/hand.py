@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fingers of a hand: open, closed, and closed until they touch something (thesis 9.4.2).
 
-A finger is what moves beyond the palm.  The couplings of its joints are those of the robot's file.
+Fingers are the links that only motors beyond the palm move. The couplings of their joints are those of the robot's file.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ STEPS = 60  # from open to closed, in which contacts are looked for
 
 
 class Hand:
-    """The motors that move fingers alone, and the ends of their ranges at which the hand is open and closed."""
+    """The motors of the fingers of one hand.
+
+    `open`, `closed`: (m,) rad, the ends of the motors' ranges at which the hand is open and closed, in the order of `motors`.
+    """
 
     def __init__(self, robot: Robot, marker: str) -> None:
-        """`marker`: of the palm, with its normal out of the palm, such as "left_palm".
+        """Find the finger motors of a hand; `marker`: name of the palm's marker, whose normal points out of the palm, as "left_palm".
 
-        Raises InvalidValue if no motor moves links beyond the palm alone, and UnknownName.
+        Raises InvalidValue if no motor moves only links beyond the palm, and UnknownName if the robot has no such marker.
         """
         self.robot, palm = robot, robot.marker(marker)
         ancestry, matrix = tables(robot).ancestry, robot.coupling[0]
@@ -34,7 +37,7 @@ class Hand:
         carrying = sorted({int(j) for shape in self._solids for j in ancestry[shape.link]} - {int(j) for j in ancestry[palm.link]})
         others = np.setdiff1d(np.arange(len(robot.joints)), [link - 1 for link in self._links])
         self.motors: Ints = np.flatnonzero((matrix[carrying] != 0.0).any(axis=0) & ~(matrix[others] != 0.0).any(axis=0))
-        """Indices of the fingers' motors, ascending."""
+        """Indices of the fingers' motors, ascending, (m,)."""
         if not len(self.motors):
             raise InvalidValue(f"{marker} of {robot.name!r} has no fingers: no motor moves links beyond {robot.links[palm.link]} alone")
         centre = palm.position + AHEAD * palm.normal
@@ -44,7 +47,10 @@ class Hand:
         self.open, self.closed = np.where(closes_high, low, high), np.where(closes_high, high, low)
 
     def posture(self, q: Array, share: float) -> Array:
-        """Return q (n,) rad with the fingers closed by a share: 0 is open, 1 closed."""
+        """Return a copy of q (n,) rad with the fingers closed by `share`, from 0 (open) to 1 (closed).
+
+        Raises InvalidValue for a share outside this range.
+        """
         if not 0.0 <= share <= 1.0:
             raise InvalidValue(f"share {share:g} of closing: must be between 0, open, and 1, closed")
         found = q.copy()
@@ -52,9 +58,9 @@ class Hand:
         return found
 
     def closed_around(self, model: Model, q: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return q (n,) rad with each finger closed until its solids touch an object of the model's world, and what is touched.
+        """Return a copy of q (n,) rad with the fingers closed until they touch objects of the model's world, and the objects' names.
 
-        All fingers close together from open; a motor stops as soon as a link that it moves touches.
+        All fingers close together, beginning open; a motor stops as soon as a solid that it moves touches an object.
         """
         found, moving, touched = self.posture(q, 0.0), np.ones(len(self.motors), dtype=bool), dict[str, None]()
         moves = (self.robot.coupling[0][:, self.motors] != 0.0).T

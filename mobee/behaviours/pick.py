@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Picks up an upright thing and puts it down elsewhere, from a pre-grasp beside it (thesis 4.3.3, and what comes after it).
+"""Picks up an upright thing and puts it down elsewhere, starting at a pre-grasp beside the thing (thesis 4.3.3, and further steps).
 
-Each step is a motion of a `Body`, which is a plant in one process or the robot of the live system.
+Each step is a motion of a `Body`, which is an offline plant or the robot of the live system.
 """
 
 from __future__ import annotations
@@ -43,14 +43,21 @@ TURNS = tuple(np.deg2rad(sorted(np.arange(45.0, -46.0, -7.5), key=abs)).tolist()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """The end of a motion along a path: whether something was bumped into, and the posture (n,) rad then."""
+    """The end of a motion along a path.
+
+    `bumped`: whether the robot bumped into something. `q`: (n,) rad, the posture at the end.
+    """
 
     bumped: bool
     q: Array
 
 
 def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count: int, rng: np.random.Generator) -> Array:
-    """Return random places (count, 2) m for a thing at (2,) m, those first where the hand came from: there it met nothing."""
+    """Return random places (count, 2) m to which a thing at `thing` (2,) m can be moved, root frame.
+
+    Distances from the thing are between the two numbers of `shifts` [m]. The places on the side from which the hand came are first, because
+    the hand met nothing there. `azimuth`: direction that the palm faces, rad; 0: the left (-y), pi / 2: the front (-x).
+    """
     turns, far = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(*shifts, count)
     steps = far[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
     back = np.array([np.sin(azimuth), np.cos(azimuth)])
@@ -59,33 +66,40 @@ def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count
 
 
 Forces = Callable[[Array], Array]
-"""The law's forces (n,) rad/s^2 at a posture (n,) rad, without spring and damping."""
+"""A function that takes a posture (n,) rad and returns the law's forces without spring and damping, (n,) rad/s^2."""
 
 
 class Body(Protocol):
-    """A robot that follows paths under the law."""
+    """The interface of a robot that follows paths under the control law."""
 
     @property
     def q(self) -> Array:
-        """The encoders, (n,) rad."""
+        """The encoder values of all motors, (n,) rad."""
         ...
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """Move along a path (K, n) rad at a share of the largest speed; `watch`: ends it at a bump; `forces`: of the law, are balanced."""
+        """Move along a path (K, n) rad and return how the motion ended.
+
+        `speed`: share of the largest speed. `watch`: stops the motion at a bump; None: bumps are not detected. `forces`: the law's other
+        forces, which the attractor balances; None: they are not balanced.
+        """
         ...
 
     def press(self, q: Array, seconds: float) -> None:
-        """Set the attractor to q (n,) rad at once, and leave it there for a time."""
+        """Set the attractor to q (n,) rad at once, and leave it there for `seconds`."""
         ...
 
     def rest_at(self, q: Array) -> None:
-        """Set the attractor to q (n,) rad, and wait until nothing is commanded to move, or for CALM s."""
+        """Set the attractor to q (n,) rad, and wait until the commanded motion has ended, but at most 1.5 s."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Upright:
-    """An upright thing as it is seen: the place of its axis (2,) m, radius and height [m], and the height [m] of what it stands on."""
+    """An upright thing as the cameras see it.
+
+    `place`: (2,) m, x and y of its axis, root frame. `radius`, `height`: m. `ground`: height of the surface on which it stands [m].
+    """
 
     place: Array
     radius: float
@@ -94,24 +108,33 @@ class Upright:
 
 
 class NoPosture(MobeeError):
-    """Raised if the robot has no posture, or no motion without contacts, for a step."""
+    """Raised if the robot has no posture for a step, or no motion without contacts."""
 
 
 def azimuth_beside(place: Array) -> float:
-    """Return the azimuth [rad] that suits the iCub's right hand at a thing at (2,) m: the farther right, the more to the front."""
+    """Return a suitable azimuth [rad] of the iCub's right palm beside a thing at (2,) m, x and y in the root frame.
+
+    The azimuth is the direction that the palm faces: 0: the left (-y), pi / 2: the front (-x). For things farther right the palm is turned
+    more to the front.
+    """
     return float(np.deg2rad(40.0) * np.clip((place[1] - 0.05) / 0.15, 0.0, 1.1))
 
 
 def beside(grasp: SideGrasp, thing: Upright, azimuth: float, gap: float, above: float, starts: Array | None) -> Array | None:
-    """Return the posture (n,) rad with the palm beside a thing, `above` m above the height of a grasp; None if there is none."""
+    """Return the posture (n,) rad with the palm beside a thing, or None if there is none.
+
+    `azimuth`: direction that the palm faces [rad]. `gap`: between palm and thing [m]. `above`: height of the palm above that of a grasp
+    [m]. `starts`: (S, n) rad, postures from which inverse kinematics starts; None: those of `grasp`.
+    """
     return grasp.posture(palm_beside(thing.place, thing.radius, azimuth, gap, thing.ground + above, grasp.grip), starts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreGrasp:
-    """A posture (n,) rad with the palm beside a thing, and the one before it, `away` (n,) rad, from where the hand moves straight to it.
+    """A pre-grasp: a posture with the palm beside a thing, from which the hand moves to the thing.
 
-    `azimuth`: rad, that the palm faces.  `above`: whether the hand comes from above, else from the side.
+    `azimuth`: direction that the palm faces [rad]. `away`: (n,) rad, a posture farther from the thing, from which the hand moves straight
+    to the pre-grasp. `posture`: (n,) rad, the pre-grasp. `above`: whether `away` is above the pre-grasp; else it is at the side.
     """
 
     azimuth: float
@@ -121,9 +144,9 @@ class PreGrasp:
 
 
 def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
-    """Return the pre-grasps from which the hand can move to the thing, the best first; those from above are last.
+    """Return the pre-grasps from which the hand can move to the thing, the best first; those that are reached from above are last.
 
-    The best are those in which the law pushes little until the thing is lifted: what it pushes keeps the palm from its pose.
+    The best pre-grasps are those at which the law pushes little until the thing is lifted, because its forces keep the palm from its pose.
     """
     found: list[tuple[float, PreGrasp]] = []
     for turn in TURNS:
@@ -156,12 +179,12 @@ class _Motion:
 
 
 class Picker:
-    """Picks things up with one hand.
+    """Picks up things with one hand and puts them down.
 
     Args:
         body: the robot.
-        grasp: postures; the world of its model has what must not be touched, not the thing.
-        watched: motors whose torques show bumps, see BumpWatch.
+        grasp: finds postures; the world of its model contains what must not be touched, without the thing.
+        watched: names of the motors whose torques show bumps.
     """
 
     def __init__(self, body: Body, grasp: SideGrasp, watched: Sequence[str]) -> None:
@@ -173,9 +196,9 @@ class Picker:
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
     def settle_at(self, q: Array) -> Array:
-        """Bring torso and arm to q (n,) rad; return the attractor (n,) rad that this needs.
+        """Move torso and arm to q (n,) rad as exactly as possible; return the attractor (n,) rad that this needs.
 
-        What remains after a settled motion is added to the attractor, a few times.
+        After each settled motion, the remaining error is added to the attractor, at most four times.
         """
         aim = self.grasp.attractor(q)
         for number in range(CORRECTIONS + 1):
@@ -188,11 +211,17 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad, the attractor making up for the law's forces; return whether something was bumped into."""
+        """Move along a path (K, n) rad, with an attractor that balances the law's forces; return whether the robot bumped into something.
+
+        `speed`: share of the largest speed. `watch`: stops the motion at a bump; None: bumps are not detected.
+        """
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
     def arrive(self, goal: PreGrasp, watch: BumpWatch | None = None) -> bool:
-        """Move the hand, which is away from the thing, straight to the pre-grasp; return whether it bumped into something then."""
+        """Move the hand from its posture away from the thing straight to the pre-grasp; return whether it bumped into something.
+
+        `watch`: stops the motion at a bump; None: bumps are not detected.
+        """
         self.settle_at(goal.away)
         if self.move(np.stack([goal.away, goal.posture]), SLOW, watch):
             return True
@@ -201,7 +230,10 @@ class Picker:
         return False
 
     def close(self, thing: Upright, azimuth: float) -> None:
-        """Move the palm from the pre-grasp to the thing, and close the hand; raises NoPosture."""
+        """Move the palm from the pre-grasp to the thing, and close the hand.
+
+        `azimuth`: direction that the palm faces [rad]. Raises NoPosture if the robot has no posture with the palm at the thing.
+        """
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
         self.move(np.stack([there, here]), SLOW)
@@ -215,23 +247,37 @@ class Picker:
         self.body.press(aim, SQUEEZING)
 
     def lift(self, thing: Upright, azimuth: float) -> None:
-        """Lift the thing straight up; raises NoPosture."""
+        """Lift the thing straight up by 8 cm.
+
+        `azimuth`: direction that the palm faces [rad]. Raises NoPosture if the robot has no posture for this.
+        """
         up = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT))
         self.move(np.stack([self._held(self.body.q), up]), GENTLE)
         self._passed.append(up)
 
     def slipped(self, thing: Upright, centre: Array) -> Array:
-        """Return how far a thing whose centre is seen at (3,) m has slipped in the hand, (3,) m in the frame of the palm."""
+        """Return how far a thing has slipped in the hand, (3,) m in the frame of the palm.
+
+        `centre`: (3,) m, root frame, where the cameras see the centre of the thing.
+        """
         pose, marker = self.grasp.model.evaluate(self.body.q), self.grasp.marker
         found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - self._gripped(thing)
         return found
 
     def put(self, thing: Upright, places: Sequence[Array], centre: Array | None = None) -> Array:
-        """Put what is in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
+        """Put the thing in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
 
-        The first place at which the law pushes little is taken.  Where hand or thing bumps into something on the motion down, the hand
-        goes up again, to another place.  `centre`: (3,) m, where the thing is seen; None: where the hand has gripped it.
-        Raises NoPosture if no place works; then the hand has moved back, and the thing stands where it was lifted, unless it bumped again.
+        The first place at which the law pushes little is used, or else the place with the smallest push. If hand or thing bumps into
+        something on the motion down, the hand moves up again and to another place.
+
+        Args:
+            thing: the thing as it was seen before the grasp.
+            places: (2,) m each, x and y in the root frame.
+            centre: (3,) m, root frame, where the cameras see the centre of the thing now; None: it has not slipped in the hand.
+
+        Raises:
+            NoPosture: no place is suitable.  Then the hand has put the thing back where it was lifted, or still holds it after another
+                bump.
         """
         slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
         held = self._model_with(thing, slipped)
@@ -318,12 +364,18 @@ class Picker:
 
 
 def is_free(model: Model, path: Array) -> bool:
-    """Return whether a path (K, n) rad has no contacts of solids in the world of a model; its first posture is not checked."""
+    """Return whether a path (K, n) rad has no contacts of solids in the world of a model; its first posture is not checked.
+
+    Postures about 0.03 rad apart are checked.
+    """
     return not touches(model, path)
 
 
 def touches(model: Model, path: Array) -> bool:
-    """Return whether solids touch in postures along a path (K, n) rad, about STEP apart, without its first one."""
+    """Return whether solids touch on a path (K, n) rad in the world of a model; its first posture is not checked.
+
+    Postures about 0.03 rad apart are checked.
+    """
     pieces = []
     for start, end in zip(path, path[1:], strict=False):
         count = max(1, int(np.ceil(np.abs(end - start).max() / STEP)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths to a pre-grasp: a map of poses beside upright things, and new plans where the arm bumps into something (thesis 4.3.3)."""
+"""Paths to a pre-grasp: a map of poses beside upright things, and new plans after the arm bumps into something (thesis 4.3.3)."""
 
 from __future__ import annotations
 
@@ -29,30 +29,36 @@ MARKER, PART = "right_palm", "right_arm"
 ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw")
 MOTORS = ("torso", *(f"r_{joint}" for joint in ARM))
 WATCHED = ("torso_yaw", "r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw")
-"""Motors whose torques show that the right arm has bumped into something."""
+"""Names of the motors whose torques show that the right arm has bumped into something."""
 PLACES = ((-0.45, -0.2), (0.0, 0.42), (0.0, 0.12))
-"""m, of the palm: x, y, and the height above that of a grasp."""
+"""Range of the palm's positions in the pre-grasp map, (low, high) m: x and y in the root frame, and height above that of a grasp."""
 FACES = (0.0, float(np.deg2rad(60.0)))  # rad, azimuths
 SPACING = (0.03, 0.03, 0.05, float(np.deg2rad(20.0)))  # m and rad
 NEIGHBOURS, LONGEST, MARGIN = 16, 0.5, float(np.deg2rad(10.0))
 ASIDE = (-0.24, 0.38, 0.0, float(np.deg2rad(30.0)))  # of a pose with the hand at the side of the table
 PLANS = 8
 AROUND, OVER = 0.05, 0.065
-"""m, beside and above the place of the palm at a bump, to which it does not return: what is there stands on the table."""
+"""After a bump, the palm does not return to places within AROUND [m] horizontally and below OVER [m] above its position at the bump.
+
+The space below is excluded too, because the object that was hit stands on the table.
+"""
 _LEFT = {"shoulder_pitch": -40.0, "shoulder_roll": 40.0, "shoulder_yaw": -30.0, "elbow": 100.0}  # degrees, the left arm aside
 _RIGHT = {"shoulder_pitch": 0.0, "shoulder_roll": 80.0, "shoulder_yaw": -20.0, "elbow": 70.0}  # the right elbow away from the body
 
 
 def icub_starts(robot: Robot) -> Array:
-    """Return postures (2, n) rad of an iCub from which inverse kinematics starts, its left arm aside; in one its right elbow is away."""
+    """Return two postures (2, n) rad of an iCub from which inverse kinematics starts; the left arm is out of the way.
+
+    In the second posture the right elbow is away from the body too.
+    """
     aside = _changed(robot, robot.home, "l", _LEFT)
     return np.stack([aside, _changed(robot, aside, "r", _RIGHT)])
 
 
 def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
-    """Return a map of poses with the thumb up, over the place of the palm and the azimuth that it faces (thesis fig. 4.8); takes seconds.
+    """Return a roadmap of poses with the thumb up, whose task is the palm's position and the azimuth that it faces (thesis fig. 4.8).
 
-    `ground`: m, height of what things stand on.  The world of `grasp` should be that without the things.
+    `ground`: height of the surface on which things stand [m]. The world of `grasp` should not contain the things. Building takes seconds.
     """
     low = ground + grasp.grip.height
     box = [*PLACES[:2], (low + PLACES[2][0], low + PLACES[2][1])]
@@ -69,35 +75,45 @@ def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
 
 
 def aside(trm: Roadmap, ground: float, grip: Grip) -> Array:
-    """Return the posture (n,) rad of a map with the hand at the side of the table, where it hides nothing."""
+    """Return the posture (n,) rad of the pre-grasp map `trm` with the hand at the side of the table, where it hides nothing.
+
+    `ground`: height of the surface on which things stand [m]. `grip`: numbers of the hand.
+    """
     posture: Array = trm.q[trm.exit(np.array(ASIDE) + np.array([0.0, 0.0, ground + grip.height, 0.0]))]
     return posture
 
 
 class Planner(Protocol):
-    """Plans motions to pre-grasps."""
+    """The interface of a planner of paths to pre-grasps."""
 
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
         """Return a path (K, n) rad from a posture to a pre-grasp, or None if there is no path.
 
         Args:
             start: posture (n,) rad.
-            goal: posture (n,) rad of the pre-grasp.
-            azimuth: direction that the palm faces in `goal`, rad about the vertical axis.
+            goal: posture (n,) rad at the end of the path.
+            azimuth: direction that the palm faces in `goal`, rad about the vertical axis; 0: the left (-y), pi / 2: the front (-x).
             blocked: positions (B, 3) m of the palm at earlier bumps, root frame; the palm must move around or over them.
         """
         ...
 
 
 class MapPlanner:
-    """Searches the pre-grasp map in a world."""
+    """A `Planner` that searches a path without contacts in the pre-grasp map.
+
+    `trm`: the map. `world`: the robot in the world in which paths are checked. `marker`: name of the palm's marker.
+    """
 
     def __init__(self, trm: Roadmap, world: Model, marker: str) -> None:
         self._map, self._world, self._marker = replace(trm, model=world), world, marker
         self._palms = trm.model.evaluate(trm.q).position(marker)
 
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
-        """See Planner."""
+        """Return a path (K, n) rad from `start` (n,) rad through the map to `goal` (n,) rad, or None if there is no path.
+
+        `azimuth`: direction that the palm faces in `goal` [rad]. `blocked`: (B, 3) m, positions of the palm at earlier bumps, root frame;
+        the palm moves around or over them.
+        """
         place = self._world.evaluate(goal).position(self._marker)
         try:
             path = self._without(blocked).path(start, [*place, azimuth], free=True)
@@ -117,14 +133,20 @@ class MapPlanner:
 
 
 def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
-    """Return which places (P, 3) m of a palm are beside, below or just above blocked places (B, 3) m."""
+    """Return whether each of the palm positions (P, 3) m is beside, below or just above one of the blocked positions (B, 3) m, (P,).
+
+    Beside means within 5 cm horizontally, just above means less than 6.5 cm higher.
+    """
     beside = np.linalg.norm(palms[:, None, :2] - blocked[:, :2], axis=2) <= AROUND
     found: NDArray[np.bool_] = (beside & (palms[:, None, 2] < blocked[:, 2] + OVER)).any(axis=1)
     return found
 
 
 def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
-    """Return whether the marker goes around or over the blocked places (B, 3) m on a path (K, n) rad; it may begin near one."""
+    """Return whether the marker stays away from the blocked positions (B, 3) m on a path (K, n) rad.
+
+    The path may begin near a blocked position, but must not return to one after it has left them. A path that never leaves them counts too.
+    """
     if not len(blocked):
         return True
     shares = np.linspace(0.0, 1.0, 10)[:, None, None]
@@ -136,7 +158,11 @@ def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
 
 @dataclass(slots=True)
 class Approach:
-    """How an approach went: azimuth [rad] of the pre-grasp, None if it gave up; bumps, plans, processor time of their paths [s]."""
+    """The result of `approach`.
+
+    `azimuth`: direction that the palm faces in the pre-grasp that was reached [rad]; None if none was reached. `bumps`: number of bumps.
+    `plans`: number of plans. `planning`: processor time for planning [s].
+    """
 
     azimuth: float | None = None
     bumps: int = 0
@@ -145,9 +171,10 @@ class Approach:
 
 
 def approach(body: Body, picker: Picker, thing: Upright, plan: Planner) -> Approach:
-    """Bring the palm to a pre-grasp along planned paths; where the arm bumps into something, plan again around that place of the palm.
+    """Move the palm to a pre-grasp of a thing along planned paths, with a new plan after each bump.
 
-    After a bump the hand comes from above if it can, since what it has bumped into is beside the thing.
+    A new path must move around or over the positions of the palm at earlier bumps. After a bump, pre-grasps that are reached from above are
+    preferred, because the object that was hit is beside the thing. At most 8 plans are made.
     """
     found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
     watch = BumpWatch(model.robot, picker.watched)

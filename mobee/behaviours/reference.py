@@ -15,10 +15,17 @@ LEASH = np.deg2rad(15.0)  # rad by which the reference may be ahead of its motor
 
 
 class Reference:
-    """The moving reference of some motors; arrays (m,) in rad and rad/s."""
+    """The reference of some motors, which moves towards a moving goal within the limits of speed and acceleration.
+
+    `q`: (m,) rad and `velocity`: (m,) rad/s are its present state.
+    """
 
     def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array, speed: float = SPEED) -> None:
-        """Start at rest at q, to stay between `low` and `high`; `where`: the motors; `speed`: share of their largest speed."""
+        """Start at rest at q (m,) rad.
+
+        `where`: range of the indices of the m motors. `low`, `high`: (m,) rad, limits of the reference. `speed`: share of the motors'
+        largest speed that is used.
+        """
         table = robot.motor_table[where]
         self._fastest = speed * np.array([motor.max_velocity for motor in table])
         self._hardest = ACCELERATION * np.array([motor.max_acceleration for motor in table])
@@ -26,9 +33,16 @@ class Reference:
         self.q, self.velocity = q.copy(), np.zeros(len(q))
 
     def catch_up(self, goal: Array, goal_velocity: Array, near: Array, dt: float) -> None:
-        """Advance by dt [s] towards a goal that moves; stay near `near`, where the motors are expected.
+        """Advance the reference by dt [s] towards a moving goal.
 
-        A far goal is approached at full speed, and with so much time left that the acceleration limit suffices to move with it then.
+        Far from the goal it moves at full speed. It brakes early enough to arrive with the velocity of the goal within the acceleration
+        limit.
+
+        Args:
+            goal: (m,) rad, the present goal.
+            goal_velocity: (m,) rad/s.
+            near: (m,) rad, the expected positions of the motors; the reference stays within 15 degrees of them.
+            dt: s.
         """
         left = goal - self.q
         rate = np.minimum(CLOSE * np.abs(left), np.sqrt(BRAKING * self._hardest * np.abs(left)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motion of a target by its last places: where it is now, although pictures are late and rare."""
+"""Estimates the present position of a target from its last seen places, because pictures are late and rare."""
 
 from __future__ import annotations
 
@@ -16,17 +16,20 @@ JUMP = 0.05  # m from where the target was expected: it has jumped, and older pl
 
 
 class TargetTrack:
-    """Follows a target that moves at a constant velocity, or jumps; times are in s of any clock."""
+    """Estimates the motion of a target that moves at a constant velocity, or jumps; times are in s of any clock."""
 
     def __init__(self, patience: float = 0.6) -> None:
-        """`patience`: s after the last place for which the motion is extrapolated; after that the target is stale."""
+        """Make a track; `patience`: time after the last seen place for which the motion is extrapolated [s]."""
         if not 0.0 < patience < np.inf:
             raise InvalidValue(f"patience {patience!r} s: must be a finite time above 0")
         self.patience = patience
         self._seen: deque[tuple[float, Array]] = deque()
 
     def note(self, t: float, place: Array) -> None:
-        """Add the place (3,) m of the target at time t [s]; one that is not newer than the last is ignored.  Raises InvalidValue."""
+        """Add a place (3,) m at which the target was seen at time t [s]; a place that is not newer than the last one is ignored.
+
+        Raises InvalidValue if a number is not finite or the shape is wrong.
+        """
         place = real_array("place", place)
         if place.shape != (3,) or not (np.isfinite(place).all() and np.isfinite(t)):
             raise InvalidValue(f"place {place.tolist()} of the target at {t} s: must be three finite numbers, in m, at a finite time")
@@ -40,7 +43,10 @@ class TargetTrack:
             self._seen.popleft()
 
     def at(self, t: float) -> tuple[Array, Array] | None:
-        """Return place (3,) m and velocity (3,) m/s at time t [s], by a line through the last places; None if it is not known or stale."""
+        """Return the position (3,) m and velocity (3,) m/s of the target at time t [s], by a line through the last seen places.
+
+        None if no place is known, or if the last one was seen more than `patience` before t.
+        """
         if not self._seen or t - self._seen[-1][0] > self.patience:
             return None
         times = np.array([time for time, _ in self._seen])
@@ -52,5 +58,5 @@ class TargetTrack:
         return places.mean(axis=0) + (t - times.mean()) * velocity, velocity
 
     def forget(self) -> None:
-        """Drop all places, at the start of a new run."""
+        """Remove all places; called at the start of a new run."""
         self._seen.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks clauses: contradictions with limits or each other, violations at home, rows without effect."""
+"""Checks the clauses of a robot: contradictions with limits or each other, violations at home, rows without effect."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROUNDING = np.deg2rad(0.01)  # rad: tolerance for the digits of a file
 
 
 def constraints(subject: Subject) -> Iterator[Finding]:
-    """Yield all findings about the robot's clauses."""
+    """Yield all findings about the robot's clauses (conditions on motor positions)."""
     robot = subject.robot
     dead = False
     for index, clause in enumerate(robot.clauses):
@@ -39,7 +39,7 @@ def constraints(subject: Subject) -> Iterator[Finding]:
 
 
 def row_range(clause: Clause, limits: Array) -> tuple[Array, Array]:
-    """Return the smallest and the largest a.q + b of every row within the limits (n, 2), each (rows,) rad."""
+    """Return the smallest and the largest a.q + b of every row of a clause within the motor limits (n, 2) rad, each (rows,) rad."""
     ends = clause.a[:, :, None] * limits[None]
     return ends.min(axis=2).sum(axis=1) + clause.b, ends.max(axis=2).sum(axis=1) + clause.b
 
@@ -134,10 +134,11 @@ MARGIN = 1e-6  # rad
 
 
 def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
-    """Return indices of a smallest set of clauses that no pose was found to satisfy together; () if a pose satisfies all.
+    """Return the indices of a small set of clauses that contradict each other; () if none is found.
 
-    `limits` (n, 2) rad; `poses` (k, n) rad within the limits: where the search starts. The search may fail although such a pose exists,
-    but the returned set is small enough for a person to judge.
+    No pose was found that satisfies all clauses of the set; if any single clause is removed from it, a pose is found. `limits` (n, 2) rad.
+    `poses` (k, n) rad: poses within the limits from which the search starts. The search may fail although such a pose exists, but the
+    returned set is small enough for a person to judge.
     """
     for group in _connected(clauses):
         if _satisfiable([clauses[k] for k in group], limits, poses):

@@ -29,7 +29,10 @@ from mobee.robot.xml.versions import CONVERT, WORLD_TAGS, upgrade_robot, upgrade
 
 
 def source(root: Node) -> Iterator[Finding]:
-    """Yield findings about the elements of a zero-position XML file or of a world; rewrites them into today's grammar."""
+    """Yield findings about the elements of a robot file in zero-position XML, or of a world file.
+
+    `root`: the root element; its elements are rewritten into today's grammar, in place.
+    """
     where = f"{root.file}:{root.line}"
     yield from _empty_names(root)
     remarks = upgrade_world(root) if root.tag in WORLD_TAGS else upgrade_robot(root)
@@ -69,7 +72,7 @@ def _empty_names(root: Node) -> Iterator[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """The content of a file, and the findings about it."""
+    """The content of a robot or world file, and the findings about it, errors first."""
 
     content: Robot | World
     findings: tuple[Finding, ...]
@@ -85,10 +88,11 @@ def check_file(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Checked:
-    """Check a shipped robot or world, or a file of one; return its content and all findings, errors first.
+    """Check a shipped robot or world, or a robot or world file; return its content and all findings, errors first.
 
-    `world`: a world in which the robot is also checked, at home. The other options are for a URDF, see `load_robot`.
-    Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read, or if an option does not apply to it.
+    `world`: a world; the objects that the robot touches in it at home are reported too. `field`, `meshes`, `corners`, `srdf`, `home`:
+    options for reading a URDF or MJCF file, as in `mobee.robot.load.load_robot`. Raises RobotFileError, UnknownName or InvalidValue if the
+    file cannot be read, or if an option is not valid for the file.
     """
     _require_known(name_or_path)
     path = world_file(name_or_path)
@@ -130,7 +134,7 @@ def _require_known(name_or_path: str | Path) -> None:
 
 
 def world_file(name_or_path: str | Path) -> Path | None:
-    """Return the file of a world; None for a robot, and where there is no file."""
+    """Return the path of the file of a shipped world or of a world file; None for a robot, and if there is no such file."""
     given, path = str(name_or_path), Path(name_or_path)
     if given in shipped_worlds() and given not in shipped_robots():
         return WORLDS / f"{given}.xml"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks masses: wrong units, impossible moments of inertia, centres far from their links, weights that motors cannot hold."""
+"""Checks the masses of a robot: wrong units, impossible inertias, centres far from their links, weights that motors cannot hold."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_OUTSIDE = 0.1  # m: how far a centre of mass may always lie outside its link
 
 
 def masses(subject: Subject) -> Iterator[Finding]:
-    """Yield all findings about the robot's masses; none for a robot without masses."""
+    """Yield all findings about the robot's masses; no findings for a robot without masses."""
     if not subject.robot.bodies:
         return
     yield from _total(subject)

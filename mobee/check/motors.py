@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks joints, motors, markers and homes: limits, couplings, motors without effect, homes in limit zones."""
+"""Checks the joints, motors, markers and home of a robot: limits, couplings, motors without effect, homes in limit zones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SLACK = 1e-6  # rad or m: tolerance for the digits of a file
 
 
 def joint_limits(subject: Subject) -> Iterator[Finding]:
-    """Find joints without limits, with an empty range, or with one of more than a turn to a side."""
+    """Yield a finding for each joint without limits, with an empty range, or with a limit more than one turn from zero."""
     for joint in subject.robot.joints:
         where, said = subject.where("joint", joint.name), interval(joint.limits, joint.kind)
         low, high = joint.limits
@@ -52,7 +52,7 @@ def joint_limits(subject: Subject) -> Iterator[Finding]:
 
 
 def coupling(subject: Subject) -> Iterator[Finding]:
-    """Find joints that their motors drive beyond their own limits, and joints that no motor drives."""
+    """Yield a finding for each joint that its motors can drive beyond the joint's limits, and for each joint that no motor drives."""
     matrix, offset = subject.robot.coupling
     ends = matrix[:, :, None] * subject.range[None]
     low, high = ends.min(axis=2).sum(axis=1) + offset, ends.max(axis=2).sum(axis=1) + offset
@@ -84,7 +84,7 @@ MIN_RANGE = np.deg2rad(1.0)  # rad: a smaller one cannot be used; any range of a
 
 
 def home_limits(subject: Subject) -> Iterator[Finding]:
-    """Find motors whose home lies outside their limits."""
+    """Yield a finding for each motor whose home is outside the motor's limits."""
     for motor in subject.robot.motor_table:
         if not motor.limits[0] <= motor.home <= motor.limits[1]:
             home = f"{np.rad2deg(motor.home):.4g} deg ({motor.home:.4g} rad)"
@@ -99,7 +99,7 @@ def home_limits(subject: Subject) -> Iterator[Finding]:
 
 
 def idle_motors(subject: Subject) -> Iterator[Finding]:
-    """Find motors that move no shape and no marker."""
+    """Yield a finding for each motor that moves neither a shape nor a marker."""
     bearing = {shape.link for shape in subject.robot.shapes} | {marker.link for marker in subject.robot.markers.values()}
     for motor in subject.robot.motor_table:
         driven = [joint for joint, scale, _ in motor.joints if scale]
@@ -117,7 +117,7 @@ def idle_motors(subject: Subject) -> Iterator[Finding]:
 
 
 def idle_parts(subject: Subject) -> Iterator[Finding]:
-    """Find parts without a motor that an agent could use."""
+    """Yield a finding for each part that no agent can use: it has no motor, or all its motors have a range below 1 degree."""
     units = motor_units(subject.robot)
     ranges = {motor.name: float(np.ptp(motor.limits)) / unit for motor, unit in zip(subject.robot.motor_table, units, strict=True)}
     for part in subject.robot.parts.values():
@@ -135,7 +135,7 @@ def idle_parts(subject: Subject) -> Iterator[Finding]:
 
 
 def unreachable_markers(subject: Subject) -> Iterator[Finding]:
-    """Find markers that no motor moves; in a URDF or MJCF, where every link is a marker, one note for all."""
+    """Yield a finding for each marker that no motor moves; for a URDF or MJCF file, in which many links are markers, one note for all."""
     unmoved = [marker for marker in subject.robot.markers.values() if marker.link not in subject.moved]
     if (subject.is_urdf or subject.is_mjcf) and unmoved:
         yield Finding(
@@ -162,7 +162,10 @@ ROUNDING = 1e-4  # of the motor's range: tolerance for the digits of a file
 
 
 def home_zones(subject: Subject) -> Iterator[Finding]:
-    """Find motors whose home lies inside a limit zone of the default gains, so that they are pushed away, or at the end of a zone."""
+    """Yield a note on all motors whose home is in a limit zone of the default gains, and a second one on those whose zone ends at home.
+
+    The limit forces push the first ones away from home; the second ones rest at home.
+    """
     units = motor_units(subject.robot)
     better = {
         motor.name: outside_zones(motor.home, motor.limits, float(unit))

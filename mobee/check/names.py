@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks names: those that differ in case only, and those that other programs cannot use."""
+"""Checks the names in a robot: names that differ in upper and lower case only, and names that are not valid in keys or lists."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KEY = re.compile(r"[a-z0-9_]+")
 
 
 def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
-    """Find names of one kind that differ in upper and lower case only."""
+    """Yield a finding for each name that differs from another name of its kind (part, link, motor, ...) in upper and lower case only."""
     robot = subject.robot
     kinds: dict[str, Iterable[str]] = {
         "part": robot.parts,
@@ -39,7 +39,7 @@ def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
 
 
 def unusable_names(subject: Subject) -> Iterator[Finding]:
-    """Find parts whose names are not valid in a key of the bus, and motors whose names are not valid in a list."""
+    """Yield a finding for each part with a name that is not valid in a key of the bus, and for each motor with a blank or comma in it."""
     for part in subject.robot.parts:
         if not KEY.fullmatch(part):
             yield Finding(

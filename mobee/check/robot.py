@@ -47,9 +47,10 @@ CHECKS: tuple[Check, ...] = (
 
 
 def check_robot(robot: Robot, world: World | None = None) -> list[Finding]:
-    """Return all findings about a robot, errors first; with a world also the objects that it touches there at home.
+    """Return all findings about a robot, errors first.
 
-    Poses are sampled with a fixed seed, so that the same robot always gets the same findings.
+    `world`: a world; the objects that the robot touches in it at home are reported too. Poses are sampled with a fixed seed, so that the
+    same robot always gets the same findings.
     """
     subject = Subject(robot, world)
     with np.errstate(invalid="ignore"):  # joints without limits are a finding, not a failure of the others

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks shapes: fields that do not enclose the solids of their link, reduced hulls that extend beyond their meshes, duplicates."""
+"""Checks the shapes of a robot: fields that do not enclose their link's solids, reduced hulls larger than the exact ones, duplicates."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ GRID = 7  # points along an edge of a box
 
 
 def surface(shape: Shape) -> Array:
-    """Return points (k, 3) m on the surface of a shape, root frame, zero pose."""
+    """Return points (k, 3) m spread over the surface of a shape, root frame, zero pose; for a convex shape, its vertices."""
     return np.asarray(shape.position + _local_surface(shape) @ shape.rotation.T)
 
 
 def outside(shape: Shape, points: Array) -> Array:
-    """Return the distances (k,) m of points (k, 3) m, root frame, zero pose, from a shape; 0 inside."""
+    """Return the distances (k,) m of `points` (k, 3) m from a shape, 0 for points inside; root frame, zero pose.
+
+    For a convex shape the distance is a lower bound, computed from many planes around the shape.
+    """
     local = (points - shape.position) @ shape.rotation
     if shape.kind == "convex":  # beyond the nearest of many planes around it
         planes = _sphere(4 * BALL).T
@@ -43,7 +46,7 @@ def outside(shape: Shape, points: Array) -> Array:
 
 
 def vertices(shape: Shape) -> Array:
-    """Return the vertices (v, 3) m of a convex shape, in its own axes; none for other shapes."""
+    """Return the vertices (v, 3) m of a convex shape, relative to its position, along its own axes; shape (0, 3) for other shapes."""
     return np.empty((0, 3)) if shape.vertices is None else shape.vertices
 
 
@@ -77,7 +80,10 @@ Link = tuple[list[Shape], list[Shape]]  # solids, fields
 
 
 def fields(subject: Subject) -> Iterator[Finding]:
-    """Find fields inside solids, solids that extend beyond all fields of their link, and links with solids but no field."""
+    """Yield findings about fields inside solids, solids that extend beyond all fields of their link, and links with solids but no field.
+
+    For a robot without any field it is one note.
+    """
     links: dict[tuple[int, str], Link] = defaultdict(lambda: ([], []))  # two robots may stand on one base
     for shape in subject.robot.shapes:
         links[shape.link, shape.part][shape.role == "field"].append(shape)
@@ -144,7 +150,7 @@ SAME_WITHIN = 1e-6  # m
 
 
 def identical_shapes(subject: Subject) -> Iterator[Finding]:
-    """Find shapes of the same role, kind, size and position on the same link."""
+    """Yield a finding for each shape that is a duplicate of another one: the same link, role, kind, size, position and orientation."""
     for one, other in combinations(subject.robot.shapes, 2):
         if _same(one, other):
             yield Finding(
@@ -178,7 +184,10 @@ SUM_WEIGHT = 1e4  # of the condition that the shares sum to 1, relative to the h
 
 
 def hulls(robot: Robot, exact: Robot) -> Iterator[Finding]:
-    """Yield a note if hulls extend beyond the exact ones; `exact`: the same robot, read with `corners="all"`."""
+    """Yield a note if reduced hulls of meshes extend beyond the exact hulls.
+
+    `robot`: the robot with reduced hulls. `exact`: the same robot, read with `corners="all"`.
+    """
     out = {
         shape.name: excess(_root_vertices(shape), _root_vertices(true))
         for shape, true in zip(robot.shapes, exact.shapes, strict=True)
@@ -202,7 +211,7 @@ def hulls(robot: Robot, exact: Robot) -> Iterator[Finding]:
 
 
 def excess(corners: Array, vertices: Array) -> float:
-    """Return the greatest distance [m] of the `corners` (c, 3) from the convex hull of `vertices` (v, 3)."""
+    """Return the greatest distance [m] of one of the points `corners` (c, 3) m from the convex hull of `vertices` (v, 3) m."""
     to_vertex = np.array([np.sqrt(((vertices - corner) ** 2).sum(axis=1).min()) for corner in corners])
     farthest = 0.0
     for k in np.argsort(-to_vertex):

@@ -26,30 +26,30 @@ Touch = tuple[str, str, str]  # first, second, kind
 
 
 class Subject:
-    """A robot, perhaps in a world, with the values that several checks use."""
+    """A robot that is checked, in `world` or alone (None), with values that several checks use; each is computed at its first use."""
 
     def __init__(self, robot: Robot, world: World | None = None) -> None:
         self.robot = robot
         self.world = world
 
     def where(self, kind: str, name: str) -> str:
-        """Return file and line of an element, or those of the robot where the reader recorded none."""
+        """Return "file:line" of an element, for example ("joint", name); that of the robot if the reader did not record the element."""
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
     @property
     def is_urdf(self) -> bool:
-        """Whether the robot was read from a URDF, for which some remedies differ."""
+        """Whether the robot was read from a URDF file; the remedies for some findings are different then."""
         return any(".urdf:" in line for line in self.robot.where.values())
 
     @cached_property
     def is_mjcf(self) -> bool:
-        """Whether the robot was read from an MJCF file."""
+        """Whether the robot was read from an MJCF file; the remedies for some findings are different then."""
         return is_mjcf(Path(self.where("robot", self.robot.name).rpartition(":")[0]))
 
     def urdf_link(self, shape: str) -> str | None:
-        """Return the URDF link of a shape; a fixed joint may join it to the robot's link.
+        """Return the name of the link of a shape in the URDF file, before links of fixed joints are merged.
 
-        None for another kind of file, and where shapes of several links begin in one line.
+        `shape`: name of the shape. Returns None for another kind of file, and if shapes of several links begin in the same line.
         """
         return self._urdf_links.get(self.where("shape", shape))
 
@@ -67,34 +67,34 @@ class Subject:
 
     @cached_property
     def range(self) -> Array:
-        """Motor limits (n, 2) rad; half a turn to each side for a motor without limits."""
+        """The lower and upper limit of each motor, (n, 2) rad; an infinite limit is replaced by half a turn."""
         return np.nan_to_num(self.robot.limits, nan=0.0, neginf=-np.pi, posinf=np.pi)
 
     @cached_property
     def samples(self) -> Array:
-        """Poses (POSES, n) rad, uniform within the limits."""
+        """The sampled poses, (POSES, n) rad, POSES = 256: uniformly distributed within `range`, with a fixed seed."""
         low, high = self.range.T
         return np.random.default_rng(SEED).uniform(low, np.maximum(high, low), (POSES, len(low)))
 
     @cached_property
     def home(self) -> Array:
-        """The home posture, (n,) rad."""
+        """The motor positions at home, (n,) rad; 0 for a home that is not a number."""
         return np.nan_to_num(self.robot.home)
 
     @cached_property
     def limited(self) -> Robot:
-        """The robot with finite limits for all motors: `range` replaces the limits of the file. A model needs finite limits."""
+        """The robot with finite limits for all motors, which a model needs: `range` replaces the limits of the file."""
         motors = zip(self.robot.motor_table, self.range, strict=True)
         return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
 
     @cached_property
     def at_home(self) -> tuple[Contact, ...]:
-        """Contacts at home, including those with the world."""
+        """The contacts of the robot at home with itself and with the objects of the world."""
         return Model(self.limited, self.world).evaluate(self.home).contacts
 
     @cached_property
     def always(self) -> frozenset[Touch]:
-        """Pairs of the robot's shapes that overlap at home and in every sampled pose."""
+        """The pairs of the robot's shapes that overlap at home and in every sampled pose, as (first name, second name, kind)."""
         model = Model(self.limited)
         left = touches(model.evaluate(self.home).contacts)
         for q in self.samples:
@@ -105,7 +105,10 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """(field, solid, depth [m]): fields that overlap a solid of another part at home, but touch no field of that solid's link."""
+        """The fields that overlap a solid of another part at home, but touch no field of that solid's link.
+
+        Each is given as (field, solid, depth [m]). Fields act on fields only, so no force keeps the field's part away from the solid.
+        """
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
         near = [
@@ -127,7 +130,7 @@ class Subject:
 
     @cached_property
     def moved(self) -> frozenset[int]:
-        """Links that a motor moves in the root frame."""
+        """The indices of the links that a motor moves."""
         driven = set(np.flatnonzero(self.robot.coupling[0].any(axis=1)))
         found: set[int] = set()
         for index, joint in enumerate(self.robot.joints):
@@ -137,7 +140,7 @@ class Subject:
 
     @cached_property
     def below(self) -> tuple[frozenset[int], ...]:
-        """The links that each joint carries, including the one that it moves."""
+        """For each joint, the indices of the links that it carries, including the link that it moves."""
         carried: list[set[int]] = [{index + 1} for index in range(len(self.robot.joints))]
         for index in reversed(range(len(self.robot.joints))):
             parent = self.robot.joints[index].parent
@@ -147,5 +150,5 @@ class Subject:
 
 
 def touches(contacts: tuple[Contact, ...]) -> set[Touch]:
-    """Return the pairs of these contacts."""
+    """Return the pairs of volumes of some contacts, as a set of (first name, second name, kind)."""
     return {(contact.first, contact.second, contact.kind) for contact in contacts}

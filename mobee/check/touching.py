@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks which links touch at home or in every pose, and which pairs are never tested; writes touching pairs into an SRDF."""
+"""Finds links that touch at home or in every pose, and pairs that are never tested; writes touching pairs into an SRDF."""
 
 from __future__ import annotations
 
@@ -39,7 +39,11 @@ UNKNOWN = "left out by an <ignore> of the file, or by the program that made the 
 
 @dataclass(frozen=True, slots=True)
 class UntestedGroup:
-    """Pairs that are never tested for one reason: names of links, and the numbers of pairs of shapes."""
+    """All pairs of shapes that are never tested for contacts for the same reason.
+
+    `kind`: the reason without names; groups of the same kind can be added up. `links`: names of the pairs of links. `solids`, `fields`: the
+    numbers of pairs of solids and of fields.
+    """
 
     reason: str
     kind: str  # the reason without names: groups of one kind are summed up together
@@ -49,9 +53,9 @@ class UntestedGroup:
 
 
 def untested_groups(robot: Robot) -> list[UntestedGroup]:
-    """Return all pairs of links with shapes that are never tested against each other, by reason, the largest group first.
+    """Return the pairs of the robot's shapes that are never tested for contacts, in one group for each reason, the largest group first.
 
-    Solids are never tested against fields of the same robot, so such pairs are not listed.
+    Solids are never tested against fields of the same robot; such pairs are not listed.
     """
     links: dict[str, set[tuple[int, int]]] = defaultdict(set)
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
@@ -103,7 +107,12 @@ LinkNames = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class TouchingPair:
-    """Two links whose solids touch; for a URDF its own links, before links of fixed joints are merged."""
+    """Two links whose solids touch.
+
+    `first`, `second`: names of the links; for a URDF, of its own links, before links of fixed joints are merged. `reason`: "Always": they
+    touch in all random poses; "Default": they touch at home (the words of MoveIt). `depth`: m, of the deepest contact at home, 0 if they do
+    not touch there. `share`: the fraction of the random poses in which they touch.
+    """
 
     first: str
     second: str
@@ -113,9 +122,9 @@ class TouchingPair:
 
 
 def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]:
-    """Return the pairs that touch at home or in all random poses, those that always touch first; the poses have a fixed seed.
+    """Return the pairs of links whose solids touch at home or in all random poses, the pairs that always touch first.
 
-    Only the robot's own solids are tested: no fields, and no objects of a world.
+    `poses`: number of random poses, which have a fixed seed. Fields and objects of a world are not tested.
     """
     subject = Subject(replace(robot, field_pairs=robot.field_pairs[:0]))
     model = Model(subject.limited)
@@ -155,7 +164,7 @@ def _links(subject: Subject, first: int, second: int) -> LinkNames:
 
 
 def always_touching(subject: Subject) -> Iterator[Finding]:
-    """Find pairs that overlap in every sampled pose."""
+    """Yield a finding for each pair of shapes that overlaps at home and in every sampled pose."""
     for first, second, kind in sorted(subject.always):
         yield Finding(
             "warning",
@@ -186,7 +195,10 @@ def _ignoring(subject: Subject, first: str, second: str) -> str:
 
 
 def home_contacts(subject: Subject) -> Iterator[Finding]:
-    """Find solids that collide and fields that push at home, but not in every pose."""
+    """Yield a finding for each contact of solids or of fields at home, including contacts with the world.
+
+    Pairs that overlap in every sampled pose are left out, since `always_touching` reports them.
+    """
     world = subject.world.objects if subject.world else {}
     for contact in subject.at_home:
         if (contact.first, contact.second, contact.kind) in subject.always:
@@ -215,7 +227,7 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def world_contacts(subject: Subject) -> Iterator[Finding]:
-    """Report in one note the objects of the world that the robot touches at home; nothing without a world."""
+    """Yield one note with the objects of the world that the robot touches at home; no finding without a world."""
     if subject.world is None:
         return
     world = subject.world.objects
@@ -246,7 +258,10 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Find fields that overlap, at home, a solid of another part but no field of its link; report the deepest for each pair of parts."""
+    """Yield a note for each pair of parts of which a field of one overlaps a solid of the other at home, but no field of the solid's link.
+
+    Fields act on fields only, so no force keeps the two apart. The note gives the deepest such overlap.
+    """
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
         parts = field.part, solid.part
@@ -275,7 +290,12 @@ def _left_out(subject: Subject, one: int, other: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """The result of `leave_out_touching`: the file, the pairs that were written, and the contacts that remain at home."""
+    """The result of `leave_out_touching`.
+
+    `path`: of the SRDF file. `merged`: whether the file existed before, or the text of another SRDF was copied. `pairs`: the pairs that
+    were added to the file. `enabled`: touching pairs that were not added, because the file enables their test. `touching`: number of
+    contacts of solids that remain at home. `found`: whether `load_robot` finds the file without being given its path.
+    """
 
     path: Path
     merged: bool  # whether the file existed before, or the text of another SRDF was copied
@@ -286,10 +306,11 @@ class LeftOut:
 
 
 def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any) -> LeftOut:
-    """Write <disable_collisions> for every two links of a URDF whose solids touch at home or in all of many random poses.
+    """Write <disable_collisions> into an SRDF for every two links of a URDF whose solids touch at home or in all random poses.
 
-    `out`: the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside it. The text of an existing SRDF is kept
-    word for word. The file is written completely or not at all. `options`: of `load_robot`. Raises RobotFileError and InvalidValue.
+    `out`: path of the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside the URDF. The text of an existing
+    SRDF is kept word for word. The file is written completely or not at all. `options`: keyword arguments of `load_robot`. Raises
+    RobotFileError, and InvalidValue for a file that is not a URDF or a target that cannot be used.
     """
     path = find_file(urdf, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":

@@ -19,7 +19,7 @@ QUARTERS = np.deg2rad(np.pi / 4 * np.array([1, 2, 3, 4, 6, 8]))  # rad: 45, 90, 
 
 
 def size(subject: Subject) -> Iterator[Finding]:
-    """Find a robot that is implausibly large or small."""
+    """Yield a finding if the whole robot is larger than 10 m or smaller than 1 cm, which suggests a wrong unit of length."""
     things = list(_things(subject))
     if not things:
         return
@@ -48,7 +48,7 @@ def size(subject: Subject) -> Iterator[Finding]:
 
 
 def radians(subject: Subject) -> Iterator[Finding]:
-    """Find ranges of motors that look like radians read as degrees; not in a URDF, which is in radians."""
+    """Yield a finding if ranges of motors look like radians that were read as degrees; not for a URDF, which is in radians."""
     if subject.is_urdf:
         return
     turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor)]
@@ -81,7 +81,7 @@ def _things(subject: Subject) -> Iterator[tuple[str, str, Array]]:
 
 
 def half_extent(shape: Shape) -> Array:
-    """Return half the size (3,) m of the shape's bounding box along the root frame's axes."""
+    """Return half the size (3,) m of a box around the shape, centred at its position, along the axes of the root frame at zero pose."""
     if shape.kind == "convex":
         return np.asarray(np.abs(vertices(shape) @ shape.rotation.T).max(axis=0))
     if shape.kind == "box":

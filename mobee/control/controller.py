@@ -31,15 +31,15 @@ FOLLOW_TIME = 0.1  # s of the law's time for which the velocity of a moving goal
 
 
 class Controller:
-    """Integrates thesis eq. 5.7 over all motors of a robot and returns a command in every tick.
+    """Computes the motion of all motors by thesis eq. 5.7 and returns a command in every tick.
 
-    The velocity in the law is the controller's own state; only q comes from the encoders. Velocity commands are the original modality;
-    position commands integrate the controller's own reference; torque commands also compensate gravity if the robot's file has
-    masses. Commands keep the motors' limits of velocity (times `speed_scale`, 0 to 1) and acceleration, so that the safety gate
-    refuses none.
+    The velocity in the equation is the controller's own state; only the position q comes from the encoders. The modality is the kind of
+    command: "velocity" (as in the original program); "position", the integral of the controller's own velocity; "torque", which also
+    compensates gravity if the robot's file has masses. Commands stay within the motors' limits of acceleration and of velocity (times
+    `speed_scale`), so the safety gate accepts them.
 
-    An attractor may be outside the motors' limits: it pulls with at most `max_spring`, and the limits push back. The plants refuse
-    such a goal.
+    The attractor q* may be outside the motors' limits: its spring pulls with at most the force `max_spring` of the gains, and the force
+    `limits` pushes back. Plants (`mobee.plant.Plant`) refuse an attractor outside the limits.
     """
 
     __slots__ = (
@@ -61,14 +61,14 @@ class Controller:
         """Start at rest, with the attractor at the robot's home; raises InvalidValue and UnknownName.
 
         Args:
-            model: evaluates contacts when `step` is given neither forces nor a pose.
-            gains: of the law; None: the default ones.
-            modality: of the commands.
-            propagate: how far down the body a contact acts, "tree" or "part".
-            speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
-            contact_forces: False leaves f_coll at zero.
-            alive: (n,) the motors on which forces act; the others are never moved. None: all.
-            terms: user-defined forces, added to those of the law; `max_dt` does not include them.
+            model: the robot in its world; it evaluates contacts when `step` is given neither forces nor a pose.
+            gains: numbers of the control law; None: `Gains.default()`.
+            modality: the kind of the commands, "position", "velocity" or "torque".
+            propagate: the motors on which a contact acts: "tree": all motors down to the base; "part": only those of the part that touches.
+            speed_scale: fraction of the motors' largest speed that commands may use, above 0, at most 1.
+            contact_forces: False: contacts cause no force (f_coll is 0).
+            alive: (n,) True for the motors on which forces act; the others are never moved. None: all motors.
+            terms: user-defined forces, added to the forces of the law. The largest stable time step `max_dt` is computed without them.
         """
         if not callable(getattr(model, "track", None)):  # other classes with the same methods are valid too
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
@@ -88,7 +88,7 @@ class Controller:
         self.weight = self.gains.weight(self.robot.motors)
         self.max_dt = largest_step(self.robot, self.gains)
         self.law = Law(self.robot, self.gains, modality, speed_scale, contact_forces, alive)
-        """The law as tables for the core."""
+        """The control law of this robot as tables for the core."""
         self.terms = valid_terms(terms)
         self.force_names = (*term_names(), *(term.name for term in self.terms))
         """The names of the forces in `last_forces`, in the order in which they are added."""
@@ -100,7 +100,10 @@ class Controller:
 
     @property
     def attractor(self) -> Array:
-        """q*, shape (n,), in [rad]: a copy."""
+        """The position q* that attracts the motors, shape (n,), in [rad]; a copy.
+
+        Assign an array to set it; the attractor then does not move.
+        """
         return self._attractor.copy()
 
     @attractor.setter
@@ -110,72 +113,81 @@ class Controller:
 
     @property
     def velocity(self) -> Array:
-        """The law's own velocity, shape (n,), in [rad/s]: a copy."""
+        """The velocity q' of the law's own state, shape (n,), in [rad/s]; a copy. It is not measured."""
         own: Array = self._state["velocity"].copy()
         return own
 
     @property
     def acceleration(self) -> Array:
-        """The acceleration of the last step, shape (n,), in [rad/s^2]: a copy."""
+        """The commanded acceleration of the last step, shape (n,), in [rad/s^2]; a copy."""
         own: Array = self._state["acceleration"].copy()
         return own
 
     @property
     def state(self) -> Table:
-        """The state of the law, a row for each motor (see `mobee._core.law.STATE`); always the same array, which plants change in place."""
+        """The state of the law: a table with one row for each motor, always the same array.
+
+        Its columns are those of `mobee._core.law.STATE`: velocity, acceleration, position reference and others. The law and the plants
+        change it in place.
+        """
         return self._state
 
     @property
     def goal(self) -> Array:
-        """The attractor itself, shape (n,), in [rad]: always the same array, no copy."""
+        """The attractor q*, shape (n,), in [rad]. It is the controller's own array and not a copy, so it always has the present values."""
         return self._attractor
 
     @property
     def last_forces(self) -> Forces:
-        """The constraint forces of the last step."""
+        """The constraint forces of the last step by name, with the forces of user-defined terms, each (n,) rad/s^2; 0 after `reset`."""
         known = self._last_forces
         return known if isinstance(known, Forces) else Forces(**dict(zip(self.force_names, known.copy(), strict=True)))
 
     def note_forces(self, forces: Array) -> None:
-        """Set `last_forces` to rows (forces, n) in the order of `force_names`.
+        """Store the forces that `last_forces` returns: (number of forces, n) rad/s^2, one row for each name in `force_names`.
 
-        The rows are not copied: `last_forces` always shows their present values.
+        The array is not copied: if the caller changes it later, `last_forces` shows the new values.
         """
         self._last_forces = forces
 
     @property
     def pushed(self) -> bool:
-        """Whether a client pushes markers; such forces depend on the pose."""
+        """Whether a force of `push` acts on a marker. Such a force on the motors depends on the pose."""
         return bool(self._pushes)
 
     @property
     def reaches(self) -> Reaches:
-        """The reaches in progress."""
+        """The reaches in progress: forces that pull a marker to a target, begun by `reach_toward`."""
         return self._reaches
 
     def client_force(self, q: Array) -> Array:
-        """Return f_config + f_work at q (n,) rad, each bounded, (n,) rad/s^2 (thesis eqs. 5.9 and 5.10)."""
+        """Return the forces of the client at q (n,) rad, f_config + f_work of thesis eqs. 5.9 and 5.10, (n,) rad/s^2.
+
+        These are the forces given to `force` and `push`, each bounded. 0 if there are none.
+        """
         total = np.zeros(len(q))
         if self._pushes or self.forced:
             self._add_client(q, total)
         return total
 
     def set_attractor(self, part: str, q: Array) -> None:
-        """Set the attractor of one part, (n_part,) rad, which stands still; raises InvalidValue and UnknownName."""
+        """Set the attractor of one part, (n_part,) rad, as a goal that does not move; raises InvalidValue and UnknownName."""
         where = self.robot.part(part)
         self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
         self._state["goal_time"][where.slice] = 0.0
 
     def follow(self, part: str, q: Array, velocity: Array) -> None:
-        """Set the attractor of one part to a moving goal; call it at least every FOLLOW_TIME of the law's time, else the goal stands still.
+        """Set the attractor of one part to a goal that moves with a known velocity.
 
-        The damping of eq. 5.7 is relative to the goal's velocity, C (q' - q*'), so that the part follows without a lag.  A motor yields
-        to forces that oppose this velocity: from 0.25 rad/s^2 on, only the spring pulls it.  Raises InvalidValue and UnknownName.
+        The damping of eq. 5.7 then acts on the velocity relative to the goal, C (q' - q*'), so that the part follows without a lag. If
+        other forces push a motor against the goal's velocity, the motor follows less; if they are 0.25 rad/s^2 or more, only the spring of
+        the attractor pulls the motor. Call this at least every FOLLOW_TIME (0.1 s of the law's time); later the goal counts as not moving.
+        Raises InvalidValue and UnknownName.
 
         Args:
-            part: the part.
-            q: (n_part,) rad, where the goal is now.
-            velocity: (n_part,) rad/s, of the goal.
+            part: name of the part.
+            q: (n_part,) rad, present position of the goal.
+            velocity: (n_part,) rad/s, velocity of the goal.
         """
         where = self.robot.part(part)
         moving = checked(f"velocity of {part}", velocity, len(where))
@@ -183,75 +195,87 @@ class Controller:
         self._state["goal_velocity"][where.slice], self._state["goal_time"][where.slice] = moving, FOLLOW_TIME
 
     def force(self, f: Array) -> None:
-        """Apply a force on the motors, (n,) rad/s^2 or m/s^2, until the next call or `clear` (f of thesis eq. 5.9)."""
+        """Apply a client's force f to the motors until the next call or `clear` (thesis eq. 5.9); raises InvalidValue.
+
+        `f`: (n,) rad/s^2, or m/s^2 for a motor that slides.
+        """
         self._client = checked_force("force", f, len(self.robot.motors))
         self.forced = bool(self._client.any())
 
     def push(self, marker: str, f: Array) -> None:
-        """Apply a force (3,), or a force and a moment (6,), root frame, to a marker until the next call or `clear` (thesis eq. 5.10).
+        """Apply a client's force to a marker until the next call for this marker, or `clear` (thesis eq. 5.10).
 
-        It is per unit mass: J^T f is in rad/s^2 before it is bounded.
+        `f`: force (3,), or force and moment (6,), in the root frame, per unit mass: J^T f is in rad/s^2, and is then bounded. Raises
+        InvalidValue and UnknownName.
         """
         self.robot.marker(marker)
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
-        """End `force` and all pushes; reaches continue."""
+        """End the forces of `force` and of all calls of `push`; reaches continue."""
         self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 
     def reach_toward(self, part: str | None, marker: str, target: ReachTarget) -> None:
-        """Pull a marker to a target with the motors of one part, against its attractor, until the next call or `end_reach` (thesis 8.2).
+        """Pull a marker to a target with the motors of one part, until the next call for this part or `end_reach` (thesis 8.2).
 
-        `part` None: with all motors that move the marker. Raises InvalidValue if no such motor may be moved, and UnknownName.
+        The spring of the attractor and all other forces act at the same time. `part` None: pull with all motors that move the marker.
+        Raises InvalidValue if the marker is moved by none of the motors that may move, and UnknownName.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
         self._reaches[part].aim(target)
 
     def end_reach(self, part: str | None) -> None:
-        """End the reach of a part, or of the whole body (None), if it has one."""
+        """End the reach of a part (None: the reach of the whole body). Without such a reach nothing happens."""
         if part is not None:
             self.robot.part(part)
         self._reaches.end(part)
 
     def is_approaching(self, part: str | None) -> bool:
-        """Return whether the part's reach still moves its marker nearer to the target; it is over only when this is False."""
+        """Return whether the reach of a part (None: of the whole body) still moves its marker nearer to the target.
+
+        An action with a reach is over only when this is False. It is always False under the published law, and without a reach.
+        """
         return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
-        """Start from rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q."""
+        """Set the law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
+
+        Forces of clients and reaches continue.
+        """
         q = checked("q", q, len(self.robot.motors))
         self._attractor[:] = q
         self._state[:] = self.law.at_rest(q)
         self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
-        """Stop a part: own velocity 0, attractor at its measured q (n_part,) rad.
+        """Stop a part: set its own velocity to 0 and its attractor to its measured position q (n_part,) rad.
 
-        The commanded velocity follows as fast as the acceleration limit allows.
+        The commanded velocity then decreases as fast as the acceleration limit allows.
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
         self._state["velocity"][where] = self._state["acceleration"][where] = 0.0
 
     def rest(self, part: str, q: Array) -> None:
-        """Reset one part to rest at its measured q (n_part,) rad, as `reset` does for all; for a part whose motors do not follow commands.
+        """Set one part to rest at its measured q (n_part,) rad, as `reset` does for all parts. Use it if the motors do not follow commands.
 
-        Unlike after `hold`, the commanded velocity starts from 0 and the position reference from q.
+        The next commands start from velocity 0 and from the position q. After `hold`, in contrast, they continue from the last commands.
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
         self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """Return the law's own constraint forces at a pose, as `step` computes them when it is given none."""
+        """Return the constraint forces of the law at a pose, as `step` computes them if no forces are given; without user-defined terms."""
         return forces_of(self.law, pose, self.propagate, self._state)
 
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
-        """Return the forces of `terms` for a tick of dt [s] at the measured q (n,) rad; raises InvalidValue, which names the term.
+        """Return the forces of the user-defined `terms` by name, each (n,) rad/s^2, at the measured q (n,) rad in a tick of dt [s].
 
-        `pose` None: evaluated when a term reads it, with the markers that are `reaching` (see `Model.evaluate`).
+        `pose`: the robot at q; None: evaluated when a term reads it. `reaching`: the markers that reach in this pose; contacts of their
+        hands with targets are ignored. Raises InvalidValue, with the name of the term, if a term fails.
         """
         if not self.terms:
             return {}
@@ -264,9 +288,10 @@ class Controller:
     def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
         """Advance the law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
 
-        `forces`: the constraint forces; None: computed at `pose`, or with the model. Forces that depend on the law's state, and those of
-        `terms`, are added if they are absent. Raises InvalidValue for a dt at which the gains are unstable (`max_dt` and above), for a q
-        that is not finite, and for forces that are not finite or whose sum is beyond LARGEST_FORCE.
+        `forces`: the constraint forces at q; None: computed from `pose`, the robot at q; without a pose the model evaluates q. Forces that
+        depend on the law's state, and the forces of `terms`, are computed if `forces` does not contain them. Raises InvalidValue for a dt
+        at which the law is unstable (`max_dt` or more), for a q that is not finite, and for forces that are not finite or whose sum is
+        above LARGEST_FORCE (1e9 rad/s^2).
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)

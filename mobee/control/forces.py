@@ -31,16 +31,19 @@ LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far above what any squash l
 class Forces(Mapping[str, Array]):
     """The constraint forces by name, each (n,) in rad/s^2 (force per unit mass), already bounded.
 
-    First those of the law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim, f_cst and
-    f_coll of thesis eq. 5.7; then those of user-defined terms. Each is an attribute too. Forces of the law that depend on its state may be
-    absent.
+    First are the forces of the law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim, f_cst
+    and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute: `forces.limits`.
+    Forces of the law that depend on its state may be missing; such forces exist only in a core that was extended.
     """
 
     __slots__ = ("_rows",)
     __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __init__(self, *rows: Array, **more: Array) -> None:
-        """`rows`: forces of the law in their order; `more`: other forces of the law, and those of user-defined terms, by name."""
+        """Store forces of the law in their order (`rows`) or by name (`more`), and those of user-defined terms by name (`more`).
+
+        Raises InvalidValue if a force that depends on the pose only is missing, or if one is given twice.
+        """
         if not more and len(rows) == len(term_names()):
             self._rows = dict(zip(term_names(), rows, strict=True))
             return
@@ -77,26 +80,30 @@ class Forces(Mapping[str, Array]):
 
 
 def published_terms() -> tuple[str, ...]:
-    """Return the names of the terms that depend on the pose only: the model publishes these, the controller computes the others."""
+    """Return the names of the law's forces that depend on the pose only. The model publishes these; the controller computes all others."""
     return tuple(name for name in term_names() if name not in state_term_names())
 
 
 def needs_contacts() -> bool:
-    """Return whether some terms depend on the law's state, such as its velocity: then the model publishes the contacts too."""
+    """Return whether some forces of the law depend on the law's state, such as its velocity. The model then publishes the contacts too."""
     return bool(state_term_names())
 
 
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:
-    """Return the constraint forces at one pose (thesis eqs. 5.11 to 5.17); raises InvalidValue for a batch.
+    """Return the constraint forces at one pose (thesis eqs. 5.11 to 5.17); raises InvalidValue for a batch of poses.
 
-    `propagate`: how far down the body a contact acts. `contact_forces` False leaves f_coll at zero, for experiments in which contacts
-    have no effect.
+    `propagate`: "tree": a contact acts on all motors down to the base; "part": on the motors of its part only. `contact_forces` False:
+    f_coll is 0, for experiments in which contacts have no effect.
     """
     return forces_of(_law(pose.robot, gains, contact_forces), pose, propagate)
 
 
 def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = None) -> Forces:
-    """Return the constraint forces of a law at one pose; `state`: of the law, None: at rest."""
+    """Return the constraint forces of a law at one pose; raises InvalidValue for a batch of poses, and UnknownName.
+
+    `propagate`: "tree": a contact acts on all motors down to the base; "part": on the motors of its part only. `state`: the state of the
+    law, with the columns of `mobee._core.law.STATE`; None: at rest.
+    """
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")
     if propagate not in ("tree", "part"):
@@ -111,7 +118,7 @@ def _law(robot: Robot, gains: Gains, contact_forces: bool) -> Law:
 
 
 def checked(what: str, value: Array, length: int) -> Array:
-    """Return a copy of an array (length,) of finite numbers; raises InvalidValue with the name `what`."""
+    """Return a copy of `value` as an array (length,) of finite numbers; raises InvalidValue, with the name `what`, if it is not valid."""
     # The first test is for the usual case: the general checks below take several times as long.
     if type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == (length,) and all(map(math.isfinite, value.tolist())):
         return value.copy()
@@ -125,7 +132,10 @@ def checked(what: str, value: Array, length: int) -> Array:
 
 
 def checked_force(what: str, value: Array, length: int) -> Array:
-    """Return a copy of an array (length,) of numbers of at most LARGEST_FORCE in size; raises InvalidValue with the name `what`."""
+    """Return a copy of `value` as an array (length,) of finite numbers of at most LARGEST_FORCE (1e9) in size.
+
+    Raises InvalidValue, with the name `what`, if it is not valid.
+    """
     array = checked(what, value, length)
     if np.abs(array).max(initial=0.0) > LARGEST_FORCE:
         raise InvalidValue(f"{what}: {array[np.abs(array).argmax()]:.3g}; must be at most {LARGEST_FORCE:g} in size")

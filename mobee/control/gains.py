@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The gains of the control law, in two named sets, and the test that ends an action (thesis 6.1)."""
+"""The gains of the control law, in named sets, and the settle test, which ends an action (thesis 6.1)."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor 
 
 Verdict = Literal["moving", "settled", "timeout"]
 VERDICTS: tuple[Verdict, ...] = ("moving", "settled", "timeout")
-"""The verdicts, in the order of the core."""
+"""The possible results of the settle test, in the order of their numbers in the core."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settle:
-    """The thresholds of the settle test. They are part of the physics: they decide which states are hard to reach.
+    """The thresholds of the settle test. They influence the results of learning, because they decide which states are hard to reach.
 
-    A part has settled when no motor is commanded beyond `speed` and `acceleration`. For a motor that slides both are in its fine unit
-    (`mobee.robot.motor_units`): 3 deg/s are 0.4 % of its range per second.
+    A part has settled when the commanded speed and acceleration of all its motors are at most `speed` [rad/s] and `acceleration` [rad/s^2].
+    The test is made `first_check` s after the start of the action and then every `interval` s; after `timeout` s the action ends without
+    having settled. For a motor that slides, its speed and acceleration are divided by its fine unit (`mobee.robot.motor_units`) first: 3
+    deg/s are then 0.4 % of its range per second.
     """
 
     speed: float  # rad/s
@@ -55,26 +57,30 @@ class Settle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gains:
-    """The numbers of the law of thesis eq. 5.7, and its variant. The mass is 1, so a force is an acceleration in rad/s^2.
+    """The numbers of the control law of thesis eq. 5.7, and the variant of the law.
 
-    All numbers are for motors that turn. For a motor that slides, 1 rad is a share of its range (`mobee.robot.motor_units`), so that
-    the law is the same in that unit: `limit_width` of 10 degrees is 5 % of its range, a `max_` of 12 rad/s^2 is 3.4 ranges/s^2.
-    `dataclasses.asdict` of a set of gains goes through JSON and back by `Gains(**read)`.
+    The mass is 1, so a force is an acceleration in rad/s^2. All numbers are for motors that turn. For a motor that slides, 1 rad stands for
+    a fraction of its range (`mobee.robot.motor_units`): a `limit_width` of 10 degrees is 5 % of the range, a force of 12 rad/s^2 is 3.4
+    ranges/s^2. Gains can be stored as JSON: write `dataclasses.asdict(gains)`, and make `Gains(**read)` from what was read.
 
     Attributes:
-        law: the variant: how constraints and contacts become forces (see `mobee.reference.forces`).
+        law: the variant of the law, which decides how constraints and contacts become forces (see `mobee.reference.forces`).
         damping: C in 1/s.
         stiffness: K in 1/s^2.
-        max_spring, max_limit, max_constraint, max_contact, max_client: bounds of the forces, rad/s^2.
+        max_spring, max_contact, max_client: largest size of the force of the attractor, of contacts and of a client, rad/s^2.
+        max_limit, max_constraint: force at a limit, or at the boundary of a clause, rad/s^2; the force increases further beyond it. In the
+            published law `max_constraint` is the largest force.
         limit_width: width of the zone before each limit, rad.
-        constraint_width: width of the zone of a clause, rad along the row's normal; published law: in units of a.q + b.
-        contact_gain: default law: rad/s^2 for a lever and a depth of 1 m; published law: deg/s^2 before it is squared.
-        contact_slope, client_slope: slope of the squash at 0.
+        constraint_width: width of the zone before the boundary of a clause, rad along the row's normal; published law: in units of a.q + b.
+        contact_gain: default law: force in rad/s^2 of a contact with a depth of 1 m and a lever of 1 m/rad; published law: a factor of the
+            same product, which is squared afterwards; the square is in deg/s^2.
+        contact_slope, client_slope: slope at 0 of the function that bounds the force (k of eq. 5.8).
         client_squash: "each" bounds a client's force motor by motor (eq. 5.8 as printed), "direction" bounds its norm in each part.
         settle: thresholds of the settle test.
-        weights: (pattern of motor names, 0 or 1); the first match counts, 1 without a match. A motor of weight 0 is never moved.
-        motors: (pattern, gains of these motors), see `with_motors`.
-        groups: the same, applied after `motors`; patterns that match no motor of a robot are ignored.
+        weights: pairs (pattern of motor names, 0 or 1). A motor of weight 0 is never moved. The first pattern that matches a motor counts;
+            a motor without a match has weight 1.
+        motors: pairs (pattern of motor names, gains of these motors), as `with_motors` adds them.
+        groups: such pairs too, with lower priority than `motors`; patterns that match no motor of a robot are ignored.
     """
 
     law: Law
@@ -121,12 +127,12 @@ class Gains:
 
     @classmethod
     def default(cls) -> Gains:
-        """Return the thesis' equations with our own tuning: time constant C/K = 0.32 s, contacts that stay within the fields.
+        """Return the default gains: the equations of the thesis with our own tuning. Contacts then stay within the fields.
 
-        Tuned by the experiment `gain-tuning`, with the lag and delay of the motors and commands up to three ticks old at 100 Hz. With a
-        stiffer contact the robot begins to oscillate; with stronger springs it passes through the fields. The springs of torso and
-        shoulders are weaker, because many motors push a hand together. The bound of the contact force is a little above the springs
-        of an arm together, so that the force is stiff where a field begins.
+        The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with the lag and delay of the motors and commands
+        up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs its links pass through
+        the fields. The springs of torso and shoulders are weaker, because many motors push a hand together. The bound of the contact force
+        is a little above the sum of the springs of an arm, so that a contact is stiff even at the border of a field.
         """
         return cls(
             law="default",
@@ -148,9 +154,9 @@ class Gains:
 
     @classmethod
     def published_2014(cls) -> Gains:
-        """Return the gains of the 2014 program, converted from its degrees; with them the published findings appear.
+        """Return the gains of the 2014 program, converted from degrees. They are needed to reproduce the published findings.
 
-        Fingers and eyes do not move. Contacts are centimetres deep in the fields of the robot model.
+        Fingers and eyes do not move. Obstacles enter the fields of the robot model by centimetres.
         """
         return cls(
             law="published_2014",
@@ -173,16 +179,18 @@ class Gains:
 
     @classmethod
     def derived(cls) -> Gains:
-        """Return the default gains for robots whose fields were derived, see `mobee.derive`: contact forces have a larger bound.
+        """Return the default gains with a larger bound of the contact force (50 rad/s^2), for robots whose fields `mobee.derive` computed.
 
-        Such robots have a least lever, so contacts of all levers have the stiffness contact_gain * LEVER^2 = 450 1/s^2. With the bound of
-        the default gains, tuned for the wide fields of the iCub, limbs with strong springs press their fields together.
+        Such robots have a least lever (`Robot.least_lever`), because of which contacts of all levers have the same stiffness, contact_gain
+        * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The lever of a contact is the change of its depth if the motors move by 1 rad. The bound of
+        the default gains is tuned for the wide fields of the iCub; with it, strong springs would press the fields of such a robot's links
+        into each other.
         """
         return replace(cls.default(), max_contact=50.0)
 
     @classmethod
     def named(cls, name: str) -> Gains:
-        """Return the gains named "default", "derived" or "published_2014"; raises UnknownName."""
+        """Return the set of gains with the name "default", "derived" or "published_2014"; raises UnknownName."""
         sets = {"default": cls.default, "derived": cls.derived, "published_2014": cls.published_2014}
         if name not in sets:
             raise UnknownName("gain set", name, sets)
@@ -191,16 +199,17 @@ class Gains:
     def with_motors(self, pattern: str, **gains: float) -> Gains:
         """Return gains with other values for the motors that match a pattern, for example `gains.with_motors("*_elbow", stiffness=50.0)`.
 
-        The last setting has priority. Values are in the unit of the motor: for one that slides, limit_width in m and each `max_` in
-        m/s^2; its other gains still follow its range. Motors can have their own damping, stiffness, max_spring, limit_width, max_limit,
-        client_slope, max_client and weight. Clauses and contacts involve several motors and have one set of gains.
+        If several calls match a motor, the last call counts. Values are in the unit of the motor: for a motor that slides, `limit_width` is
+        in m and each `max_` in m/s^2; its other gains still depend on its range. These gains can be set for single motors: damping,
+        stiffness, max_spring, limit_width, max_limit, client_slope, max_client and weight. Clauses and contacts involve several motors and
+        have one set of gains.
         """
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
         """Return the gain `name` of each motor, (n,), as it was set, without a conversion for motors that slide.
 
-        `motors`: the names of the motors.  Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
+        `motors`: the names of the motors. Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
         """
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
@@ -209,7 +218,7 @@ class Gains:
         return _first_match(self._changed(name), motors, common)
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or m for a motor that slides; raises UnknownName."""
+        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or of m for a motor that slides; raises UnknownName."""
         values = self.of_motors(name, robot.motors)
         if name not in _ANGLES:
             return values
@@ -217,7 +226,7 @@ class Gains:
         return values * np.where([any(fnmatchcase(m, p) for p in own) for m in robot.motors], 1.0, motor_units(robot))
 
     def weight(self, motors: tuple[str, ...]) -> Array:
-        """Return the weight of each motor, (n,)."""
+        """Return the weight of each motor, (n,): 1, or 0 for a motor that is never moved. `motors`: the names of the motors."""
         return _first_match((*self._changed("weight"), *self.weights), motors, 1.0)
 
     def _changed(self, name: str) -> Changes:
@@ -240,20 +249,20 @@ def _require_positive(name: str, value: float) -> None:
 
 
 class SettleTest:
-    """The settle test of one action: checks the commanded motion at intervals, as the original did."""
+    """The settle test of one action: decides at intervals, from the commanded motion, whether the part has settled (thesis 6.1)."""
 
     def __init__(self, settle: Settle, start: float) -> None:
-        """`start`: when the action begins [s]."""
+        """Begin the test of an action that starts at time `start` [s]."""
         self.settle = settle
         self._thresholds = core.Settle(*(getattr(settle, name) for name in core.SETTLE))
         self._memory = core.SettleTest(start, start + settle.first_check)
         self._check = core.calls().settle_check
 
     def update(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
-        """Return the verdict on the part's motion at time t [s]; always "moving" between two checks.
+        """Return "moving", "settled" or "timeout" for the part's motion at time t [s]; between two checks always "moving".
 
-        `speeds` rad/s and `accelerations` rad/s^2: the commands to the part's motors, (n_part,); those of motors that slide are
-        divided by their `fine_units`.
+        `speeds` (n_part,) rad/s and `accelerations` (n_part,) rad/s^2: commanded motion of the part's motors; the values of motors that
+        slide must be divided by their `mobee.robot.motor_units.fine_units`.
         """
         motion = np.array([speeds, accelerations], dtype=np.float64)
         verdict: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The control law of thesis eq. 5.7 with its numbers for one robot, as tables for the core.
+"""The control law of thesis eq. 5.7 for one robot, with its gains as tables for the core.
 
 The compiled formulas are in core/law.cpp, the readable ones in `mobee.reference.forces` and `mobee.reference.law`.
 """
@@ -28,7 +28,7 @@ _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 
 class Law:
-    """The law of one robot as tables; any number of threads may use it. The callers have checked all arrays."""
+    """The control law of one robot as tables for the core. Several threads may use it. Its methods do not check their arrays."""
 
     def __init__(
         self,
@@ -39,13 +39,17 @@ class Law:
         contact_forces: bool = True,
         alive: NDArray[np.bool_] | None = None,
     ) -> None:
-        """`alive` (n,): the motors on which forces act; None: all. The others are never moved, as motors of weight 0."""
+        """Build the tables from a robot and its gains.
+
+        `speed_scale`: fraction of the motors' largest speed that commands may use. `contact_forces` False: f_coll is 0. `alive` (n,): True
+        for the motors on which forces act; None: all. The others are never moved, like motors of weight 0.
+        """
         mask = np.ones(len(robot.motor_table), dtype=bool) if alive is None else alive
         self.motors = _motors(robot, gains, speed_scale)
         self.active: Ints = np.flatnonzero(mask & (gains.weight(robot.motors) > 0))
         """Indices of the motors that may be moved."""
         self.live: Ints = np.flatnonzero(mask)
-        """Indices of the motors on which forces are computed."""
+        """Indices of the motors on which forces act."""
         spans = ([i for i in range(part.start, part.start + len(part)) if mask[i]] for part in robot.parts.values())
         self.parts = np.array([(of_part[0], of_part[-1] + 1) for of_part in spans if of_part], dtype=INTERVAL)
         clauses = [clause for clause in robot.clauses if clause.a[:, mask].any()]
@@ -65,9 +69,10 @@ class Law:
         return len(self.motors)
 
     def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
-        """Return the constraint forces at q, (len(term_names()), n) in rad/s^2: f_lim, f_cst, f_coll (thesis eqs. 5.11 to 5.17).
+        """Return the constraint forces at q (n,) rad: rows f_lim, f_cst, f_coll, (len(term_names()), n) rad/s^2 (thesis eqs. 5.11 to 5.17).
 
-        `torque` (n,): `Pose.projection`, or `Pose.projection_of_part`. `state`: of the law before the step; None: at rest.
+        `torque` (n,): the sum over all contacts of J^T times depth times normal, m^2/rad, from `Pose.projection` or
+        `Pose.projection_of_part`. `state`: the state of the law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
         given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
@@ -75,18 +80,22 @@ class Law:
         return found
 
     def at_rest(self, q: Array) -> Table:
-        """Return the state of the law at rest at the measured q (n,)."""
+        """Return the state of the law at rest at the measured q (n,) rad, with the columns of `mobee._core.law.STATE`."""
         state: Table = np.zeros(len(self), dtype=core.STATE)
         state["reference"] = np.clip(q, self.motors["low"], self.motors["high"])
         state["reference"][self.active] = q[self.active]
         return state
 
     def add_client(self, f: Array, total: Array) -> None:
-        """Add L(f), which is f_config or f_work (thesis eqs. 5.9 and 5.10), to a total, both (n,)."""
+        """Add L(f), a client's force after it is bounded (thesis eqs. 5.8 to 5.10), to `total`, in place; both (n,) rad/s^2."""
         self._core.client(self.address, numbers(f, len(self)), address(total))
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
-        """Advance a state by dt [s] under the sum of all forces (n,); return the commands position, velocity and torque, (3, n)."""
+        """Advance the state by dt [s]; return the commands (3, n): position [rad], velocity [rad/s] and torque [N m].
+
+        `q`: (n,) rad, measured. `attractor`: (n,) rad. `force`: (n,) rad/s^2, the sum of all forces except spring and damping. `state`:
+        changed in place.
+        """
         n, commands = len(self), np.empty((3, len(self)))
         given = numbers(q, n), dt, numbers(attractor, n), numbers(force, n)
         self._core.step(self.address, *given, address(state), address(commands))
@@ -129,7 +138,11 @@ def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Tab
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClauseRows:
-    """The rows a.q + b > 0 of all clauses of a robot; row i belongs to clause `clause[i]`."""
+    """The rows a.q + b > 0 of all clauses of a robot (`mobee.robot.robot.Clause`: conditions on motor positions), one below the other.
+
+    `a` (rows, n) and `b` (rows,) rad; `norms` (rows,): |a|; `normals` (rows, n): a / |a|; `clause` (rows,): the clause of each row;
+    `starts` (clauses,): the first row of each clause.
+    """
 
     a: Array  # (rows, n)
     b: Array  # (rows,) rad
@@ -140,7 +153,7 @@ class ClauseRows:
 
 
 def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
-    """Return the rows of all clauses of a robot with n motors as one matrix."""
+    """Return the rows of all clauses of a robot with n motors as matrices, one below the other."""
     counts = [len(c.b) for c in clauses]
     a = np.concatenate([c.a for c in clauses]) if clauses else np.zeros((0, n))
     b = np.concatenate([c.b for c in clauses]) if clauses else np.zeros(0)
@@ -158,7 +171,10 @@ FRICTION = 5.0  # N m s/rad
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """One command for all motors, each array (n,) in the order of `robot.motors`; the modality decides which array is used."""
+    """One command for all motors: position [rad], velocity [rad/s], torque [N m], each (n,) in the order of `robot.motors`.
+
+    The modality of the controller decides which of the three the motors follow.
+    """
 
     position: Array  # rad
     velocity: Array  # rad/s

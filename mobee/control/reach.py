@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaching with the Jacobian transpose (thesis 5.1, eqs. 5.4 to 5.6, Algorithm 5): as a path in advance, and tick by tick."""
+"""Reaching with the Jacobian transpose (thesis 5.1, eqs. 5.4 to 5.6, Algorithm 5): as a path that is computed before, and tick by tick."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ MIN_STIFFNESS = 1e-12  # m^2: of J J^T, for a marker that no motor moves
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachPath:
-    """A piecewise linear path of `reach_path`."""
+    """The piecewise linear path that `reach_path` returns.
+
+    `q`: (K, n) rad, the poses from start to end. `end`: why the path ends, "reached", "stuck" or "steps used up". `distance` m and `angle`
+    rad: what remains at the end between marker and target, and between their normals.
+    """
 
     q: Array  # (steps + 1, n) rad
     end: Literal["reached", "stuck", "steps used up"]  # why it ended
@@ -40,12 +44,23 @@ def reach_path(
     tolerance: float = 1e-3,
     steps: int = 2000,
 ) -> ReachPath:
-    """Return the path of a marker to a target in steps of alpha J^T dx (thesis eq. 5.4, Algorithm 5); contacts are ignored.
+    """Return a path that moves a marker to a target in steps of alpha J^T dx (thesis eq. 5.4, Algorithm 5); contacts are ignored.
 
-    `position` (3,) m and `normal` (3,) in the root frame, `start` (n,) rad, `tolerance` m, and rad for the normal. The thesis leaves
-    alpha open: here it is one over the largest eigenvalue of J J^T plus a bound on the curvature of the path, so that no step
+    The thesis leaves alpha open. Here it is 1 / (the largest eigenvalue of J J^T + a bound on the curvature of the path), so that no step
     overshoots. Every step ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of
-    reach, limits block the motion, or the pose is singular. Raises InvalidValue and UnknownName.
+    reach, limits block the motion, or the pose is singular.
+
+    Args:
+        model: the robot.
+        marker: name of the marker.
+        position: (3,) m, root frame, of the target.
+        start: (n,) rad, first pose of the path.
+        normal: (3,), root frame, wanted direction of the marker's normal; None: any direction.
+        tolerance: distance [m], and angle between the normals [rad], at which the target counts as reached.
+        steps: largest number of steps.
+
+    Raises:
+        InvalidValue, UnknownName: an argument is not valid, or the robot has no such marker.
     """
     model.robot.marker(marker)
     target = ReachTarget(position, normal=normal)
@@ -77,7 +92,12 @@ def reach_path(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerError:
-    """Position and error of a marker in a pose; the radius of the target is ignored."""
+    """The position of a marker in a pose, and what remains to its target; the radius of the target is ignored.
+
+    `position`: (3,) m, root frame, of the marker. `error`: (3,) m from marker to target; with a wanted normal (6,), where the last three
+    are ARM (0.1 m) times the cross product of the marker's normal and the wanted normal. `angle`: rad, between the normals; 0 without a
+    wanted normal.
+    """
 
     position: Array  # (3,) m, of the marker
     error: Array  # (3,) m toward the target, or (6,) with the rotation of the normal, in which 1 rad counts ARM m
@@ -85,17 +105,17 @@ class MarkerError:
 
     @property
     def distance(self) -> float:
-        """The distance of the marker from the target [m]."""
+        """The distance between marker and target [m]."""
         return float(np.linalg.norm(self.error[:3]))
 
     @property
     def arms(self) -> Array:
-        """The weight of each row of the marker's Jacobian: 1, or ARM [m] for a rotation."""
+        """The weight of each row of the marker's Jacobian, (3,) or (6,): 1 for a position, ARM (0.1 m) for a rotation."""
         return np.repeat([1.0, ARM], 3)[: len(self.error)]
 
 
 def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> MarkerError:
-    """Return position and error of a marker at q (n,) rad."""
+    """Return the position of a marker at q (n,) rad, and its remaining error to a target."""
     pose = model.evaluate(q)
     position = pose.position(marker)
     wanted, apart = target.normal, target.position - position
@@ -113,7 +133,8 @@ def bend_bound(jacobian: Array, error: Array) -> float:
     """Return an upper bound on the stiffness [m^2 per rad^2] that the curvature of the marker's path adds to a pull by J^T error.
 
     For a joint i nearer to the base than a joint j, the second derivative of the marker's position is the cross product of the axis of i
-    and the linear column of j.  So the norms of the error, of all columns and of all axes bound the sum.
+    and the linear column of j. For a position the bound is therefore the product of three norms: of the error, of all linear columns, and
+    of all axes. For a rotation it is ARM (0.1 m) times the norm of the error times the squared norm of all axes.
 
     Args:
         jacobian: (6, n), linear rows first.
@@ -134,16 +155,18 @@ class Reacher:
 
     The pull begins when the object is made. All motors that move the marker take part, also those of the torso. The controller's forces
     keep the robot away from obstacles. With the published gains the springs of the attractor pull back during the reach, so that the marker
-    stops before the target. A controller has one reach of the whole body at a time: a new `Reacher` replaces it. For two hands at once use
-    `Controller.reach_toward` with their parts.
+    stops before the target. A controller has at most one reach of the whole body: a new `Reacher` replaces the previous one. To reach with
+    two hands at the same time use `Controller.reach_toward` with their parts.
     """
 
     __slots__ = ("_best", "_controller", "_marker", "_seen", "_since", "_tolerance", "angle", "distance", "target")
 
     def __init__(self, controller: Controller, marker: str, position: Array, normal: Array | None = None, tolerance: float = 2e-3) -> None:
-        """`position` (3,) m and `normal` (3,) in the root frame; `tolerance` m, in which an angle of the normal counts times 0.1 m.
+        """Begin to pull `marker` to `position` (3,) m, root frame.
 
-        Raises InvalidValue, also if no motor that may be moved moves the marker, and UnknownName.
+        `normal`: (3,), root frame, wanted direction of the marker's normal; None: any. `tolerance`: m, error at which the target counts as
+        reached; an error of 1 rad between the normals counts as 0.1 m. Raises UnknownName, and InvalidValue, also if the marker is moved by
+        none of the motors that may move.
         """
         if not 0 < tolerance < np.inf:
             raise InvalidValue(f"tolerance {tolerance} m: must be a finite distance above 0")
@@ -156,10 +179,10 @@ class Reacher:
         self.angle = 0.0  # rad, between the normals, at the last update
 
     def update(self, q: Array, dt: float) -> ReachStatus:
-        """Return the status at the measured q (n,) rad, dt [s] after the last update.
+        """Return the status at the measured q (n,) rad, dt [s] after the last update: "reaching", "reached" or "stuck".
 
-        "stuck" while the marker comes no nearer: the target is out of reach, or limits, clauses, contacts or springs prevent the motion.
-        The force on the marker continues.
+        "stuck": the marker came no nearer for 3 s, because the target is out of reach, or limits, clauses, contacts or springs prevent the
+        motion. The force on the marker continues after every status; `stop` ends it.
         """
         found = marker_error(self._controller.model, self._marker, self.target, real_array("q", q))
         self.angle = found.angle
@@ -174,7 +197,7 @@ class Reacher:
         return "stuck" if self._since > PATIENCE else "reaching"
 
     def stop(self, q: Array) -> None:
-        """End the pull; the motors that move the marker stay at q (n,) rad."""
+        """End the pull. The attractor of all motors that move the marker is set to q (n,) rad, so that the marker stays."""
         controller = self._controller
         controller.end_reach(None)
         moved = np.abs(controller.model.jacobian(q, self._marker)).max(axis=0) > 0

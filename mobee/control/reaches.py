@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaches in progress; core/reach.cpp and core/reach_pull.cpp have the formulas."""
+"""The reaches of a controller that are in progress. The formulas are in core/reach.cpp and core/reach_pull.cpp."""
 
 from __future__ import annotations
 
@@ -23,14 +23,19 @@ if TYPE_CHECKING:
 
 
 Chain = tuple[int, Marker, Table, Table, Table]
-"""The arguments of `Reaching` for one marker and one part."""
+"""The arguments of `Reaching`, for one marker and one part: first motor, marker, and the tables of joints, drives and motors."""
 
 
 class Reaching:
-    """One reach, with its state in the core."""
+    """One reach in progress: a force that pulls a marker to a target. Its state is in the core."""
 
     def __init__(self, part: int, marker: Marker, joints: Table, drives: Table, motors: Table) -> None:
-        """`part`: the index of its first motor, see `_first`. The tables: see `mobee._core.law`; those that change are copied."""
+        """Begin a reach without a target.
+
+        `part`: index of the first motor of the part; -1: the whole body. `joints`, `drives`, `motors`: tables with the columns JOINT, DRIVE
+        and PULLED of `mobee._core.law`, for the chain from the base to the marker; joints and motors are copied, because the core changes
+        them.
+        """
         self.marker = marker.name
         self.joints, self.motors = joints.copy(), motors.copy()
         self._drives, self._curvature = drives, np.zeros((len(motors), len(motors)))
@@ -42,7 +47,7 @@ class Reaching:
         self.address = ctypes.addressof(self.struct)
 
     def aim(self, target: ReachTarget) -> None:
-        """Set the target."""
+        """Set the target of the reach, or replace it."""
         self.struct.to_surface, self.struct.faces_target = target.aim == "surface", target.faces
         self.struct.turns_normal = target.faces or target.normal is not None
         self.struct.target[:], self.struct.radius = target.position.tolist(), target.radius
@@ -50,7 +55,7 @@ class Reaching:
 
 
 class Reaches:
-    """The reaches in progress: at most one for each part, and one of the whole body."""
+    """The reaches in progress by part: at most one for each part, and one of the whole body (None)."""
 
     __slots__ = ("_addresses", "_chains", "_core", "_law", "_robot", "_under_way", "address")
 
@@ -68,9 +73,9 @@ class Reaches:
         return self._under_way[part]
 
     def begin(self, part: str | None, marker: str) -> None:
-        """Begin a reach of a part (None: of the whole body) with a marker, in place of its previous reach; it has no target yet.
+        """Begin a reach of a part (None: of the whole body) with a marker. It replaces the part's previous reach and has no target yet.
 
-        Raises InvalidValue if none of the motors that may be moved moves the marker, and UnknownName.
+        Raises InvalidValue if the marker is moved by none of the motors that may move, and UnknownName.
         """
         if (part, marker) not in self._chains:
             self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))
@@ -79,22 +84,29 @@ class Reaches:
         self._list()
 
     def end(self, part: str | None) -> None:
-        """End a part's reach, if there is one."""
+        """End the reach of a part (None: of the whole body), if there is one."""
         if self._under_way.pop(part, None) is not None:
             self._list()
 
     def marker(self, part: str | None) -> str | None:
-        """Return the marker that a part reaches with; None if it does not reach."""
+        """Return the marker that a part (None: the whole body) reaches with; None if there is no such reach."""
         reaching = self._under_way.get(part)
         return None if reaching is None else reaching.marker
 
     def add_forces(self, q: Array, attractor: Array, dt: float, total: Array) -> None:
-        """Add the forces of all reaches at the measured q (n,) rad to `total` (n,) in rad/s^2, the sum of all other forces."""
+        """Add the forces of all reaches at the measured q (n,) rad to `total`, in place.
+
+        `attractor`: (n,) rad. `dt`: time since the last tick [s]. `total`: (n,) rad/s^2, the sum of all other forces except spring and
+        damping.
+        """
         copy = q.copy()
         self._core.add_reaches(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))
 
     def is_approaching(self, part: str | None) -> bool:
-        """Return whether a part's reach still moves its marker nearer to the target; always False under the published law."""
+        """Return whether the reach of a part (None: of the whole body) still moves its marker nearer to the target.
+
+        Always False under the published law, and without a reach.
+        """
         return bool(self._core.reach_is_approaching(self._law.address, self.address, len(self), _first(self._robot, part)))
 
     def _list(self) -> None:

@@ -26,11 +26,12 @@ class ReflexSettings:
     Attributes:
         history: how long poses are recorded.
         confirm: how long a violation must last without a break before it counts.
-        release: how long it must be absent before it counts as over.
+        release: how long a violation must be absent before it counts as over.
         brake: how long the robot brakes before it retraces its poses.
-        dead_time: how long it waits after retracing, before the pose is checked.
-        pace: recorded poses that are retraced per tick.
-        must_be_clear: continue past a waypoint that is in violation, and return control at a pose without violations only.
+        dead_time: how long the robot waits after retracing, before the pose is checked.
+        pace: number of recorded poses that are retraced in each tick.
+        must_be_clear: True: return control to the client only at a pose without violations, and retrace further than a waypoint with
+            violations; False: return control at the first waypoint.
     """
 
     history: float = 30.0
@@ -51,9 +52,9 @@ class ReflexSettings:
 
     @classmethod
     def naive(cls) -> ReflexSettings:
-        """Return the settings of thesis 4.1: a violation counts at once, and control returns to the client at the first waypoint.
+        """Return the settings of thesis 4.1: a violation counts immediately, and control returns to the client at the first waypoint.
 
-        Thesis 4.4 reports the result: oscillation between the two controllers, and recoveries that fail.
+        The result is in thesis 4.4: oscillation between the two controllers, and recoveries that fail.
         """
         return cls(confirm=0.0, release=0.0, brake=0.0, dead_time=0.0, must_be_clear=False)
 
@@ -65,7 +66,12 @@ TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate allows the same beyon
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One contact, limit or clause that a pose violates."""
+    """One contact, limit or clause that a pose violates.
+
+    `kind`: "contact", "limit" or "clause". `what`: the two volumes of a contact ("first - second"), the motor, or the part and number of
+    the clause. `depth`: depth of a contact in m; motion beyond a limit in rad (m of a motor that slides); distance from the nearest row of
+    a clause in rad along its normal.
+    """
 
     kind: Literal["contact", "limit", "clause"]
     what: str  # "first - second", the motor, or the part and number of the clause
@@ -76,9 +82,11 @@ class Watch:
     """Checks poses for violations: contacts, motors beyond their limits, clauses that do not hold."""
 
     def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
-        """`kinds`: of contacts that count; `tolerance` rad: by how much a limit or a clause may be exceeded, since encoders are noisy.
+        """Prepare the checks for a robot; raises InvalidValue.
 
-        For a motor that slides the tolerance is in its fine unit (`mobee.robot.motor_units`). Raises InvalidValue.
+        `kinds`: kinds of contacts that count as violations, of "solid" and "field". `tolerance`: rad, how far a pose may be beyond a limit
+        or a clause without a violation, because encoders are noisy; for a motor that slides it is multiplied by its
+        `mobee.robot.motor_units.fine_units`.
         """
         if unknown := set(kinds) - set(KINDS):
             raise InvalidValue(f"kinds {sorted(unknown)}: contacts are of the kinds {', '.join(KINDS)}")
@@ -90,7 +98,7 @@ class Watch:
         self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
 
     def check(self, pose: Pose) -> tuple[Violation, ...]:
-        """Return all violations of one pose: contacts, the deepest first, then limits, then clauses."""
+        """Return all violations of one pose: first contacts (the deepest first), then limits, then clauses."""
         contacts = [Violation("contact", f"{c.first} - {c.second}", float(c.depth)) for c in pose.contacts if c.kind in self._kinds]
         contacts.sort(key=lambda violation: -violation.depth)
         beyond = np.maximum(self._limits[:, 0] - pose.q, pose.q - self._limits[:, 1])
@@ -113,7 +121,12 @@ Outcome = Literal["under way", "waypoint", "end of history", "stuck"]
 
 @dataclass(slots=True)
 class Recovery:
-    """One recovery by the reflex, in progress or ended."""
+    """One recovery by the reflex, in progress or ended.
+
+    `cause`: the violations at its start. `ticks`: its duration. `deepest`: m, largest depth of a contact during it. `again`: how often a
+    violation was over and came back. `passed`: number of waypoints at which it did not stop, because the pose was in violation. `outcome`:
+    "under way", or why it ended: "waypoint", "end of history" or "stuck".
+    """
 
     cause: tuple[Violation, ...]
     ticks: int = 0
@@ -125,7 +138,11 @@ class Recovery:
 
 @dataclass(slots=True)
 class Counts:
-    """Counts of events since the reflex was created."""
+    """Numbers of events since the reflex was created.
+
+    `reflexes`: recoveries begun. `recovered`: recoveries after which control returned to the client. `stuck`: recoveries that failed.
+    `flips`: changes of the unfiltered result of the check (violation or not).
+    """
 
     reflexes: int = 0
     recovered: int = 0
@@ -134,16 +151,19 @@ class Counts:
 
 
 class Debounce:
-    """A filtered signal: it changes only after the raw one has differed from it for some ticks without a break (thesis 4.4)."""
+    """A filter for a signal with two values: its output changes after the input has differed from it for some ticks without a break.
+
+    It is used as in thesis 4.4. `on` is the present output.
+    """
 
     def __init__(self, confirm: int, release: int) -> None:
-        """`confirm`: ticks until it becomes true; `release`: ticks until it becomes false; at least 1 each."""
+        """Set after how many equal inputs the output changes: `confirm` ticks to True, `release` ticks to False, at least 1 each."""
         self._needed = {True: max(confirm, 1), False: max(release, 1)}
         self._ticks = 0  # since the raw signal differs
         self.on = False
 
     def update(self, raw: bool) -> bool:
-        """Take one tick of the raw signal; return the filtered one."""
+        """Process the input of one tick; return the output of the filter."""
         self._ticks = self._ticks + 1 if raw != self.on else 0
         if self._ticks >= self._needed[raw]:
             self.on, self._ticks = raw, 0
@@ -151,15 +171,20 @@ class Debounce:
 
 
 class Reflex:
-    """A state machine that decides who commands the robot: the client (state forward), or the reflex, which retraces recent poses.
+    """A state machine that decides in each tick what commands the robot: the client, or the reflex, which retraces recent poses.
 
-    forward -> brake when a violation is confirmed; brake -> rewind when its time is over; rewind -> dead at a waypoint or at the end of
-    the history; dead -> forward when its time is over and the pose is clear, else -> rewind to the waypoint before, or -> stuck when no
-    history is left; stuck -> forward when the pose is clear, or by `accept`.
+    State "forward": the client commands, and poses are recorded; a confirmed violation changes to "brake". State "brake": the robot stops;
+    the time `brake` later, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a waypoint or
+    to the oldest pose; then the state changes to "dead". State "dead": the robot waits for the time `dead_time`. Then, if the pose is
+    without violation, the state changes to "forward"; otherwise to "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends
+    when the pose is without violation, or by `accept`.
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:
-        """`dt`: the tick [s]; `max_velocity` (n,) rad/s: the fastest motion of the target while it retraces poses."""
+        """Start in state "forward" without recorded poses; raises InvalidValue.
+
+        `dt`: duration of a tick [s]. `max_velocity`: (n,) rad/s, largest velocity of the target while it retraces poses.
+        """
         if not 0.0 < dt < math.inf:
             raise InvalidValue(f"tick of {dt} s: must be a finite time above 0")
         self.settings, self.counts = settings, Counts()
@@ -181,20 +206,23 @@ class Reflex:
 
     @property
     def recorded(self) -> int:
-        """The number of poses that could be retraced now."""
+        """The number of recorded poses, which the reflex can retrace."""
         return len(self._history)
 
     def mark(self) -> bool:
-        """Mark the newest recorded pose as a waypoint, which is safe; False if nothing is recorded or the reflex is in control."""
+        """Mark the newest recorded pose as a waypoint: a pose that is known to be safe, and at which a recovery may end.
+
+        Return False, and mark nothing, if no pose is recorded or the client does not command.
+        """
         if self.state != "forward" or not self._history:
             return False
         self._history[-1] = self._history[-1][0], True
         return True
 
     def accept(self, q: Array, violations: Sequence[Violation]) -> None:
-        """Leave the state `stuck` at the pose q (n,) rad, by a decision of the client.
+        """Return control to the client in state "stuck", by the client's decision; in other states nothing happens.
 
-        The given violations are ignored until the pose has been without any.
+        `q`: (n,) rad, measured pose. `violations`: the violations of this pose; they are ignored until a pose had no violation at all.
         """
         if self.state != "stuck":
             return
@@ -203,9 +231,10 @@ class Reflex:
         self._keep_place(q)
 
     def tick(self, q: Array, violations: Sequence[Violation]) -> Array | None:
-        """Advance by one tick at the measured pose q (n,) rad; return the target (n,) rad of the reflex, None while the client commands.
+        """Advance by one tick at the measured pose q (n,) rad; return the reflex's target pose (n,) rad, or None if the client commands.
 
-        While the robot brakes or is stuck, the target is the pose at which that state began.
+        `violations`: the violations of this pose. While the robot brakes, the target is the pose at which braking began; while it is stuck,
+        the last target.
         """
         violated, recovery = self._judge(violations), self.recovery
         if self.state == "forward" or recovery is None:
@@ -219,7 +248,7 @@ class Reflex:
         return None if self.state == "forward" else self._target
 
     def give_up(self) -> None:
-        """Enter the state `stuck`, because the robot does not follow the reflex."""
+        """Change to state "stuck", because the robot does not follow the reflex. Without a recovery in progress nothing happens."""
         if self.state not in ("forward", "stuck") and self.recovery is not None:
             self._end_stuck(self.recovery)
 

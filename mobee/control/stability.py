@@ -18,7 +18,10 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest stable time step of the control law, and the motion of the joints that becomes unstable at a larger one."""
+    """The largest stable time step of the control law, and the motion of the motors that becomes unstable at a larger step.
+
+    `step`: s. `motor`: the motor with the largest share of that motion. `damping` 1/s and `stiffness` 1/s^2: of the law along that motion.
+    """
 
     step: float  # s
     motor: str  # the motor that moves most in that motion
@@ -27,12 +30,12 @@ class Bound:
 
 
 def largest_step(robot: Robot, gains: Gains) -> float:
-    """Return the time step [s] at which the semi-implicit Euler step of the law becomes unstable."""
+    """Return the bound of the time step [s], infinite if no motor moves: the semi-implicit Euler step of the law is stable below it."""
     return stability_bound(robot, gains).step
 
 
 def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
-    """Raise InvalidValue, with the motor and the violated bound, if the law is unstable at steps of dt [s]."""
+    """Raise InvalidValue, with the motor and the violated bound, if the law is unstable at steps of dt [s], or if dt is not valid."""
     if not (dt > 0 and np.isfinite(dt)):
         raise InvalidValue(f"time step {dt} s: must be a finite time above 0")
     bound = stability_bound(robot, gains)
@@ -51,12 +54,12 @@ def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
 
 @lru_cache(maxsize=8)
 def stability_bound(robot: Robot, gains: Gains) -> Bound:
-    """Return the bound for all springs at once (attractor, limits, all clauses), each at its steepest.
+    """Compute the largest stable time step if all springs (attractor, limits, all clauses) have their largest stiffness at the same time.
 
-    With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive
-    definite: with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular. Contacts are not in the bound: their
-    stiffness depends on the pose and on their number, and their force is bounded. Nor is the age of the commands, which depends on
-    the motors. docs/law.md has numbers for both.
+    With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive definite:
+    with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular. The bound does not include contacts: their stiffness
+    depends on the pose and on their number, and their force is bounded. It also does not include the age of commands, whose effect depends
+    on the motors. docs/law.md has numbers for both.
     """
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""User-defined forces of thesis eq. 5.7, as Python functions."""
+"""User-defined forces in the control law (thesis eq. 5.7), as Python functions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,11 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 
 
 class State:
-    """The input of a user-defined force: `q` (n,) rad, measured; `velocity` (n,) rad/s, the law's own; `dt` s; `robot`; `pose`."""
+    """The input of a user-defined force in one tick; arrays are read-only.
+
+    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the law's own velocity. `dt`: s, duration of the tick. `robot`: the robot.
+    `pose`: the robot at q in its world.
+    """
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
 
@@ -32,7 +36,7 @@ class State:
 
     @property
     def pose(self) -> Pose:
-        """The robot at q in the present world, with its contacts; evaluated when it is first read."""
+        """The robot at q in the present world, with its contacts. It is evaluated when it is read the first time."""
         if self._pose is None:
             self._pose = self._evaluate()
         return self._pose
@@ -40,10 +44,10 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A user-defined force on the right-hand side of thesis eq. 5.7.
+    """A user-defined force, added on the right-hand side of thesis eq. 5.7.
 
-    `name`: of a-z, 0-9 and _, and different from those of the law. `function`: returns the force on the motors (n,), rad/s^2, or m/s^2
-    for a motor that slides. It is called in every tick.
+    `name`: of a-z, 0-9 and _, a letter first, different from the names of the law's forces. `function`: takes a `State` and returns the
+    force on the motors, (n,) rad/s^2, or m/s^2 for a motor that slides. It is called in every tick.
     """
 
     name: str
@@ -56,7 +60,10 @@ class Term:
             raise InvalidValue(f"term {self.name!r}: its function is {self.function!r}; it must be a function of the state.")
 
     def force(self, state: State) -> Array:
-        """Return the force of the function; raises InvalidValue with the name of the term if it fails or is not valid."""
+        """Return the force of the function, (n,) rad/s^2.
+
+        Raises InvalidValue, with the name of the term, if the function fails or its result is not valid.
+        """
         try:
             given = self.function(state)
         except Exception as error:  # code of the user, which may raise anything
@@ -72,7 +79,10 @@ def _kept(array: Array) -> Array:
 
 
 def valid_terms(given: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the terms; raises InvalidValue unless their names differ from each other and from those of the law."""
+    """Return the given terms as a tuple.
+
+    Raises InvalidValue if two names are equal, or if one is a name of the law's forces or of an attribute of `Forces`.
+    """
     terms, taken = tuple(given), set(term_names())
     for term in terms:
         if not isinstance(term, Term):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the arms of a robot in its tree: chains of joints that end in a leaf, or in a hand."""
+"""Finds the arms of a robot in its tree: chains of joints that end at a link without further joints, or at a hand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ HAND = 0.5  # of the length of a chain: branches at its end that are all shorter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """An arm: joints from the last branching to the end, base first; `end` is the link at its end, `hand` the joints beyond it."""
+    """An arm: a chain of joints from the last branching of the tree to its end.
+
+    `joints`: indices, the joint nearest to the base first. `end`: index of the link at the end. `hand`: indices of the joints of the
+    fingers, which the end carries.
+    """
 
     joints: tuple[int, ...]
     end: int
@@ -24,11 +28,12 @@ class Chain:
 
 
 def chains(robot: Robot) -> list[Chain]:
-    """Return the chains that end in a leaf, in the order of the tree.
+    """Return the chains of joints that can be arms or legs, in the order of the tree.
 
-    Where a chain branches, a branch is short if it is shorter than HAND times the chain. If all branches are short, they are the fingers of
-    a hand and the chain ends there. If only some are short, these are ignored. Elsewhere each branch begins a chain of its own, and the
-    joints before the branching are a trunk, which belongs to no chain.
+    A chain ends at a link without further joints, or at a hand. At a branching, a branch is short if it is shorter than HAND (0.5) times
+    the chain. If all branches are short, they are the fingers of a hand, and the chain ends there. Short branches beside longer ones are
+    ignored. If one branch is long, the chain continues in it (unless the chain has only one joint). Else each long branch begins a new
+    chain, and the joints before the branching are a trunk, which belongs to no chain.
     """
     tree = _Tree(robot)
     found: list[Chain] = []
@@ -87,7 +92,10 @@ class _Tree:
 
 
 def corners_of(shape: Shape) -> Array:
-    """Return points (k, 3) m in the root frame, whose convex hull has the extent of a shape along its length; round sides are left out."""
+    """Return points (k, 3) m of a shape, root frame at zero pose, that mark its extent.
+
+    They are the corners of a box or hull. For a sphere, capsule or cylinder they are only the two ends on its z axis.
+    """
     if shape.vertices is not None:
         local = shape.vertices
     elif shape.kind == "box":
@@ -101,7 +109,11 @@ def corners_of(shape: Shape) -> Array:
 
 
 def end_point(robot: Robot, chain: Chain) -> Array:
-    """Return the point (3,) m, root frame at zero pose, whose motion counts: the middle of the shapes at the end of a chain."""
+    """Return the end point of a chain, (3,) m, root frame at zero pose, whose motion is measured.
+
+    It is the mean position of the solids of the last link and its hand; without solids, of their markers; without markers, of the joints of
+    the hand, else the last joint of the chain.
+    """
     links = {chain.end, *(joint + 1 for joint in chain.hand)}
     middles = [shape.position for shape in robot.shapes if shape.link in links and shape.role == "solid"]
     middles = middles or [marker.position for marker in robot.markers.values() if marker.link in links]

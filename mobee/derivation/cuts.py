@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Narrower limits of motors, and clauses, that keep solids apart which are too near each other for fields.
+"""Narrower limits of motors, and clauses, for solids that are too near each other for fields: they keep these solids apart.
 
-Whether two links a few joints apart touch depends only on the motors between them.  Over random positions of these, half-spaces
-are cut off until no touching position is left: one along a single motor becomes its limit, another a clause (thesis eqs. 5.14 to 5.17).
+Whether two links with few joints between them touch depends only on the motors between them.  From the space of these motors, half-spaces
+are cut off until no sampled position is left in which the links touch. A half-space along a single motor becomes a limit of this motor,
+any other a clause (thesis eqs. 5.14 to 5.17).
 """
 
 from __future__ import annotations
@@ -43,10 +44,11 @@ class _Group:
 
 
 def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
-    """Return the robot with limits and clauses that keep pairs of solids apart, the motors with a narrower range, and the other pairs.
+    """Add limits and clauses that keep pairs of solids apart.
 
-    `pairs` (p, 2): indices of shapes.  Pairs with more than MOST_MOTORS motors between them, or motors of several parts, are not treated.
-    The other pairs, (r, 2), are those and the pairs that touch near home or for which no half-space excludes the touching positions.
+    Return the robot with them, the names of the motors whose range is narrower now, and the pairs (r, 2) that can still touch in more than
+    MOST_LEFT (20 %) of the sampled touching positions: fields are needed for these. `pairs` (p, 2): indices of shapes; pairs with more than
+    MOST_MOTORS (3) motors between them, or with motors of several parts, are not treated and not returned. `seed`: of the samples.
     """
     narrowed: dict[int, Array] = {}
     clauses: list[Clause] = []

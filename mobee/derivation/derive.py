@@ -27,7 +27,11 @@ LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """A part that learns: `motors` is its chain, `joints` span its states, `movement` is how far its best joint moves its end [m]."""
+    """An arm that learns.
+
+    `part`: name of its part. `motors`: names of the motors of its chain. `joints`: names of the motors to learn, which span its states.
+    `movement`: m, how far the best motor moves the end of the arm over its range; 0 if the arm was requested, not found.
+    """
 
     part: str
     motors: tuple[str, ...]
@@ -39,10 +43,11 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
-    `limited`: motors that had more than a turn and got half a turn to each side. `home_moved`: motors whose home was moved out of contact,
-    or farther from it. `narrowed`: motors with a narrower range: beyond it, solids touch that fields cannot keep apart; the added clauses
-    do the same for combinations of several motors. `left_out`: pairs of links that are no longer tested. `field`: width of the fields that
-    were added [m], 0 for none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
+    `arms`: those that learn. `limited`: names of motors that had a range of a turn or more and got half a turn to each side. `home_moved`:
+    names of motors whose home was moved, so that no solids touch at home and fields are apart. `narrowed`: names of motors with a narrower
+    range, because beyond it solids touch that fields cannot keep apart; clauses that were added do the same for combinations of several
+    motors. `left_out`: names of the pairs of links that are no longer tested for contacts. `field`: width of the fields that were added
+    [m], 0: none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
     """
 
     robot: Robot
@@ -55,29 +60,32 @@ class Derived:
     gains: Gains
 
     def rest(self, arm: Arm) -> tuple[float, ...]:
-        """Return the home of each motor of the arm's part as a fraction of its range: the position of the motors that are not learned."""
+        """Return the home of each motor of the arm's part as a fraction of the motor's range, 0 (lower limit) to 1 (upper limit).
+
+        The motors of the part that are not learned stay there.
+        """
         part = self.robot.parts[arm.part]
         low, high = self.robot.limits[part.slice].T
         return tuple(np.clip((self.robot.home[part.slice] - low) / (high - low), 0.0, 1.0).round(6).tolist())
 
     def space(self, arm: Arm) -> Lattice:
-        """Return the states and actions of an arm: three levels of each joint, the part's other motors at home."""
+        """Return the states and actions of an arm: a lattice with three levels of each joint to learn, the part's other motors at home."""
         return Lattice(self.robot, arm.joints, rest=self.rest(arm))
 
 
 def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed: int = 0) -> Derived:
     """Derive arms, joints to learn, limits, home, tested pairs and fields of a robot.
 
-    A robot whose file defines parts keeps them; a robot that has fields keeps its fields, its pairs and its home.
+    A robot with more than one part keeps its parts; a robot that has fields keeps its fields, its tested pairs and its home.
 
     Args:
         robot: any robot.
-        parts: the motors to learn of each part that should learn, in place of those that are derived; a part that the robot does not
-            have is made of these motors.
-        seed: of the random poses over which contacts and movements are measured.
+        parts: name of each part that should learn -> the names of its motors to learn; None: they are derived. A part that the robot
+            does not have is made of these motors.
+        seed: of the random poses in which contacts and movements are measured.
 
     Raises:
-        InvalidValue: no motor moves anything, or `parts` names motors of several parts.
+        InvalidValue: no motor moves the end of a chain, or a part in `parts` is given no motors, or motors of another part.
         UnknownName: `parts` names a motor that the robot does not have.
     """
     robot, limited = bounded(robot)

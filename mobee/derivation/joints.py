@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses the joints of an arm that move its end most, and limits for joints that turn without end."""
+"""Chooses the joints of an arm that move its end most, and limits for joints with a range of a turn or more."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ TURN = 2.0 * np.pi
 
 
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
-    """Return the robot with half a turn to each side for motors whose range is a turn or more, and their names.
+    """Limit every motor whose range is a turn or more to half a turn to each side; return the robot and the names of the changed motors.
 
-    In a larger range different positions are the same pose, so the states of a lattice would be too.
+    In a larger range different motor positions are the same pose, so that different states of a lattice would be the same pose too. The
+    middle of the range is 0, or home if home is not within half a turn of 0.
     """
     changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []
@@ -39,7 +40,10 @@ def bounded(robot: Robot) -> tuple[Robot, list[str]]:
 
 
 def with_limits(robot: Robot, limits: Mapping[int, Array]) -> Robot:
-    """Return the robot with other limits (2,) of some motors, by their numbers; home is clipped to these limits."""
+    """Return a copy of the robot with new limits of some motors; home and the limits of the joints are adapted.
+
+    `limits`: index of the motor -> (2,) in the unit of the motor, rad or m.
+    """
     table = [
         replace(motor, limits=limits[k], home=float(np.clip(motor.home, *limits[k]))) if k in limits else motor
         for k, motor in enumerate(robot.motor_table)
@@ -55,7 +59,10 @@ def _with_motors(robot: Robot, table: Sequence[Motor]) -> Robot:
 
 
 def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> Array:
-    """Return how far each motor moves the end of a chain over its range [m], the mean over random poses of the others."""
+    """Return how far each motor moves the end of a chain over the motor's range, (k,) m: the mean over random poses of the other motors.
+
+    `motors`: their k indices. `seed`: of the random poses.
+    """
     low, high = robot.limits.T
     point = end_point(robot, chain)
     poses = np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
@@ -71,6 +78,9 @@ def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> A
 
 
 def joints_to_learn(robot: Robot, motors: Sequence[int], moved: Array) -> tuple[str, ...]:
-    """Return the motors that move the end most, at most MOST_JOINTS, in the order given; `moved`: as `movements` returns it."""
+    """Return the names of the motors that move the end of an arm most, at most MOST_JOINTS (4), in the given order.
+
+    `motors`: their k indices. `moved`: (k,) m, how far each motor moves the end; motors below 10 % of the largest value are left out.
+    """
     best = [k for k in np.argsort(-moved, kind="stable")[:MOST_JOINTS] if moved[k] >= LEAST_SHARE * moved.max()]
     return tuple(robot.motors[motors[k]] for k in sorted(best))

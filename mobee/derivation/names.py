@@ -17,7 +17,10 @@ LONGEST = 24  # letters of a name, which stands in the keys of the bus
 
 
 def names_of(groups: Sequence[Sequence[str]]) -> list[str]:
-    """Return a name of a-z, 0-9 and _ for each group of motors, each once: "left_arm", "fl_leg", "arm_2"."""
+    """Return a name for each group of motors, made of words that the names of its motors have in common: "left_arm", "fl_leg", "arm_2".
+
+    The names are all different and have only a-z, 0-9 and _. `groups`: for each group the names of its motors.
+    """
     names: list[str] = []
     for motors in groups:
         name = _name(motors, len(groups) == 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pairs that touch too often to be tested, a home without contacts, and fields with their pairs."""
+"""Finds pairs of links that touch too often to be tested, and a home without contacts; adds fields with their tested pairs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ROUNDS, DRAWS = 8, 128  # of the search for a home
 
 
 def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Robot:
-    """Return the robot without the tests of these pairs of links."""
+    """Return a copy of the robot in which some pairs of links are not tested for contacts; `reason`: recorded for each of them."""
     link = np.array([shape.link for shape in robot.shapes], dtype=np.intp)
 
     def kept(table: Ints) -> Ints:
@@ -45,7 +45,7 @@ def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Rob
 
 
 def often_touching(robot: Robot, seed: int, share: float = OFTEN) -> set[LinkPair]:
-    """Return the pairs of links whose solids touch in more than `share` of random poses."""
+    """Return the pairs of links (indices) of which two solids touch in more than the fraction `share` of random poses."""
     counts = _counted(replace(robot, field_pairs=robot.field_pairs[:0]), seed)
     links: Counter[LinkPair] = Counter()
     for (first, second), count in counts.items():
@@ -91,15 +91,19 @@ def _lever_of(pose: Pose, row: int) -> float:
 
 
 def can_cut(robot: Robot, links: LinkPair) -> bool:
-    """Return whether few motors, all of one part, move two links against each other."""
+    """Return whether one to MOST_MOTORS (3) motors, all of one part, move two links against each other.
+
+    Only then limits and clauses can keep the two links apart.
+    """
     motors = motors_between(robot, [links])
     return 0 < len(motors) <= MOST_MOTORS and len({robot.motor_table[k].part for k in motors.tolist()}) == 1
 
 
 def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
-    """Return a home (n,) where no solids touch, near that of the file, and the pairs of links for which none was found.
+    """Return a home (n,) near the robot's home in which as few solids as possible touch, and the pairs of links that still touch.
 
-    Only the motors between links that touch are moved, to random places that are farther from the file's home in each round.
+    Positions are in the units of the motors, rad or m. Only the motors between links that touch are moved: to random positions, in a range
+    about the best position so far that grows in each round of the search. `seed`: of these positions.
     """
     solids = replace(robot, field_pairs=robot.field_pairs[:0])
     model, rng = Model(solids), np.random.default_rng(seed)
@@ -136,7 +140,7 @@ def _touching(model: Model, q: Array) -> set[LinkPair]:
 
 
 def motors_between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
-    """Return the motors that move links of a pair against each other, the indices in ascending order."""
+    """Return the indices of the motors that move the two links of any of these pairs against each other, in ascending order."""
     moving: set[int] = set()
     ancestry = tables(robot).ancestry
     for pair in pairs:
@@ -147,15 +151,20 @@ def motors_between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
 
 
 def field_width(reach: float) -> float:
-    """Return the width of the fields of a robot with arms of a length [m]."""
+    """Return the width of the fields of a robot [m], the distance by which they extend beyond the solids.
+
+    It is 6 % of `reach`, the length [m] of the robot's longest arm, and at least 5 mm and at most 6 cm.
+    """
     return float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
 
 
 def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float = SHORT) -> tuple[Robot, Ints]:
-    """Return the robot with fields around these pairs of solids (p, 2), and the pairs that remain without.
+    """Add fields around pairs of solids; return the robot with them, and the pairs (r, 2) of solids that get no fields.
 
-    `width`: of the fields [m]; narrower ones are tried for pairs whose fields meet at home, or in more than FIELD_OFTEN of random poses.
-    They are also tried for pairs that limits and clauses could keep apart, and whose levers are shorter than `short` least levers.
+    `pairs`: (p, 2) indices of shapes. `width`: m, distance by which fields extend beyond the solids. Fields of 1/2, 1/4 and 1/8 of the
+    width are tried for pairs whose fields overlap at home, or in more than FIELD_OFTEN (60 %) of random poses. They are also tried for
+    pairs that limits and clauses could keep apart and whose contacts have levers shorter than `short` times the robot's least lever.
+    `seed`: of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)
@@ -163,7 +172,10 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
-    """Return a home (n,) near that of the robot where narrow fields do not meet either, if one is found."""
+    """Return a home (n,) near the robot's home in which fields of half the usual width do not overlap, as far as one is found.
+
+    Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm. `seed`: of the random search.
+    """
     width = AT_HOME * field_width(reach)
     needed = sorted(set(robot.solid_pairs.ravel().tolist()))
     wide = tuple(replace(_field(robot.shapes[index], width, "_wide"), role="solid") for index in needed)
@@ -196,7 +208,7 @@ def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int
 
 
 ICOSAHEDRON = np.array([np.roll((0.0, a, b), k) for a in (-1.0, 1.0) for b in (-1.618034, 1.618034) for k in range(3)]) / 1.511523
-"""Corners (12, 3) of an icosahedron around the ball of radius 1."""
+"""The corners (12, 3) of an icosahedron that contains the ball of radius 1."""
 FIELD_CORNERS = 32
 
 
@@ -214,7 +226,10 @@ def _field(solid: Shape, width: float, suffix: str) -> Shape:
 
 
 def reach_of(robot: Robot, links: Collection[int], joint: int) -> float:
-    """Return the distance [m] from a joint to the farthest point of these links at zero pose; without shapes, to the farthest joint."""
+    """Return the distance [m] from a joint to the farthest point of the shapes of some links at zero pose.
+
+    `links`, `joint`: indices. If the links have no shapes, it is the distance to the farthest of their joints.
+    """
     points = [corners_of(shape) for shape in robot.shapes if shape.link in links]
     points = points or [robot.joints[link - 1].point[None] for link in links]
     return float(np.linalg.norm(np.concatenate(points) - robot.joints[joint].point, axis=1).max())

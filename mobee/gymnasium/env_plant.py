@@ -18,22 +18,21 @@ from mobee.plant import Outcome
 
 
 class EnvPlant(InstantPlant):
-    """A discrete Gymnasium environment as a plant: observations are states, a step of the environment is an action.
+    """A discrete Gymnasium environment as a plant: its observations are states, and one of its steps is an action.
 
     Use:  `plant = EnvPlant(env); agent = mobee.CuriousAgent(plant.space, plant, beliefs="debiased"); agent.run(1000)`
 
-    The state in which an episode terminates is a state like any other: every action there leads to the first observation of the next
-    episode, and the agent learns this.  An episode that is truncated ends without such a state: the next action raises
-    ActionInterrupted, as on a robot that was stopped; then the agent measures the first state of the new episode, and learns no wrong
-    transition.  `agent.run` does this.
+    If an episode terminates, its last state is a state like any other: every action there leads to the first observation of the next
+    episode, and the agent learns this. If an episode is truncated, the next action raises ActionInterrupted, as on a robot that was
+    stopped. The agent must then measure the first state of the new episode, and so learns no wrong transition; `agent.run` does this.
 
     Args:
-        env: its observations and actions must be Discrete; wrap others first, for example by position.
+        env: its observations and actions must be Discrete; wrap other environments first, for example by position.
         seed: of the first reset.
-        goals: (S, A) the state to which each action is expected to lead, if that is known; see `DiscreteSpace`.
+        goals: (S, A) the state to which each action is expected to lead; None: not known, the state itself (see `DiscreteSpace`).
 
     Raises:
-        InvalidValue: spaces that are not Discrete.
+        InvalidValue: observations or actions are not Discrete.
     """
 
     space: DiscreteSpace
@@ -56,12 +55,12 @@ class EnvPlant(InstantPlant):
 
     @property
     def state(self) -> int:
-        """The number of the state that was observed last."""
+        """The number of the state that was observed last, from 0."""
         return self._state
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The id and arguments of the environment, as far as they are known, as plain JSON values."""
+        """The id and the arguments of the environment, as JSON values; empty for an environment that was not made by its id."""
         spec = self.env.spec
         return {} if spec is None else {"env": spec.id, "arguments": {name: repr(value) for name, value in spec.kwargs.items()}}
 
@@ -71,14 +70,15 @@ class EnvPlant(InstantPlant):
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the number of the state in the form of motor positions, shape (2,)."""
+        """Return the number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0."""
         self._check_part(part)
         return self.q
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Do one step of the environment; `target`: (2,), from `space.aim`.  A step counts as 1 s.
+        """Make one step of the environment and return its outcome; a step counts as 1 s.
 
-        Raises ActionInterrupted where the last step truncated the episode: a new episode has begun.
+        `part`: must be `space.part`. `target`: (2,), from `space.aim`: the expected state and the action. Raises ActionInterrupted, without
+        this action, if the last step truncated the episode: a new episode has begun.
         """
         self._check_part(part)
         action = self.space.action_of(target)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`MoBeE/Lattice-v0`: a part of a robot whose states are the cells of a lattice; a step is a whole action, until the part has settled."""
+"""`MoBeE/Lattice-v0`: the states are cells of a lattice over a part's joints; a step lasts until the part has settled."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from mobee.settings import Settings, accepts
 from mobee.simulation import OfflinePlant, PlantSettings, advance_together
 
 Reward = Callable[[int, int, int, Outcome], float]
-"""A reward: function of the state, the action, the state reached, and the outcome."""
+"""A function that returns the reward of a transition. Its arguments: state, action, state reached, and outcome of the action."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,16 +35,17 @@ class LatticeTask(Settings):
     """Settings of `MoBeE/Lattice-v0`.
 
     Args:
-        robot: a shipped name, the path of an XML or URDF file, or a Robot.
+        robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
         joints: motor names, all of one part.
-        levels: fractions of each joint's range, see `mobee.Lattice`.
-        neighbours: number of neighbours to which each state has actions, or "equidistant".
-        tie_seed: seed of the draw among equally near neighbours, which belongs to the space; the noise has the seed of `reset`.
-        world: a shipped name, the path of an XML file, or a World; None: nothing but the robot.
+        levels: fractions of each joint's range at which the samples are, see `mobee.Lattice`.
+        neighbours: number of neighbours to which each state has actions; "equidistant": the neighbours one level away along one joint;
+            None: 16, or all others if there are fewer.
+        tie_seed: seed of the random choice among equally near neighbours. It defines the space; the seed of `reset` defines the noise.
+        world: name of a shipped world, path of an XML file, or a World; None: nothing but the robot.
         plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
-        goal: a state or several: to arrive there ends the episode with the reward 1; None: there is no goal.
-        reward: added to that of the goal: None: nothing; "gain": the information gain of the transition in nats, under a model that
-            counts all episodes of this environment; or a function, see `Reward`.
+        goal: a state or several; if the robot arrives there, the episode ends with the reward 1. None: there is no goal.
+        reward: added to the reward of the goal: None: 0; "gain": the information gain of the transition in nats, under a model that counts
+            all episodes of this environment; or a function, see `Reward`.
     """
 
     robot: RobotFile = "icub"
@@ -128,19 +129,20 @@ class _Arm:
 
 
 class LatticeEnv(Env[Any, Any]):
-    """A part of a robot on a lattice; a step is a whole action: the controller moves the part until it has settled or timed out.
+    """A Gymnasium environment: a part of a robot on a lattice. A step is a whole action, until the part has settled or timed out.
 
-    Observation: the state, a cell of the lattice.  Action a aims at the sample of the a-th neighbour of the state, in ascending order; an
-    action that the state does not have moves nothing and takes no time; `info["action_mask"]` marks the actions that it has.  A contact, a
-    cable or a limit may stop the part elsewhere: that is the outcome, and `info` holds it: `q` (n_part,) rad by the encoders, `settled`,
-    `duration` in s, `touched`, names of world objects.
+    Observation: the state, the number of a cell of the lattice. Action a sets the attractor to the sample of the a-th neighbour of the
+    state, neighbours in ascending order. `info["action_mask"]` is 1 for the actions that the present state has; any other action moves
+    nothing and takes no time. A contact, a cable or a limit may stop the part in another state. `info` has the outcome: `q` (n_part,) rad
+    by the encoders, `settled`, `duration` in s, `touched` (names of world objects in contact at the end), and `valid` (False if the state
+    did not have the action).
 
     `reset` puts the robot at home; with `options={"state": s}` it moves to that state first, and may end elsewhere.
 
     Args:
-        render_mode: "rgb_array", or None.
-        settings: None: the defaults.
-        **changes: fields of `LatticeTask` by keyword, in place of those in `settings`.
+        render_mode: "rgb_array", or None: no pictures.
+        settings: the task; None: the defaults.
+        **changes: fields of `LatticeTask` by keyword, in place of the values in `settings`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
@@ -156,7 +158,7 @@ class LatticeEnv(Env[Any, Any]):
 
     @property
     def space(self) -> Lattice:
-        """The states and actions."""
+        """The lattice: the states, which are the observations, and their actions."""
         return self._lattice.space
 
     @property
@@ -166,23 +168,29 @@ class LatticeEnv(Env[Any, Any]):
 
     @property
     def learned(self) -> TransitionModel | None:
-        """The transition model under which the reward "gain" is computed; None with another reward."""
+        """The transition model from which the reward "gain" is computed; None with another reward."""
         return self._arm.learned
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
-        """Put the robot at home; `seed` determines the noise of this and all later episodes."""
+        """Put the robot at home and return its state and info; `seed` determines the noise of this and all later episodes.
+
+        `options={"state": s}`: move to that state first. Raises InvalidValue if there is no such state.
+        """
         super().reset(seed=seed)
         info = self._arm.restart(self.np_random, options)
         return self._arm.state, info
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Perform a whole action of the part."""
+        """Perform a whole action of the part: the controller moves it until it has settled or timed out.
+
+        Return the state reached, the reward, whether the goal was reached (it ends the episode), False (never truncated here), and info.
+        """
         outcome = self._arm.plant.advance()[0][1] if self._arm.begin(int(action)) else None
         state, reward, over, info = self._arm.end(int(action), outcome)
         return state, reward, over, False, info
 
     def render(self) -> Picture | None:
-        """Return a picture (H, W, 3) of the robot in its world, in "rgb_array" mode."""
+        """Return a picture (H, W, 3) of the robot in its world, or None if there is no render mode."""
         if self.render_mode is None:
             return None
         if self._portrait is None:
@@ -193,14 +201,15 @@ class LatticeEnv(Env[Any, Any]):
 class LatticeVectorEnv(RobotVectorEnv):
     """Several robots on one lattice, whose actions are simulated together; results are bit-equal to those of separate `LatticeEnv`s.
 
-    An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
+    In the step after the end of a robot's episode, its action is ignored and a new episode begins (`AutoresetMode.NEXT_STEP`).
 
     Args:
-        num_envs: how many robots.
-        max_episode_steps: after which an episode is truncated.
-        threads: of the simulation.
-        settings: None: the defaults.
-        **changes: fields of `LatticeTask` by keyword.
+        num_envs: number of robots.
+        max_episode_steps: number of steps after which an episode is truncated.
+        threads: number of threads of the simulation.
+        render_mode: only None is supported.
+        settings: the task; None: the defaults.
+        **changes: fields of `LatticeTask` by keyword, in place of the values in `settings`.
     """
 
     @accepts(LatticeTask)
@@ -222,7 +231,10 @@ class LatticeVectorEnv(RobotVectorEnv):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Ints, dict[str, Any]]:
-        """Put all robots at home; `seed`: one for each, or the first of consecutive ones."""
+        """Put all robots at home and return their states (num_envs,) and infos.
+
+        `seed`: a list with one seed for each robot, or the first of consecutive seeds. `options={"state": s}`: move to that state first.
+        """
         self._restart_all(seed)
         infos: dict[str, Any] = {}
         for number, (arm, rng) in enumerate(zip(self._arms, self._rngs, strict=True)):
@@ -230,7 +242,11 @@ class LatticeVectorEnv(RobotVectorEnv):
         return self._states(), infos
 
     def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Perform a whole action of each robot whose episode has not ended; the others begin a new episode."""
+        """Perform a whole action of each robot; a robot whose episode has ended ignores its action and begins a new episode.
+
+        `actions`: (num_envs,). Return states, rewards, whether goals were reached, whether episodes are truncated, each (num_envs,), and
+        infos.
+        """
         chosen, over = np.asarray(actions).tolist(), self._over
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
         plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]

@@ -10,7 +10,7 @@ LATTICE_STEPS, REACH_STEPS, RIVER_SWIM_STEPS = 200, 50, 200  # after which an ep
 
 
 def register_envs() -> None:
-    """Register the environments that are not registered yet."""
+    """Register the environments of this package in Gymnasium's registry, except those that are registered already."""
     here = "mobee.gymnasium"
     robots = (("Lattice", LATTICE, LATTICE_STEPS), ("Reach", REACH, REACH_STEPS))
     for name, env_id, steps in robots:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots, worlds, plants and seeds of the environments, and their pictures."""
+"""What the environments share: loading of robots and worlds, settings of plants, and pictures."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def _loaded(name: str | Path) -> Robot:
 
 
 def model_of(robot: RobotFile, world: WorldFile) -> Model:
-    """Return the model of a robot in a world, each given as an object, a shipped name, or a path; None: an empty world.
+    """Return the model of a robot in a world; each is an object, the name of a shipped one, or a path. `world` None: an empty world.
 
-    Environments of one robot file share the robot, which is never changed; each has a world of its own.
+    A robot file is loaded once: the models share the robot, which is never changed. A world file is loaded for each model.
     """
     found = robot if isinstance(robot, Robot) else _loaded(robot)
     return Model(found, load_world(world) if isinstance(world, str | Path) else world)
@@ -52,11 +52,11 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 
 @per_robot
 def guarded(robot: Robot) -> Robot:
-    """Return the robot with only those pairs of solids that its contact fields keep apart.
+    """Return the robot without those tested pairs of solids that its contact fields do not keep apart.
 
-    A link without fields, such as a finger, counts as the next link towards the base that has fields.  Left out are pairs of links
-    whose fields are not tested against each other, such as upper arm and pelvis of the iCub: their hulls overlap when the arm is beside
-    the body.
+    A pair of solids remains if the fields of their links are tested against each other; a link without fields, such as a finger, counts as
+    the next link towards the base that has fields. For example upper arm and pelvis of the iCub are removed: their hulls overlap when the
+    arm is beside the body.
     """
     with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
     guard = list(range(len(robot.links)))
@@ -69,13 +69,13 @@ def guarded(robot: Robot) -> Robot:
 
 
 def plant_settings(given: PlantSettings | None, parts: Sequence[str]) -> PlantSettings:
-    """Return the settings of a plant, in which only these parts are active unless others are named."""
+    """Return the settings of a plant: `given`, or by default ticks of 20 ms; if they do not name active parts, these `parts` are active."""
     settings = PlantSettings(dt=TICK) if given is None else given
     return settings if settings.active is not None else replace(settings, active=tuple(parts))
 
 
 class Portrait:
-    """Draws the robot of a model in its world, always in the same frame."""
+    """Draws pictures of the robot of a model in its world, always with the same camera."""
 
     def __init__(self, model: Model) -> None:
         at_home = robot_solids(model.evaluate(model.robot.home))
@@ -83,5 +83,8 @@ class Portrait:
         self._camera: Camera = framing(camera_axes(VIEW), focus(at_home), np.empty((0, 3)), PICTURE_HEIGHT, MARGIN)
 
     def picture(self, pose: Pose, bright: Sequence[str], added: Sequence[Solid] = ()) -> Picture:
-        """Return the picture (H, W, 3) of a pose, in which the parts that are not `bright` are pale; `added`: further solids."""
+        """Return the picture (H, W, 3) of a pose.
+
+        `bright`: names of the parts that are drawn in full colour; the others are pale. `added`: further solids to draw.
+        """
         return draw([*robot_solids(pose, bright), *object_solids(pose.objects), *added], self._camera, self._floor, RAYS)

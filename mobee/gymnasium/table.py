@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`MoBeE/Table-v0`: the parts of a robot at a table, each an agent of its own, by PettingZoo's parallel API."""
+"""`MoBeE/Table-v0`: several parts of a robot at a table; each part is an agent of PettingZoo's parallel interface."""
 
 from __future__ import annotations
 
@@ -38,14 +38,15 @@ class TableTask(Settings):
     """Settings of `MoBeE/Table-v0`.
 
     Args:
-        robot: a shipped name, the path of an XML or URDF file, or a Robot.
-        parts: the joints of each agent's lattice, by the name of its part.
-        levels: fractions of each joint's range.
-        neighbours: number of neighbours to which each state has actions, by part; parts that are not named have 16.
-        world: a shipped name, the path of an XML file, or a World; None: nothing but the robot.
+        robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
+        parts: a dict from the name of each part, which is an agent, to the joints of its lattice.
+        levels: fractions of each joint's range at which the samples of the lattices are.
+        neighbours: a dict from a part's name to the number of neighbours to which each of its states has actions; for other parts 16, or
+            all other states if there are fewer.
+        world: name of a shipped world, path of an XML file, or a World; None: nothing but the robot.
         plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
         reward: "gain": the information gain of each transition in nats, under a model that counts all episodes; None: 0.
-        steps: after which an episode is truncated.
+        steps: number of steps after which an episode is truncated.
     """
 
     robot: RobotFile = "icub"
@@ -59,26 +60,26 @@ class TableTask(Settings):
 
 
 class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo has no type information
-    """Several parts of one robot act at once, as live: each begins its next action when its own part has settled.
+    """A PettingZoo environment: several parts of one robot act at the same time, and each begins its next action when it has settled.
 
-    Each agent is a part.  Its observation is its own state, a cell of its lattice; its action is the number of a neighbour of this state.
-    It does not observe the other parts.  A step begins the action of every agent whose part is at rest, then simulates until one part or
-    more have settled or timed out; so a step takes as long as the shortest of the actions under way.
+    Each agent is a part. Its observation is its own state, the number of a cell of its lattice; its action is the index of a neighbour of
+    this state. It does not observe the other parts. A step begins the actions of all agents whose parts are at rest, then simulates until
+    at least one part has settled or timed out.
 
-    `infos[agent]["ready"]` says whether the agent's action has ended.  If so, the info has its outcome (`q`, `settled`, `duration`,
-    `touched`), the agent its reward, and its next action counts.  While it is False the part still moves: the observation is the old one,
-    the reward 0, and an action that is given for it is ignored.  `info["action_mask"]` lists the valid actions, none while the part
-    moves.  An action that the state does not have leaves the part at rest for this step.
+    `infos[agent]["ready"]`: whether the agent's action has ended. If it is True, the info has the outcome (`q` (n_part,) rad by the
+    encoders, `settled`, `duration` in s, `touched`), the agent gets its reward, and its next action is used. If it is False, the part still
+    moves: the observation is the previous one, the reward is 0, and an action for this agent is ignored. `infos[agent]["action_mask"]` is 1
+    for the valid actions; all are 0 while the part moves. An action that the state does not have leaves the part at rest for this step.
 
-    An episode is truncated after `steps` steps, for all agents at once.
+    All agents' episodes are truncated together, after `steps` steps.
 
     Args:
-        render_mode: "rgb_array", or None.
-        settings: None: the defaults.
-        **changes: fields of `TableTask` by keyword, in place of those in `settings`.
+        render_mode: "rgb_array", or None: no pictures.
+        settings: the task; None: the defaults.
+        **changes: fields of `TableTask` by keyword, in place of the values in `settings`.
 
     Raises:
-        InvalidValue, UnknownName: for parts, joints or levels that the robot does not have.
+        InvalidValue, UnknownName: the robot does not have a part or joint, or a level is not valid.
     """
 
     metadata: dict[str, Any] = {"name": "MoBeE/Table-v0", "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
@@ -89,7 +90,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         self.render_mode = render_mode
         self._model = model_of(task.robot, task.world)
         self.spaces = {part: self._space(part, joints) for part, joints in task.parts.items()}
-        """The states and actions of each agent."""
+        """The lattice of each agent: its states and actions."""
         self.possible_agents = list(self.spaces)
         self.agents: list[str] = []
         self.observation_spaces = {part: Discrete(len(space)) for part, space in self.spaces.items()}
@@ -97,7 +98,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         self.plant = OfflinePlant(self._model, settings=plant_settings(task.plant, self.possible_agents))
         """The simulated robot."""
         self.learned = {part: TransitionModel(space) for part, space in self.spaces.items()} if task.reward == "gain" else {}
-        """The transition models under which the reward "gain" is computed."""
+        """By agent, the transition model from which the reward "gain" is computed; empty with another reward."""
         self._states = {part: 0 for part in self.spaces}
         self._under_way: dict[str, int] = {}
         self._steps = 0
@@ -105,15 +106,15 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         self._portrait: Portrait | None = None
 
     def observation_space(self, agent: str) -> Discrete:
-        """Return the space of an agent's observations: always the same object."""
+        """Return the space of an agent's observations, the numbers of its states; it is always the same object, as PettingZoo requires."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Discrete:
-        """Return the space of an agent's actions: always the same object."""
+        """Return the space of an agent's actions, the indices of neighbours; it is always the same object, as PettingZoo requires."""
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, int], dict[str, dict[str, Any]]]:
-        """Put the robot at home; `seed` determines the noise of this and all later episodes."""
+        """Put the robot at home; return the agents' states and infos. `seed` determines the noise of this and all later episodes."""
         if seed is not None:
             self._rng = np_random(seed)[0]
         self.plant.restart(int(self._rng.integers(SEEDS)))
@@ -124,7 +125,10 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
     def step(
         self, actions: Mapping[str, int]
     ) -> tuple[dict[str, int], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Begin the actions of the parts at rest, and simulate until one part or more have ended theirs."""
+        """Begin the actions of the parts at rest, and simulate until at least one part has ended its action.
+
+        `actions`: by agent. Return states, rewards, terminated (always False), truncated and infos, each a dict by agent.
+        """
         for part in self.agents:
             if part not in self._under_way and part in actions:
                 self._begin(part, int(actions[part]))
@@ -142,7 +146,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         return seen, rewards, dict.fromkeys(agents, False), dict.fromkeys(agents, truncated), infos
 
     def render(self) -> Picture | None:
-        """Return a picture (H, W, 3) of the robot in its world, in "rgb_array" mode."""
+        """Return a picture (H, W, 3) of the robot in its world, or None if there is no render mode."""
         if self.render_mode is None:
             return None
         if self._portrait is None:
@@ -173,4 +177,4 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
 
 
 parallel_env = TableEnv
-"""The name that PettingZoo's tools expect in the module of an environment."""
+"""`TableEnv` under the name that PettingZoo's tools expect in the module of an environment."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tabular worlds as Gymnasium environments."""
+"""Gymnasium environments of worlds that are given as tables of outcomes, probabilities and rewards."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from mobee.learning.tabular import TabularWorld, deep_sea, river_swim
 
 
 class TabularEnv(Env[Any, Any]):
-    """A world of tables as an environment: states are observations, every episode starts in state 0.
+    """A Gymnasium environment from tables; the observation is the state, and every episode starts in state 0.
 
     Args:
         world: the tables of outcomes, probabilities and rewards; every state has all actions.
-        returning: whether an episode ends when the state is 0 again.
+        returning: True: an episode terminates when the state is 0 again; False: it never terminates.
         render_mode: only None is supported.
     """
 
@@ -31,13 +31,13 @@ class TabularEnv(Env[Any, Any]):
         self._state = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
-        """Start in state 0; `seed` determines all later draws."""
+        """Start in state 0; return it with an empty info. `seed` determines all later random outcomes."""
         super().reset(seed=seed)
         self._state = 0
         return 0, {}
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        """Draw the outcome of an action from the tables."""
+        """Draw the outcome of an action from the tables; return state, reward, whether the episode has ended, False, and an empty info."""
         row = self._cumulative[self._state, action]
         drawn = int(row.searchsorted(self.np_random.random() * row[-1], side="right"))
         reward = float(self.world.rewards[self._state, action, drawn])
@@ -46,10 +46,13 @@ class TabularEnv(Env[Any, Any]):
 
 
 def river_swim_env(length: int = 6, render_mode: None = None) -> TabularEnv:
-    """Return `mobee.learning.tabular.river_swim` as an environment without end; its id has a limit of 200 steps."""
+    """Return the world of `mobee.learning.tabular.river_swim` as an environment whose episodes never end.
+
+    Made by its id, `MoBeE/RiverSwim-v0`, it truncates an episode after 200 steps.
+    """
     return TabularEnv(river_swim(length), render_mode=render_mode)
 
 
 def deep_sea_env(depth: int = 10, render_mode: None = None) -> TabularEnv:
-    """Return `mobee.learning.tabular.deep_sea` as an environment whose episode ends after `depth` steps, at the top again."""
+    """Return the world of `mobee.learning.tabular.deep_sea` as an environment whose episodes end after `depth` steps, in state 0."""
     return TabularEnv(deep_sea(depth), returning=True, render_mode=render_mode)

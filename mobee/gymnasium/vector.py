@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 
 class RobotVectorEnv(VectorEnv[Any, Any, Any]):
-    """Several robots that are simulated together.
+    """The base of Gymnasium vector environments: several robots that are simulated together.
 
-    An episode that has ended begins again in the next step, whose action is ignored (`AutoresetMode.NEXT_STEP`).
+    In the step after the end of a robot's episode, its action is ignored and a new episode begins (`AutoresetMode.NEXT_STEP`).
 
     Args:
-        num_envs: how many robots.
-        max_episode_steps: after which an episode is truncated.
+        num_envs: number of robots.
+        max_episode_steps: number of steps after which an episode is truncated.
         observations: the space of one robot's observations.
-        actions: the space of its actions.
+        actions: the space of one robot's actions.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}

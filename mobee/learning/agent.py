@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The curious agent: decides, acts through a plant, observes, stores every transition (thesis Algorithm 8)."""
+"""The curious agent: decides, acts through a plant, observes the outcome, and stores every transition (thesis Algorithm 8)."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ from mobee.store import Transition, TransitionStore
 class CuriousAgent(CuriousLearner):
     """Learns the transition model of one part by trying the actions from which it expects to learn most.
 
-    Its decisions follow from its settings and its transitions alone, so an agent that is restarted with its store continues as if it
-    had never stopped.  Each transition is stored before the agent learns from it.
+    Its decisions depend only on its settings and its transitions. An agent that is restarted with its store therefore continues as if it
+    had never stopped. Each transition is stored before the agent learns from it.
 
     Args:
         space: states and actions of one part.
-        plant: the robot it acts on; must have the motors of the space's robot.
-        explorer: see `CuriousSettings`; None: as in `settings`.
-        seed: of the draws among equally good actions; None: as in `settings`.
-        settings: None: the defaults.
-        store: where transitions are written, and read from at the start; None: they are not kept.
-        continues: file of transitions of the same agent with which a new store begins; they may have been made on another plant.
-        **changes: fields of `CuriousSettings` by keyword, in place of those in `settings`.
+        plant: the robot on which the agent acts; it must have the motors of the space's robot.
+        explorer: how actions are chosen, see `CuriousSettings`; None: as in `settings`.
+        seed: seed of the random choice among equally good actions; None: as in `settings`.
+        settings: settings of the agent; None: the defaults.
+        store: file to which transitions are written, and from which they are read at the start; None: they are not stored.
+        continues: file with earlier transitions of the same agent, which are copied to the start of an empty `store`; they may have been
+            made on another plant.
+        **changes: fields of `CuriousSettings` by keyword, in place of the values in `settings`.
 
     Raises:
         UnknownName: no such setting, explorer, initialisation, divergence or beliefs.
@@ -70,46 +71,50 @@ class CuriousAgent(CuriousLearner):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the agent, of its space and, if it has any, of its plant, as plain JSON values."""
+        """The settings of the agent and of its space, and those of its plant if the plant has settings, as JSON values."""
         return super().settings | ({"plant": self.plant.settings} if isinstance(self.plant, Described) else {})
 
     @property
     def state(self) -> int:
-        """The present state of the part: measured at first and after an interruption, else taken from the last outcome."""
+        """The present state of the part, from the last outcome. At the start and after an interruption, reading it measures the state."""
         if self._state is None:
             before = None if self.last is None else self.last.s_next
             self._state = self.space.state_after(present_outcome(self.plant, self.part), before)
         return self._state
 
     def decide(self, state: int) -> int:
-        """Choose the action to take in a state."""
+        """Choose the action to take in a state, and remember it for `target`, `act` and `observe`."""
         action = self._choose(state)
         self._pending = state, action
         return action
 
     def explore_by(self, explorer: str | Explorer) -> None:
-        """Choose the next actions by another explorer; see `CuriousSettings`.
+        """Change the explorer, which chooses the next actions.
 
-        The store records the change and the transition after which it was made, so that a restarted agent continues with it. An action
-        that is already decided is not changed.
+        `explorer`: a name, a function, or the text `module:name` of a function, as in `CuriousSettings`. An action that is already decided
+        is not changed. The store records the change, so that a restarted agent makes it at the same transition.
 
         Raises:
             UnknownName: no such explorer.
-            InvalidValue: it ignores the goal that the agent has.
+            InvalidValue: the agent has a goal, which this explorer ignores.
         """
         self._explore_by(explorer)
         if self.store is not None:
             self.store.change_explorer(self.transitions + (self._pending is not None), self.explorer)
 
     def target(self, action: int) -> Array:
-        """Return the goal pose of the action just decided, shape (n_part,), in [rad]."""
+        """Return the pose at which an action aims, shape (n_part,), in [rad].
+
+        `action`: the number that the last call of `decide` returned. Raises MobeeError if no action is under way.
+        """
         state, _ = self._decided()
         return self.space.aim(state, action)
 
     def observe(self, outcome: Outcome) -> float:
-        """Learn from the outcome of the action just decided; returns the reward in nats.
+        """Learn from the outcome of the action that was decided last; return the reward, the information gain, in nats.
 
-        With a store the transition is on disk when this returns; if it cannot be written, nothing is learned.
+        With a store the transition is on disk when this returns; if it cannot be written, nothing is learned. Raises MobeeError if no
+        action is under way.
         """
         state, action = self._decided()
         following = self.space.state_after(outcome, state)
@@ -134,20 +139,23 @@ class CuriousAgent(CuriousLearner):
         return transition.reward
 
     def interrupt(self) -> None:
-        """Discard the action just decided, which ended without an outcome; nothing is learned, and the next use of `state` measures it."""
+        """Discard the action that was decided last, because it ended without an outcome. The agent learns nothing from it.
+
+        The next read of `state` measures the state again.
+        """
         self._state = self._pending = None
         self._plans.undo()
 
     def step(self) -> float:
-        """Decide, act and observe once; returns the reward in nats.
+        """Decide on an action, perform it and learn from its outcome; return the reward in nats.
 
-        Raises ActionInterrupted if the plant does; nothing is stored then, and the next step measures again.
+        Raises ActionInterrupted if the plant does; then nothing is learned or stored, and the next step measures the state again.
         """
         self.decide(self.state)
         return self.act()
 
     def act(self) -> float:
-        """Perform the action just decided, and observe; returns the reward in nats, and raises as `step` does."""
+        """Perform the action that was decided last, and learn from its outcome; return the reward in nats. Raises as `step` does."""
         try:
             outcome = self.plant.act(self.part, self.target(self._decided()[1]))
         except ActionInterrupted:
@@ -156,7 +164,7 @@ class CuriousAgent(CuriousLearner):
         return self.observe(outcome)
 
     def run(self, transitions: int) -> None:
-        """Observe `transitions` more transitions; an interrupted action does not count, and the agent then decides again."""
+        """Make `transitions` more transitions. An interrupted action does not count: the agent measures its state and decides again."""
         end = self.transitions + transitions
         while self.transitions < end:
             try:
@@ -171,20 +179,20 @@ class CuriousAgent(CuriousLearner):
 
 
 class ConcurrentPlant(Plant, Protocol):
-    """A plant on which actions of several parts may be under way at once."""
+    """A plant that can perform actions of several parts at the same time."""
 
     def begin(self, part: str, target: Array) -> None:
-        """Start an action of a part; target (n_part,) rad."""
+        """Start an action of a part, without waiting for its end. `target`: (n_part,) rad, where the attractor is set."""
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until at least one action has ended; returns the part and the outcome of each action that has ended."""
+        """Run until at least one action has ended; return (part, outcome) of each action that has ended."""
 
 
 def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
-    """Run agents of different parts at once on their common plant until they have made `transitions` more transitions in total.
+    """Run agents of different parts at the same time on one plant until they have made `transitions` more transitions in total.
 
-    No action is begun beyond that number, so at the end every part has settled and every transition was observed.
-    Raises InvalidValue unless each agent has its own part and all share a plant with `begin` and `advance`.
+    No further action is started after that number, so at the end every part has settled and every transition was observed. Raises
+    InvalidValue unless each agent has its own part and all have the same plant, a `ConcurrentPlant`.
     """
     plant = _common_plant(agents)
     waiting, begun, ended = list(agents), 0, 0

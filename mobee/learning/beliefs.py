@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner believes of the outcomes of its actions, and how far it can predict them."""
+"""What a learner believes about the outcomes of its actions, and whether it can predict them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from mobee.learning.value_iteration import OutcomeModel
 LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
 PREDICTABLE_TRIES = 2
 PREDICTABLE_SHARE = 0.8
-"""A state-action is predictable when it was tried at least PREDICTABLE_TRIES times and this share of its tries ended alike."""
+"""A state-action is predictable if it was tried at least PREDICTABLE_TRIES (2) times, and this share of the tries had the same outcome."""
 
 
 def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
-    """Return the believed probability of an outcome; 0 for one that was never observed."""
+    """Return the believed probability that action `a` in state `s` ends in the state `outcome`; 0 for one that was never observed."""
     return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
 
 
 def surprise_of(probability: float) -> float:
-    """Return the surprise −ln p of an outcome, nats."""
+    """Return the surprise -ln p of an outcome of probability p, in nats; a p below LEAST_PROBABILITY (0.001) counts as this value."""
     return -math.log(max(probability, LEAST_PROBABILITY))

@@ -14,21 +14,21 @@ from mobee.learning.space import MAX_STATES, Space
 from mobee.robot.robot import Motor, Part, Robot
 
 MOTORS = ("state", "action")
-"""The motors of the robot that stands for a decision problem; its q is the number of the state and that of the action, no angles."""
+"""The motors of the robot that stands for a decision problem. Their positions are numbers of a state and of an action, not angles."""
 
 
 class DiscreteSpace(Space):
     """Numbered states, each with the same numbered actions, of a decision problem without a robot.
 
-    It is a Space of a robot whose two motors are the number of the state and of the action, so that agents and plants of this library
-    work on it.  The result of an action is not known in advance, so its goal, which is the outcome that a model imagines
-    before the first try, is the state itself: no change.  Plan with `beliefs="debiased"`, on which this goal has little influence.
+    It is the Space of a robot with two motors, whose positions are the number of the state and of the action. So agents and plants of this
+    library work with it. A model imagines that an action leads to its goal before the first try. Here the result of an action is not known
+    in advance, so the goal is the state itself. Plan with `beliefs="debiased"`, on which this goal has little influence.
 
     Args:
-        states: their number, at least 2.
-        actions: of each state, at least 1.
-        goals: (S, A) the state to which each action is expected to lead, where this is known; None: the state itself.
-        name: of the robot's only part.
+        states: number of states, at least 2.
+        actions: number of actions of each state, at least 1.
+        goals: (S, A) the state to which each action is expected to lead; None: not known, the state itself.
+        name: name of the robot and of its only part.
 
     Raises:
         InvalidValue: an argument is out of its range; the message states the valid one.
@@ -46,11 +46,11 @@ class DiscreteSpace(Space):
         return f"<DiscreteSpace of {self.part}: {len(self)} states, {self.state_actions} state-actions>"
 
     def aim(self, state: int, action: int) -> Array:
-        """Return the number of the state that is expected and that of the action, shape (2,): what a plant is given as target."""
+        """Return the target of an action for a plant, shape (2,): the number of the expected state, and the number of the action."""
         return np.array([self.goal(state, action), action], dtype=np.float64)
 
     def action_of(self, target: Array) -> int:
-        """Return the number of the action of a target that `aim` returned; raises InvalidValue for another target."""
+        """Return the number of the action from a target that `aim` returned; raises InvalidValue for any other target."""
         actions = self.goals.shape[1]
         if np.shape(target) != (2,) or target[1] not in range(actions):
             raise InvalidValue(f"target {target!r} of {self.part}: give the state that is expected and an action from 0 to {actions - 1}.")
@@ -58,7 +58,7 @@ class DiscreteSpace(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The number of states and actions and a digest, as plain JSON values."""
+        """The numbers of states and actions, and a digest of the space, as JSON values."""
         return self._made | {"kind": "discrete", "states": len(self), "actions": self.goals.shape[1]}
 
     def _cell(self, q: list[float]) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Explorers score the actions of a state: curiosity, the baselines of the thesis, and baselines from the literature."""
+"""Explorers, which score the actions of a state: curiosity, the baselines of the thesis, and baselines from the literature."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ from mobee.learning.value_iteration import OutcomeModel
 
 
 class Explorable(Protocol):
-    """The attributes of an agent that an explorer may read."""
+    """The attributes of an agent that an explorer may read.
+
+    `model`: its transition model. `beliefs`: the outcome model with which it plans. `discount`: factor of future rewards. `seed`: of random
+    choices. `part`: name of its part. `transitions`: number of transitions observed so far.
+    """
 
     model: TransitionModel
     beliefs: OutcomeModel
@@ -30,9 +34,9 @@ class Explorable(Protocol):
     transitions: int
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """Compute state and action values, (S,) and (S, A), for a reward (S, A) and beliefs; None: the agent's own.
+        """Compute the values of states (S,) and of actions (S, A) for a reward (S, A) and beliefs (None: the agent's own).
 
-        Each plan starts from the values of the previous plan of the same key.
+        `key`: name of the plan; each plan starts from the values of the previous plan with the same name.
         """
 
 
@@ -41,14 +45,14 @@ Explorer = Callable[[Explorable, int, np.random.Generator], Array]
 
 """A function of agent, state and random generator that returns the score of each action of the state, shape (actions,).
 
-The action with the highest score is chosen, at random among equals.  The generator is seeded anew for each transition; everything else in
-the scores must depend only on the agent's settings and transitions.
+The agent takes the action with the highest score; if several have it, a random one of them. The generator has a new seed for each
+transition. Everything else in the scores must depend only on the agent's settings and transitions.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class SampledBeliefs:
-    """Transition probabilities (S, A, B) sampled from the posterior of a transition model, with the outcome state of each bin (S, A, B)."""
+    """A transition model that was drawn at random from the posterior: `outcomes` and their `probabilities`, (S, A, B)."""
 
     outcomes: Ints
     probabilities: Array
@@ -57,7 +61,8 @@ class SampledBeliefs:
 def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     """Score actions by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
 
-    The random numbers stay the same for an episode of 1 / (1 - discount) transitions; only the counts change the drawn model meanwhile.
+    The random numbers of the draw stay the same for 1 / (1 - discount) transitions. During this time the drawn model changes only because
+    the counts change.
     """
     model = agent.model
     episode = agent.transitions // round(1.0 / (1.0 - agent.discount))
@@ -67,10 +72,10 @@ def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) 
 
 
 def dirichlet(counts: Array, normal: Array) -> Array:
-    """Return a draw (..., B) from the Dirichlet distribution of `counts` (..., B); `normal`: standard normal numbers of the same shape.
+    """Return a draw (..., B) from the Dirichlet distribution with the parameters `counts` (..., B); 0 where the count is 0.
 
-    Gamma variates by Wilson and Hilferty's cube root (1931), accurate enough for counts from 1: with the same numbers, small changes of
-    the counts change the probabilities little.  Where the count is 0 the probability is 0.
+    `normal`: standard normal random numbers, same shape. They become gamma variates by the cube root formula of Wilson and Hilferty (1931),
+    which is accurate enough for counts of at least 1. With the same random numbers, small changes of the counts change the result little.
     """
     known = np.maximum(counts, 1.0)
     gamma = np.maximum(1.0 - 1.0 / (9.0 * known) + normal / (3.0 * np.sqrt(known)), 1e-3)
@@ -93,12 +98,13 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of expected information gains; among equals, by the gain that remains after the plan.
+    """Score actions by the discounted sum of expected information gains; among equal actions, by the gain that remains after the plan.
 
-    The reward of 'curious' is the last gain of a state-action.  Here it is the expected gain of the next observation under debiased
-    counts, which falls sooner once an action is certain; an action that was never tried has its imagined gain.
-    Then the best plan is simulated through its most probable outcomes, the gains on it decrease accordingly, and a second plan values
-    the remaining gains: a state with one untried action is worth less than one with sixteen.  Both plans use the agent's beliefs.
+    The explorer `curious` plans with the last gain of each state-action. Here the reward is the expected gain of the next observation, with
+    the outcome probabilities of `TransitionModel.debiased`. It decreases sooner if an action is certain; for an action that was never tried
+    it is the imagined gain. Then the best plan is simulated through its most probable outcomes, and the gains along it decrease
+    accordingly. A second plan computes the value of the remaining gains: a state with one untried action is then worth less than a state
+    with sixteen. Both plans use the agent's beliefs.
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -138,22 +144,22 @@ TIE_MARGIN = 1e-12  # scores that differ by less are a tie
 
 
 def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by their discounted information gain."""
+    """Score actions by the discounted sum of rewards in a plan for information gain, or for the agent's goal (thesis Algorithm 8)."""
     return agent.plan()[1][state, : len(agent.model.space.actions(state))]
 
 
 def random(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score all actions equally."""
+    """Score all actions equally, so that each is taken with the same probability."""
     return np.zeros(len(agent.model.space.actions(state)))
 
 
 def least_tried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by how rarely they were tried in this state."""
+    """Score actions by how rarely they were tried in this state, so that the action with the fewest tries is taken."""
     return -agent.model.tries[state, : len(agent.model.space.actions(state))].astype(np.float64)
 
 
 def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by how soon they lead to an untried state-action, or to the least-tried one if all were tried."""
+    """Score actions by how soon they lead to a state-action that was never tried; if all were tried, to one with the fewest tries."""
     tries = agent.model.tries
     exists = agent.model.reward != -np.inf
     reward = np.where(exists, tries == tries[exists].min(), -np.inf)
@@ -161,7 +167,7 @@ def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> 
 
 
 def count_bonus(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by their discounted sum of 1 / sqrt(1 + tries) (Strehl and Littman 2008)."""
+    """Score actions by the discounted sum of the rewards 1 / sqrt(1 + tries) of state-actions (Strehl and Littman 2008)."""
     reward = np.where(agent.model.reward != -np.inf, 1.0 / np.sqrt(1.0 + agent.model.tries), -np.inf)
     return agent.plan(reward, key="count_bonus")[1][state, : len(agent.model.space.actions(state))]
 
@@ -178,7 +184,7 @@ EXPLORERS: dict[str, Explorer] = {
 
 
 def choose(scores: Array, rng: np.random.Generator) -> int:
-    """Return the action with the highest score, drawn uniformly among those within 1e-12 of it."""
+    """Return the index of the highest of the scores (actions,); if several are within 1e-12 of it, a random one of them."""
     listed = scores.tolist()  # NumPy takes longer for so few numbers
     least = max(listed) - TIE_MARGIN
     ties = [action for action, score in enumerate(listed) if score >= least]
@@ -186,9 +192,10 @@ def choose(scores: Array, rng: np.random.Generator) -> int:
 
 
 class Draws:
-    """Random numbers determined by a seed, a name and a count: one generator whose state is set again for each count.
+    """Random generators for numbered decisions: the random numbers depend only on a seed, a name and a number.
 
-    Setting the state takes a tenth of the time of making a generator.  `name`: distinguishes users of the same seed.
+    It uses one generator, whose state is set for each number; this takes a tenth of the time of making a generator. `name`: distinguishes
+    users with the same seed.
     """
 
     def __init__(self, name: str) -> None:
@@ -199,7 +206,7 @@ class Draws:
         return Draws, (self._name,)
 
     def at(self, seed: int, count: int) -> np.random.Generator:
-        """Return the generator for a count, at its first draw; valid until the next call."""
+        """Return the generator for a seed and number `count`, before its first random number; it is valid until the next call."""
         self._generator.pending = f"{self._name} {seed} {count}"
         return self._generator
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""External rewards that an agent plans for instead of, or in addition to, information gain (thesis 6.5)."""
+"""External rewards, for which an agent plans instead of information gain, or in addition to it (thesis 6.5)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ PURSUING = ("curious",)  # explorers that use an external reward
 
 
 class External:
-    """An external reward R(s, a) over a space.
+    """An external reward R(s, a) for each state s and action a of a space.
 
     Args:
         space: the states and actions.
-        goal: target states, whose actions all have reward 1; or rewards of shape (S, A); or a function of a state, an action and the
-            action's goal state that returns the reward.
-        weight: the external reward times this factor is added to the intrinsic one; None: it replaces the intrinsic one.
+        goal: target states, in which all actions have reward 1; or rewards of shape (S, A); or a function of state, action and goal state
+            of the action that returns the reward.
+        weight: the external reward times this factor is added to the intrinsic reward; None: it replaces the intrinsic reward.
 
     Raises:
         InvalidValue: no such state, a reward that is not finite, or a wrong shape.
@@ -47,19 +47,25 @@ class External:
         self.reward.flags.writeable = False
 
     def combined(self, intrinsic: Array) -> Array:
-        """Return the reward to plan with, shape (S, A), -inf where there is no action."""
+        """Return the reward for plans, for each state and action, shape (S, A); -inf where there is no action.
+
+        It is the external reward, or, with a weight, `intrinsic` (S, A) plus weight times the external reward.
+        """
         if self.weight is None:
             return self.reward
         return np.where(intrinsic == -np.inf, -np.inf, intrinsic + self.weight * self.reward)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A digest of the rewards and their weight, for the record of a run (plain JSON values)."""
+        """A digest of the rewards, and their weight, for the record of a run, as JSON values."""
         return {"digest": hashlib.sha256(self.reward.tobytes()).hexdigest()[:16], "weight": self.weight}
 
 
 def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
-    """Return the external reward of an agent, None without a goal; raises InvalidValue if its explorer would ignore it."""
+    """Return the external reward of an agent; None if there is no goal.
+
+    `weight`: as in `External`. Raises InvalidValue if the agent's explorer ignores external rewards, or for a weight without a goal.
+    """
     if goal is None:
         if weight is not None:
             raise InvalidValue(f"goal_weight={weight!r} without a goal: give both, or neither.")
@@ -69,13 +75,13 @@ def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str
 
 
 def require_pursuing(explorer: str) -> None:
-    """Raise InvalidValue if an explorer ignores external rewards."""
+    """Raise InvalidValue if the explorer of this name ignores external rewards; only those in PURSUING ("curious") use them."""
     if explorer not in PURSUING:
         raise InvalidValue(f"the explorer {explorer!r} ignores a goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
 
 
 def target_states(space: Space, given: Any) -> Ints:
-    """Return the states given as one number or several, ascending; raises InvalidValue if the space has no such state."""
+    """Return the states `given` as one number or several, as an ascending array; raises InvalidValue if the space has no such state."""
     states = np.unique(np.asarray(given))
     if states.dtype.kind not in "iu" or not len(states) or states[0] < 0 or states[-1] >= len(space):
         raise InvalidValue(f"{given!r}: {space.part} has no such state. Valid are 0 to {len(space) - 1}.")

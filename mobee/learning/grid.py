@@ -15,14 +15,16 @@ MARGIN = 0.01  # m: a place seen by the calibrated cameras is wrong by 2 mm (med
 
 
 class Grid:
-    """Equal rectangular cells; the first axis is the fastest: cell = column + columns * row, as the states of a lattice.
+    """Equal rectangular cells on a horizontal surface, numbered row by row: cell = column + columns * row.
+
+    Columns are along x and rows along y; as in a lattice, the number changes fastest along the first axis.
 
     Args:
         x: lowest and highest x of the grid, m in the root frame.
         y: lowest and highest y, m.
-        shape: number of cells along x and along y.
-        margin: distance by which a place must be beyond the border of the present cell until another cell counts, m.  A place that is
-            perceived with errors then does not change its cell while the object rests near a border.
+        shape: number of cells along x (columns) and along y (rows).
+        margin: m. A position must be farther than this beyond the border of the present cell to count as another cell. So the cell does not
+            change because of errors of perception while the object rests near a border.
 
     Raises:
         InvalidValue: an empty range, fewer than two cells, or a margin that is negative or half a cell or more.
@@ -48,10 +50,10 @@ class Grid:
         return f"<Grid of {self.shape[0]} x {self.shape[1]} cells, {self._size[0]:.3g} x {self._size[1]:.3g} m each>"
 
     def cell_of(self, place: ArrayLike, before: int | None = None) -> int:
-        """Return the cell of a place (2,) or (3,) m, the nearest one if it is outside the grid.
+        """Return the cell that contains a position, (2,) or (3,) m in the root frame; outside the grid, the nearest cell.
 
-        `before`: the present cell, which stays while the place is at most `margin` beyond its border; None: no cell is preferred.
-        Raises InvalidValue for values that are not finite, or no such cell.
+        `before`: the present cell, which is returned if the position is at most `margin` beyond its border; None: no cell is preferred.
+        Raises InvalidValue for numbers that are not finite, or if there is no cell `before`.
         """
         at = real_array("place", place)
         if at.shape not in ((2,), (3,)) or not np.isfinite(at).all():
@@ -64,7 +66,7 @@ class Grid:
         return cell
 
     def centre(self, cell: int) -> Array:
-        """Return the centre of a cell, (2,) m; raises InvalidValue if there is no such cell."""
+        """Return the centre of a cell, (x, y) in m in the root frame; raises InvalidValue if there is no such cell."""
         if not 0 <= cell < len(self):
             raise InvalidValue(f"the grid has no cell {cell!r}: valid are 0 to {len(self) - 1}.")
         row, column = divmod(cell, self.shape[0])
@@ -73,6 +75,6 @@ class Grid:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments, as plain JSON values."""
+        """The constructor's arguments, as JSON values."""
         x, y = self._range
         return {"x": list(x), "y": list(y), "shape": list(self.shape), "margin": self.margin}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plants of one part whose actions end at once."""
+"""Plants of one part on which an action ends in the call that performs it."""
 
 from __future__ import annotations
 
@@ -12,27 +12,30 @@ from mobee.plant import Outcome
 
 
 class InstantPlant(ABC):
-    """A plant of one part whose actions end at once: `advance` calls `act` with the target that `begin` was given."""
+    """A plant of one part without motion in time: an action ends in the call of `act`, and counts as 1 s.
+
+    `begin` only stores the target; `advance` then calls `act`. So `mobee.learning.agent.run` can use the plant too.
+    """
 
     def __init__(self, space: Space) -> None:
         self.space: Space = space
-        """The states and actions."""
+        """The states and actions of the part."""
         self.robot = space.robot
         self._under_way: Array | None = None
 
     @abstractmethod
     def act(self, part: str, target: Array) -> Outcome:
-        """Do the action of a target that `space.aim` returned; it takes 1 s."""
+        """Perform the action whose target `space.aim` returned, and return its outcome; the action counts as 1 s."""
 
     def begin(self, part: str, target: Array) -> None:
-        """Start the action of a target that `space.aim` returned; `advance` ends it."""
+        """Store the target of an action, from `space.aim`; `advance` performs it. Raises InvalidValue if an action is under way."""
         self._check_part(part)
         if self._under_way is not None:
             raise InvalidValue(f"{part} has an action under way: wait for it with advance().")
         self._under_way = target
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """End the action under way."""
+        """Perform the action that was begun; return a list with its part and outcome. Raises InvalidValue if none was begun."""
         if self._under_way is None:
             raise InvalidValue("no action is under way: begin one first.")
         target, self._under_way = self._under_way, None

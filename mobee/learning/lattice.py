@@ -21,20 +21,21 @@ Levels = Sequence[float] | Sequence[Sequence[float]] | Mapping[str, Sequence[flo
 
 
 class Lattice(Space):
-    """States are the Voronoi cells of samples at every combination of levels; actions go to neighbours' samples.
+    """A space whose samples are at every combination of some levels of each joint; actions aim at the samples of neighbours.
 
-    Numbering as published: state = d0 + L0 d1 + L0 L1 d2 + ... with L levels of a joint, so the first joint is the
-    fastest; an action is the index of its goal among the state's goals in ascending order.
+    A state is the Voronoi cell of its sample. The numbers of the states are as published: state = d0 + L0 d1 + L0 L1 d2 + ..., where d is
+    the index of a joint's level and L its number of levels; so the first joint changes fastest. An action is the index of its goal among
+    the state's goals in ascending order.
 
     Args:
         robot: the robot; levels are fractions between its motor limits.
         joints: motor names, all of one part.
-        levels: fractions of each joint's range, ascending in [0, 1]: one sequence for all joints, one for each joint in their
-            order, or a mapping from each joint's name.
-        neighbours: number of nearest samples (in fractions of the range) that each state has actions to, or "equidistant":
-            the samples one step away along one joint.  None: 16, or all others if there are fewer.
-        tie_seed: seed of the draw among equally near samples at the last rank.
-        rest: fraction of its range at which each other motor of the part stays; or one for each motor of the part.
+        levels: fractions of each joint's range, ascending in [0, 1]: one sequence for all joints, one for each joint in their order, or a
+            dict from each joint's name to its sequence.
+        neighbours: number of nearest samples (distances in fractions of the ranges) to which each state has actions; "equidistant": the
+            samples one level away along one joint; None: 16, or all others if there are fewer.
+        tie_seed: if several samples are equally near, but not all of them become neighbours, a random choice with this seed decides.
+        rest: fraction of its range at which each other motor of the part stays; or a list with one fraction for each motor of the part.
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -51,7 +52,7 @@ class Lattice(Space):
     ) -> None:
         _, indices = checked_joints(robot, joints)
         self.levels = _checked_levels(levels, joints)
-        """The levels of each joint."""
+        """The levels of each joint, as fractions of its range."""
         sizes = tuple(len(one) for one in self.levels)
         digits = lattice_digits(sizes)
         fractions = np.stack([np.array(one)[column] for one, column in zip(self.levels, digits.T, strict=True)], axis=1)
@@ -73,7 +74,10 @@ class Lattice(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the resulting space, for the record of a run (plain JSON values)."""
+        """The constructor's arguments and a digest of the space, as JSON values.
+
+        `mobee.learning.record.space_from` rebuilds the space from them.
+        """
         first = self.levels[0]
         levels = list(first) if set(self.levels) == {first} else [list(one) for one in self.levels]
         return self._made | {"levels": levels, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
@@ -128,11 +132,11 @@ BLOCK_GAP = 0.8  # between the blocks of a drawn lattice, in steps of its first 
 
 
 def plane_layout(space: Space) -> Array:
-    """Compute positions at which to draw the states, shape (S, 2).
+    """Compute positions in a plane at which to draw the states, shape (S, 2).
 
-    A lattice becomes a grid of grids, as in the paper's figure 7: within a block the first joint goes right and the second up, the
-    third and fourth choose the block, and so on.  The postures of an ObjectSpace are a block in each of its cells.  Other spaces are
-    projected to the two directions in which the samples differ most.
+    A lattice becomes a grid of grids, as in the paper's figure 7: within a block the first joint increases to the right and the second
+    upwards; the third and fourth joint choose the block, and so on. For an `ObjectSpace` each cell of the object has a block with all
+    postures. Other spaces are projected to the two directions in which the samples differ most.
     """
     if isinstance(space, Lattice):
         return _nested([len(levels) for levels in space.levels])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The curious learner: learns from transitions and chooses actions by planning, without acting (thesis Algorithms 7 and 8)."""
+"""The curious learner: learns from transitions and chooses actions by planning, but does not act (thesis Algorithms 7 and 8)."""
 
 from __future__ import annotations
 
@@ -25,18 +25,20 @@ class CuriousSettings(Settings):
     """Settings of a `CuriousAgent`.
 
     Args:
-        explorer: how it chooses actions: a name in `mobee.learning.explorers.EXPLORERS`, "curious", "random", "least_tried", ...; a
-            function, see `Explorer`; or `module:name` of one.
-        seed: of the draws among equally good actions; agents of different parts draw differently under the same seed.
+        explorer: how actions are chosen: a name in `mobee.learning.explorers.EXPLORERS`, such as "curious", "random" or "least_tried"; a
+            function, see `mobee.learning.explorers.Explorer`; or the text `module:name` of such a function.
+        seed: seed of the random choice among equally good actions; with the same seed, agents of different parts choose differently.
         discount: factor of future rewards in plans.
-        initial: which outcomes of an action are imagined before it is tried, "50-50" or "60-40", see `TransitionModel`.
-        divergence: the reward of an observation: "kail", "kl", a function, or `module:name` of one, see `TransitionModel`.
-        forgetting: factor of the counts of a state-action before each new observation of it; 1 forgets nothing.
+        initial: outcomes of an action that are imagined before it is tried: "50-50" (one failure and one success) or "60-40" (one failure
+            and two successes), see `TransitionModel`.
+        divergence: the reward of an observation: "kail", "kl", a function, or the text `module:name` of one, see `TransitionModel`.
+        forgetting: factor by which the counts of a state-action are multiplied before each new observation of it; 1 forgets nothing.
         detector: "run_length": outcomes from before a detected change of the world are forgotten, see `TransitionModel`; "none": all count.
-        tolerance: at which a plan has converged, see `value_iteration`.
-        relative: whether the tolerance is in units of the largest reward, and each plan starts from the values of the one before.
-            False, with tolerance=1e-3: Algorithm 7 as published.
-        beliefs: what plans are made with: "counts", which include the imagined outcomes, or "debiased", which leave them out.
+        tolerance: a plan has converged if no value changes by this or more, see `value_iteration`.
+        relative: True: the tolerance is in units of the largest reward, and each plan starts from the values of the previous one. False,
+            with tolerance=1e-3: Algorithm 7 as published.
+        beliefs: the probabilities with which plans are made: "counts", which include the imagined outcomes, or "debiased", which have a
+            weak prior in place of them, see `TransitionModel.debiased`.
         goal: an external reward: target states, an array (S, A), or a function of state, action and goal state; None: curiosity alone.
         goal_weight: the external reward times this factor is added to the intrinsic reward; None: the external reward replaces it.
     """
@@ -56,7 +58,10 @@ class CuriousSettings(Settings):
 
 
 WATCHERS: list[Callable[[CuriousLearner, Transition], None]] = []
-"""Functions that are called after each transition of every learner of this process, also when it is read from a store."""
+"""Functions that are called with the learner and the transition after each transition of every learner of this process.
+
+They are also called for transitions that are read from a store.
+"""
 
 
 class _Made(NamedTuple):
@@ -68,10 +73,10 @@ class _Made(NamedTuple):
 
 
 class Plans:
-    """Caches the plans made since the last transition, by key; a new plan starts from the values of the previous plan of its key.
+    """Caches the plans made since the last transition, by name (`key`); a new plan starts from the values of the previous one of its name.
 
-    `relative`: the tolerance is in units of the largest reward, and plans start from earlier values; else Algorithm 7 as published,
-    with an absolute tolerance and all values zero at the start.
+    `discount` and `tolerance`: as in `value_iteration`. `relative`: True: the tolerance is in units of the largest reward, and plans start
+    from earlier values; False: Algorithm 7 as published, with an absolute tolerance and all values 0 at the start.
     """
 
     def __init__(self, discount: float, tolerance: float, relative: bool) -> None:
@@ -80,14 +85,20 @@ class Plans:
         self._made: dict[str, _Made] = {}
 
     def made(self, key: str, reward: Array | None, beliefs: OutcomeModel | None) -> tuple[Array, Array] | None:
-        """Return the plan of a key if it was made since the last transition, for the same reward and beliefs objects; else None."""
+        """Return the plan `key` if it was made since the last transition, for the same objects `reward` and `beliefs`; otherwise None.
+
+        A plan is the values of states (S,) and of actions (S, A).
+        """
         made = self._made.get(key)
         return made.plan if made is not None and made.reward is reward and made.beliefs is beliefs else None
 
     def make(
         self, key: str, requested: tuple[Array | None, OutcomeModel | None], reward: Array, beliefs: OutcomeModel
     ) -> tuple[Array, Array]:
-        """Plan for a reward (S, A) with beliefs; `requested`: the objects, or None for the agent's own, to compare with in `made`."""
+        """Compute and store the plan `key` for a reward (S, A) and beliefs; return the values of states (S,) and of actions (S, A).
+
+        `requested`: the reward and the beliefs with which the caller asked for the plan (None: the agent's own); `made` compares them.
+        """
         if self.relative:
             before = self._made.get(key)
             start = self._starts.get(key) if before is None else before.plan[0]
@@ -100,22 +111,24 @@ class Plans:
         return plan
 
     def keep(self) -> None:
-        """End a transition: the next plans start from the values of the present ones."""
+        """Process the end of a transition: discard the present plans, but keep their values as the start of the next plans."""
         for key, made in self._made.items():
             self._starts[key] = made.plan[0]
         self._made.clear()
 
     def undo(self) -> None:
-        """Discard the plans that were made for an action that was interrupted."""
+        """Discard the present plans, because the action for which they were made was interrupted."""
         self._made.clear()
 
 
 class CuriousLearner:
-    """Learns from transitions and chooses actions; its choices follow from its settings and its transitions alone.
+    """Learns from transitions and chooses actions. Its choices depend only on its settings and its transitions.
+
+    It does not act; `CuriousAgent` adds a plant and a store.
 
     Args:
         space: states and actions of one part.
-        settings: see `CuriousSettings`.
+        settings: settings of the learner.
 
     Raises:
         UnknownName: no such explorer or divergence.
@@ -128,11 +141,11 @@ class CuriousLearner:
         self.seed, self.discount = settings.seed, settings.discount
         self.model = TransitionModel(space, settings.initial, settings.divergence, settings.forgetting, settings.detector)
         self.beliefs: OutcomeModel = self.model.debiased() if settings.beliefs == "debiased" else self.model
-        """The outcome model that plans are made with."""
+        """The outcome model with which plans are made."""
         self.transitions = 0
-        """Number of transitions observed, those of its store included."""
+        """Number of transitions observed, with those that were read from a store."""
         self.last: Transition | None = None
-        """The newest transition."""
+        """The newest transition; None before the first."""
         self._settings, self._first_explorer = settings, self.explorer
         self._external = pursued(space, settings.goal, settings.goal_weight, self.explorer)
         self._plans = Plans(settings.discount, settings.tolerance, settings.relative)
@@ -140,7 +153,7 @@ class CuriousLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the learner and its space, as plain JSON values; a store can be continued only with equal settings."""
+        """The settings of the learner and its space, as JSON values. A store can be continued only with equal settings."""
         record = vars(self._settings) | {
             "space": self.space.settings,
             "explorer": self._first_explorer,
@@ -154,10 +167,10 @@ class CuriousLearner:
         return record
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """Return state values (S,) and action values (S, A) of a plan (Algorithm 7); computed only once between two transitions.
+        """Return the values of states (S,) and of actions (S, A) of a plan (Algorithm 7). Between two transitions it is computed only once.
 
-        `reward`: (S, A); None: the information gain, or the reward of the agent's goal.  `beliefs`: outcome model; None: the agent's.
-        `key`: each plan starts from the values of the previous plan of the same key.
+        `reward`: (S, A); None: the information gain, or the reward of the agent's goal. `beliefs`: outcome model; None: that of the agent.
+        `key`: name of the plan; each plan starts from the values of the previous plan of the same name.
         """
         plan = self._plans.made(key, reward, beliefs)
         if plan is None:

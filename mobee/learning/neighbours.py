@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Neighbour graphs over samples: the states that the actions of each state aim at, as tables and as edges."""
+"""Neighbour graphs of samples: the states at which the actions of each state aim, as tables and as edges."""
 
 from __future__ import annotations
 
@@ -18,18 +18,25 @@ MAX_COMPARED = 2000  # points up to which comparing all pairs is cheaper than im
 
 
 def lattice_strides(sizes: Sequence[int]) -> Ints:
-    """Return the step of the state's number for one level of each joint, shape (joints,): the first joint is the fastest."""
+    """Return by how much the number of a lattice state changes for one level of each joint, shape (joints,).
+
+    `sizes`: number of levels of each joint. The first joint changes fastest: [1, L0, L0 L1, ...].
+    """
     return np.cumprod([1, *sizes[:-1]]).astype(np.intp)
 
 
 def lattice_digits(sizes: Sequence[int]) -> Ints:
-    """Return the level of each joint in each state, shape (S, joints), from the number of levels of each joint."""
+    """Return the index of each joint's level in each lattice state, shape (S, joints). `sizes`: number of levels of each joint."""
     digits: Ints = np.arange(np.prod(sizes))[:, None] // lattice_strides(sizes) % np.array(sizes)
     return digits
 
 
 def equidistant_goals(digits: Ints, sizes: Sequence[int]) -> Ints:
-    """Return the states one lattice step away along one joint, ascending: shape (S, A), padded with NO_ACTION (thesis 7.2)."""
+    """Return for each lattice state the states one level away along one joint, ascending, shape (S, A) (thesis 7.2).
+
+    Rows of states with fewer than A such neighbours end in NO_ACTION (-1). `digits`: (S, joints), from `lattice_digits`. `sizes`: number of
+    levels of each joint.
+    """
     states = np.arange(len(digits))
     strides = lattice_strides(sizes)
     down = np.where(digits > 0, states[:, None] - strides, NO_ACTION)[:, ::-1]
@@ -41,9 +48,10 @@ def equidistant_goals(digits: Ints, sizes: Sequence[int]) -> Ints:
 
 
 def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
-    """Return the nearest other points of each point, ties drawn at random, ascending: shape (S, count).
+    """Return for each of `points` (S, d) the indices of its `count` nearest other points, ascending, shape (S, count).
 
-    Memory grows with S times count, and so does time unless many points are equally far.
+    If several points are equally far, but not all of them are among the `count` nearest, a random choice with `tie_seed` decides. Memory
+    grows with S times count, and so does time unless many points are equally far.
     """
     rng = np.random.default_rng(tie_seed)
     goals = np.empty((len(points), count), dtype=np.intp)
@@ -77,7 +85,7 @@ def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.rand
 
 
 def nearest_finder(points: Array) -> Callable[[Array], int]:
-    """Return a function from a point, shape (d,), to the index of the nearest of `points`, shape (S, d)."""
+    """Return a function that takes a point, shape (d,), and returns the index of the nearest of `points`, shape (S, d)."""
     return partial(_nearest_of_few, points) if len(points) <= MAX_COMPARED else partial(_nearest_in_tree, _tree(points))
 
 
@@ -100,18 +108,21 @@ Edges = list[tuple[int, int]]  # state, goal
 
 
 def edges_of(goals: Ints) -> Edges:
-    """Return all edges of a table of goals (S, A), state by state."""
+    """Return all edges (state, goal) of a table of goals (S, A), state by state."""
     states, actions = np.nonzero(goals != NO_ACTION)
     return list(zip(states.tolist(), goals[states, actions].tolist(), strict=True))
 
 
 def joined(edges: Edges) -> Edges:
-    """Return each edge once, ascending by state and goal."""
+    """Return the edges (state, goal) without repetitions, in ascending order."""
     return sorted(set(edges))
 
 
 def table_of(edges: Edges, states: int) -> Ints:
-    """Return the table of goals (S, A) from edges in ascending order; a state with fewer actions has NO_ACTION in the rest of its row."""
+    """Return the table of goals (S, A) of edges (state, goal), which must be in ascending order.
+
+    `states`: number of states S. Rows of states with fewer than A actions end in NO_ACTION (-1).
+    """
     counts = np.bincount([state for state, _ in edges], minlength=states)
     goals: Ints = np.full((states, max(1, int(counts.max(initial=0)))), NO_ACTION, dtype=np.intp)
     for (state, goal), action in zip(edges, _ranks(counts), strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""States that hold where an object is: the posture of a part, and the cell of a grid in which the object is perceived."""
+"""States that include the position of an object: the posture of a part, and the cell of a grid in which the object is perceived."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from mobee.plant import Outcome
 
 
 class ObjectSpace(Space):
-    """States are pairs of a posture and a cell: state = posture + postures * cell.  Actions are those of the posture.
+    """A space whose states are pairs of a posture and a cell of an object: state = posture + postures * cell.
 
-    The object is expected to stay in its cell, so that a learner is surprised when an action moves it.  Agents, explorers and planners use
-    this space as any other.  Their plant must perceive the object: `PerceivingPlant`, or another with `perceive`.  While
-    the object is not perceived, it is believed to be where it was before.
+    The actions of a state are those of its posture. The goal of an action has the same cell, so a learner is surprised if an action moves
+    the object. Agents, explorers and planners use this space as any other. The plant must perceive the object: use `PerceivingPlant`, or
+    another plant with `perceive`. While the object is not perceived, the space assumes that it is still in its last cell.
 
     Args:
         postures: the states and actions of the part.
-        grid: the cells.
-        name: of the object, by which the plant perceives it.
+        grid: the cells in which the object may be.
+        name: name of the object, under which the plant perceives it.
 
     Raises:
         InvalidValue: there are too many states; the message states the largest number.
@@ -48,27 +48,28 @@ class ObjectSpace(Space):
         return f"<ObjectSpace of {self.part} and {self.name}: {len(self.postures)} postures x {len(self.grid)} cells>"
 
     def state(self, posture: int, cell: int) -> int:
-        """Return the state of a posture and a cell; raises InvalidValue if there is none."""
+        """Return the number of the state with a posture and a cell; raises InvalidValue if there is no such posture or cell."""
         self.postures.target(posture)
         self.grid.centre(cell)
         return posture + len(self.postures) * cell
 
     def posture(self, state: int) -> int:
-        """Return the posture of a state."""
+        """Return the posture of a state: its number in `postures`."""
         return self._checked_state(state) % len(self.postures)
 
     def cell(self, state: int) -> int:
-        """Return the cell of a state."""
+        """Return the cell of the object in a state: its number in `grid`."""
         return self._checked_state(state) // len(self.postures)
 
     def in_cell(self, cell: int) -> Ints:
-        """Return all states with the object in a cell, ascending: a goal of an agent, or targets of a planner."""
+        """Return all states with the object in this cell, ascending. They can be the goal of an agent, or the targets of a planner."""
         return self.state(0, cell) + np.arange(len(self.postures))
 
     def state_after(self, outcome: Outcome, before: int | None = None) -> int:
-        """Return the state in which an action ended; see `Space.state_after`.
+        """Return the state in which an action ended: the posture by the encoders, and the cell in which the object was perceived.
 
-        Raises MobeeError if the object was not perceived and `before` is None.
+        `before`: the state in which the action began; its cell is used if the object was not perceived. None: not known; then raises
+        MobeeError if the object was not perceived.
         """
         known = None if before is None else self.cell(before)
         place = outcome.perceived.get(self.name)
@@ -81,17 +82,20 @@ class ObjectSpace(Space):
         return self.state(self.postures.state_of(outcome.q), 0 if cell is None else cell)
 
     def state_of(self, q: ArrayLike) -> int:
-        """Raise InvalidValue: a posture is only a part of the state; see `state_after` and `state`."""
+        """Raise InvalidValue, because a pose alone does not determine a state of this space; use `state_after` or `state`."""
         raise InvalidValue(
             f"a state of {self.part} holds the cell of {self.name} too, so that no pose is a state: give the number of a state, "
             f"posture + {len(self.postures)} x cell, or use state_after(outcome)."
         )
 
     def state_of_joints(self, q: ArrayLike) -> int:
-        """Raise InvalidValue, as `state_of`."""
+        """Raise InvalidValue, because a pose alone does not determine a state of this space; use `state_after` or `state`."""
         return self.state_of(q)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Postures, grid and name of the object, and a digest, as plain JSON values: `space_from` makes the space again."""
+        """Postures, grid and name of the object, and a digest of the space, as JSON values.
+
+        `mobee.learning.record.space_from` rebuilds the space from them.
+        """
         return self._made | {"kind": "object", "object": self.name, "postures": self.postures.settings, "grid": self.grid.settings}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans from any state to targets with a learned model; compares them with the shortest paths if every action reached its goal."""
+"""Plans from any state to target states with a learned model, compared with the shortest paths if every action reached its goal."""
 
 from __future__ import annotations
 
@@ -17,13 +17,20 @@ from mobee.learning.value_iteration import OutcomeModel, value_iteration
 
 
 def steps_between(space: Space, start: int, targets: Ints) -> int:
-    """Return the length of a shortest path to the nearest target if every action reaches its goal; -1 if there is none."""
+    """Return the number of actions on a shortest path from `start` to the nearest of `targets`; -1 if there is no path.
+
+    It assumes that every action reaches its goal.
+    """
     fewest = _steps(_graph(space), np.array([start]))[targets].min()
     return int(fewest) if np.isfinite(fewest) else -1
 
 
 def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[tuple[int, int], float]:
-    """Return the actions on the shortest intended paths, as (state, goal), with the probability that each ends at its goal."""
+    """Return the actions on the shortest paths from `start` to the nearest of `targets` if every action reached its goal.
+
+    A dict from (state, goal state) to the probability, according to `beliefs`, that the action ends in its goal state; empty without a
+    path.
+    """
     graph = _graph(space)
     there, on = _steps(graph, np.array([start])), _steps(graph.T.tocsr(), targets)
     if not np.isfinite(on[start]):
@@ -36,9 +43,10 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return, for each state that a path can pass, the highest probability of an action into it times that of an action out of it.
+    """Return for each state the probability of passing it: the highest of an action into it times the highest of an action out of it.
 
-    `actions`: probability of success of each action, by start and goal state.
+    `actions`: a dict from (state, goal state) of an action to its probability of success. States without an action into them, or out of
+    them, are not in the result.
     """
     entry: dict[int, float] = {}
     leaving: dict[int, float] = {}
@@ -74,11 +82,14 @@ RELIABLE = 0.5  # success probability below which states and actions count as un
 class Plan:
     """A path to a target, and its probability of success.
 
-    `path`: states from start to target.  `actions`: the action in each but the last.  `probabilities`: that each action ends in the next
-    state of the path.  `success`: that all of them do.  `steps`: mean number of actions to a target, if the plan is made again
-    after each action.  `shortest`: number of actions of a shortest path if every action reached its goal.
-    `avoided`: states on such shortest paths that are not on this one, with the probability of passing each;
-    `distrusted`: actions on them, as (state, goal), with the probability of reaching the goal; both only if it is below one half.
+    `path`: states from start to target. `actions`: the action in each state of the path except the last. `probabilities`: the probability
+    that each action ends in the next state of the path; `success`: the product of them. `steps`: mean number of actions to a target if the
+    agent plans again after each action; infinite if it may come to a state without a known path. `shortest`: number of actions on a
+    shortest path if every action reached its goal.
+
+    Two attributes explain why the path is longer than the shortest ones. `avoided`: states on shortest paths, but not on this path, with
+    the probability of passing each. `distrusted`: actions on shortest paths, as (state, goal state), with the probability of reaching the
+    goal. Both contain only probabilities below one half.
     """
 
     path: tuple[int, ...]
@@ -96,9 +107,10 @@ class Planner:
 
     Args:
         space: states and actions.
-        beliefs: outcomes of the actions, e.g. `model.debiased()`: the imagined outcomes would make reliable actions seem unreliable.
+        beliefs: outcomes of the actions and their probabilities, e.g. `model.debiased()`: with the imagined outcomes of a
+            `TransitionModel`, reliable actions would seem unreliable.
         targets: one or more states.
-        discount: factor per step, in [0, 1); the smaller it is, the more a short path is preferred over a reliable one.
+        discount: factor per step, in [0, 1); with a smaller one, a short path is preferred more over a reliable path.
 
     Raises:
         InvalidValue: no such state.
@@ -116,7 +128,10 @@ class Planner:
         """The action to take in each state, shape (S,); meaningless in a target and where the value is 0."""
 
     def plan(self, start: int) -> Plan:
-        """Return the plan from a state; raises InvalidValue if there is no such state, MobeeError if no path is known."""
+        """Return the plan from the state `start`.
+
+        Raises InvalidValue if there is no such state, MobeeError if no path to a target is known.
+        """
         path = [int(target_states(self.space, start)[0])]
         probabilities: list[float] = []
         while path[-1] not in self.targets:

@@ -23,9 +23,9 @@ _OF_A_RECORD = {"robot", "digest", "kind"}
 
 
 def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
-    """Make the space that has these `Space.settings`, on the robot of that name.
+    """Rebuild a space from its recorded settings (`Space.settings`), for a robot of the recorded name.
 
-    Raises InvalidValue if it is not the record of a space, or is of another robot; MobeeError if the space that is made differs from the
+    Raises InvalidValue if `settings` are not those of a space, or are of another robot; MobeeError if the rebuilt space differs from the
     recorded one, because the robot's limits or this program have changed.
     """
     kinds: dict[str, type[Space]] = {"lattice": Lattice, "voronoi": Voronoi, "space": Space, "object": ObjectSpace}
@@ -62,29 +62,32 @@ def _object_space(settings: Mapping[str, Any], robot: Robot) -> Space:
 
 
 def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:
-    """Return a model without observations, with the settings of a `CuriousLearner`."""
+    """Return a transition model without observations for a space, with the settings of a `CuriousLearner`."""
     return TransitionModel(space, **{key: settings[key] for key in ("initial", "divergence", "forgetting", "detector") if key in settings})
 
 
 @dataclass(frozen=True, slots=True)
 class Learned:
-    """The space and model of an agent, rebuilt from its transitions."""
+    """The space and the transition model of an agent, rebuilt from its transitions.
+
+    `part`: name of the agent, which is that of its part. `transitions`: their number. `state`: the state in which the last one ended.
+    """
 
     part: str
     space: Space
     model: TransitionModel
     transitions: int
     state: int
-    """Its last state."""
+    """The state in which the last transition ended."""
 
 
 def load_learned(file: str | Path, part: str | None = None, robot: Robot | None = None) -> Learned:
-    """Rebuild the space and model of an agent from its transitions on disk.
+    """Rebuild the space and the transition model of an agent from its transitions on disk.
 
     Args:
-        file: of a TransitionStore.
-        part: of the agent; may be None if the file holds one agent.
-        robot: of the space; may be None if it is a shipped robot.
+        file: a file of `mobee.store.TransitionStore`, as a run writes it.
+        part: the agent's part; None is valid if the file contains one agent.
+        robot: the robot of the space; None is valid if it is a shipped robot.
 
     Raises:
         MobeeError, UnknownName: no such file or agent, no transitions, or a robot that is not the recorded one.

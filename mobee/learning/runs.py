@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long the outcomes of each action have been as they are now, and the outcomes to forget: a posterior over run lengths.
+"""Change detection for the outcomes of each action: a posterior over the time since the outcomes changed, and the outcomes to forget.
 
-Bayesian online change point detection (Adams and MacKay 2007) for outcomes that are counted.  The hazard, the probability of a change
-before a try, is not a setting: it is one of `HAZARDS`, equally likely at first, and the outcomes of all actions inform about it.
+Bayesian online change point detection (Adams and MacKay 2007) for outcomes that are counted. A run is the time since the last change. The
+hazard, the probability of a change before a try, is not a setting: it is one of `HAZARDS` (0.1 to 0.0001), equally likely at first, and the
+outcomes of all actions inform about it.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ NEGLIGIBLE = 1e-3  # probability below which a run is dropped
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The runs that may be the present one of an action, the longest first.
+    """The possible present runs of an action, the longest first. A run is the time since its outcomes changed.
 
-    `weight`: (R, H) probability of each run given the hazard.  `counts`: (R, B) outcomes since the run began.  `suspected`: how certain
-    the change of a neighbour was that made this action suspect, 0 if it was tried since.
+    `weight`: (R, H) probability of each of R runs, given each of H hazards. `counts`: (R, B) number of each outcome since the run began.
+    `suspected`: the increase of the probability that a neighbour has changed, because of which this action became suspect; 0 if the action
+    was tried since.
     """
 
     weight: Array
@@ -33,10 +35,11 @@ class Runs:
 
 
 class OutcomeRuns:
-    """The runs of all actions of a space.
+    """The runs of all actions of a space: how often each outcome was observed since the outcomes of the action changed.
 
-    If the outcomes of an action have changed, those of its neighbours, the actions to the same goal and the one back from it, may have
-    changed too.  The share of neighbours for which this is true is learned; with that probability their runs end.
+    If the outcomes of an action have changed, the outcomes of its neighbours may have changed too. Neighbours are the actions to the same
+    goal, and the action from this goal back to the state. The share of neighbours for which this is true is learned. If the probability
+    that an action has changed increases by p, the runs of its neighbours end with the probability p times this share.
 
     Args:
         space: states and actions.
@@ -49,17 +52,21 @@ class OutcomeRuns:
         self._runs: dict[tuple[int, int], Runs] = {}
 
     def counts(self, state: int, action: int, bins: int) -> Array:
-        """Return the expected number of each of the action's outcomes in its present run, shape (bins,)."""
+        """Return the expected number of each of the action's outcomes since the last change, shape (bins,). `bins`: number of outcomes."""
         runs = self._of(state, action, bins)
         return self._expected(runs, self._hazard)
 
     def following(self, state: int, action: int, chosen: int, bins: int) -> Array:
-        """Return what `counts` will be after an outcome in the bin `chosen`; changes nothing."""
+        """Return what `counts` would return after one more outcome, of index `chosen`; nothing is changed."""
         runs, evidence = self._after(self._of(state, action, bins), chosen)
         return self._expected(runs, self._informed(evidence))
 
     def observe(self, state: int, action: int, chosen: int, bins: int) -> list[tuple[int, int]]:
-        """Add an outcome, in the bin `chosen` of `bins`; returns the neighbours that are suspect now, whose counts have changed too."""
+        """Count one outcome of an action, of index `chosen` among `bins` outcomes.
+
+        Return the neighbours, as (state, action), that are suspect now because this action seems to have changed; their counts have changed
+        too.
+        """
         before = self._of(state, action, bins)
         after, evidence = self._after(before, chosen)
         was_changed = self._changed(before)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state-action space of one part: states are the Voronoi cells of samples, actions go to samples of other states (thesis 6.2, 6.3)."""
+"""The state-action space of one part: states are the Voronoi cells of samples, and actions aim at samples (thesis 6.2, 6.3)."""
 
 from __future__ import annotations
 
@@ -23,17 +23,19 @@ NEIGHBOURS = 16  # of each state, as in the thesis' arms
 
 
 class Space:
-    """States and actions of one part, given by their samples and goals; `Lattice` and `Voronoi` make them.
+    """States and actions of one part, given by their samples and goals; `Lattice` and `Voronoi` compute samples and goals.
 
-    A state is the set of poses that are nearer to its sample than to any other, in fractions of the joint ranges; an
-    action is the index of the state it aims at among the state's goals.
+    A state is the set of poses that are nearer to its sample than to any other sample, in fractions of the joint ranges (a Voronoi cell).
+    Each action of a state aims at the sample of another state, its goal; the number of the action is its index among the goals of the
+    state. In shapes, S is the number of states, A the largest number of actions of a state, d the number of joints, and n_part the number
+    of motors of the part.
 
     Args:
         robot: the robot.
         joints: motor names, all of one part.
         samples: (S, d) rad, a pose of the joints for each state.
-        goals: (S, A) the state that each action aims at; rows of states with fewer actions end in -1.
-        rest: fraction of its range at which each other motor of the part stays; or one for each motor of the part.
+        goals: (S, A) the state at which each action aims; rows of states with fewer actions end in -1.
+        rest: fraction of its range at which each other motor of the part stays; or a list with one fraction for each motor of the part.
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -55,7 +57,7 @@ class Space:
         """Indices of the joints among the motors of the part, shape (d,)."""
         self._columns: list[int] = self.columns.tolist()
         self.samples: Array = _checked_samples(samples, len(joints))
-        """The centre of each state, shape (S, d), in [rad]."""
+        """The sample of each state, shape (S, d), in [rad]."""
         self.goals: Ints = _checked_goals(goals, len(self.samples))
         """Goal state of every action, shape (S, A), -1 where a state has no such action."""
         self._counts: list[int] = (self.goals != NO_ACTION).sum(axis=1).tolist()
@@ -75,26 +77,29 @@ class Space:
 
     @property
     def state_actions(self) -> int:
-        """Number of pairs of a state and an action."""
+        """The number of state-actions: the sum of the numbers of actions of all states."""
         return sum(self._counts)
 
     def actions(self, state: int) -> Ints:
-        """Return the goal states in ascending order: action a of the state aims at the a-th of them."""
+        """Return the goal states of the actions of a state, shape (actions,): action a aims at the a-th of them.
+
+        They are in ascending order, unless the table `goals` was given in another order. Raises InvalidValue if there is no such state.
+        """
         row: Ints = self.goals[self._checked_state(state), : self._counts[state]]
         return row
 
     def goal(self, state: int, action: int) -> int:
-        """Return the goal state of an action: the action sets the attractor to its sample."""
+        """Return the goal state of an action: the state at whose sample it aims. Raises InvalidValue if there is no such action."""
         if not 0 <= action < self._counts[self._checked_state(state)]:
             raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {self._counts[state] - 1}.")
         return self.goals.item(state, action)
 
     def state_of(self, q: ArrayLike) -> int:
-        """Return the state whose sample is nearest to a pose of the part, in fractions of the joint ranges.
+        """Return the state whose sample is nearest to a pose of the part, with distances in fractions of the joint ranges.
 
-        `q`: rad, shape (n_part,): all motors of the part, as a plant measures them.  Where the space has fewer joints than the part
-        has motors, the joints alone are accepted too, shape (d,), in the order of `joints`.
-        On a border between states a lattice returns the lower one.  Raises InvalidValue for another shape or values that are not finite.
+        `q`: rad, shape (n_part,): all motors of the part, as a plant measures them. If the space has fewer joints than the part has motors,
+        the joints alone are valid too, shape (d,), in the order of `joints`. On a border between states a lattice returns the lower one.
+        Raises InvalidValue for another shape or values that are not finite.
         """
         given = real_array(f"q of {self.part}", q)
         if given.shape == self._targets.shape[1:]:
@@ -103,7 +108,10 @@ class Space:
         return self.state_of_joints(given)
 
     def state_of_joints(self, q: ArrayLike) -> int:
-        """Return the state of a pose of the space's joints alone, shape (d,) rad, in the order of `joints`; otherwise as `state_of`."""
+        """Return the state whose sample is nearest to a pose of the space's joints alone, shape (d,) rad, in the order of `joints`.
+
+        Distances are in fractions of the joint ranges. Raises InvalidValue for another shape or values that are not finite.
+        """
         given = real_array(f"q of {self.part}", q)
         if given.shape != self.columns.shape:
             raise InvalidValue(
@@ -113,21 +121,30 @@ class Space:
         return self._state_of(given.tolist())
 
     def state_after(self, outcome: Outcome, before: int | None = None) -> int:
-        """Return the state in which an action ended; `before`: the state in which it began, None if that is not known."""
+        """Return the state in which an action ended, that of `outcome.q`.
+
+        `before`: the state in which the action began; this class does not use it, but `ObjectSpace` does.
+        """
         return self.state_of(outcome.q)
 
     def target(self, state: int) -> Array:
-        """Return the state's sample as a pose of the whole part, shape (n_part,), in [rad]; other motors stay at `rest`."""
+        """Return the sample of a state as a pose of the whole part, shape (n_part,), in [rad].
+
+        Motors that are not joints of the space are at `rest`. Raises InvalidValue if there is no such state.
+        """
         pose: Array = self._targets[self._checked_state(state)].copy()
         return pose
 
     def aim(self, state: int, action: int) -> Array:
-        """Return what a plant is given as the target of an action, shape (n_part,): the sample of its goal, in [rad]."""
+        """Return the target of an action for a plant, shape (n_part,), in [rad]: the sample of the action's goal."""
         return self.target(self.goal(state, action))
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the space, as JSON values, from which `mobee.learning.record.space_from` makes it."""
+        """The constructor's arguments and a digest of the space, as JSON values.
+
+        `mobee.learning.record.space_from` rebuilds the space from them.
+        """
         return self._made | {"kind": "space", "samples": self.samples.tolist(), "goals": self.goals.tolist()}
 
     @cached_property
@@ -157,7 +174,10 @@ class Space:
 
 
 def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
-    """Return the part of the joints and their indices among the robot's motors; raises InvalidValue, UnknownName."""
+    """Return the part of some joints, and their indices among the robot's motors.
+
+    Raises UnknownName, and InvalidValue unless all joints belong to one part, can move, and are given once.
+    """
     if isinstance(joints, str) or len(joints) == 0:
         raise InvalidValue(f"joints={joints!r}: give a list of motor names of one part, e.g. {list(robot.motors[:2])}.")
     if len(set(joints)) < len(joints):
@@ -173,7 +193,10 @@ def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
 
 
 def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
-    """Return the number of neighbours; None: 16, or all others if there are fewer.  `also`: end of the message about valid values."""
+    """Return the number of neighbours of each state: the given one; for None 16, or all other states if there are fewer.
+
+    `states`: number of states. `also`: text about further valid values, for the message. Raises InvalidValue.
+    """
     if neighbours is None:
         return min(NEIGHBOURS, states - 1)
     if isinstance(neighbours, bool) or not isinstance(neighbours, int) or not 1 <= neighbours < states:

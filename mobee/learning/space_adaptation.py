@@ -20,9 +20,10 @@ SHORTCUT_SPAN = 4  # transitions on a path between the two states of a shortcut,
 
 
 def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTEMPTS) -> tuple[Space, Ints]:
-    """Return the space without the states that were the goal `seen` times and never reached, and each state's new number, -1 if removed.
+    """Return the space without unreachable states, and the new number of each state, (S,), -1 for a removed state.
 
-    Raises InvalidValue if fewer than two states would remain.
+    A state is unreachable if it was the goal of at least `seen` of the transitions, and no transition started or ended in it. States that
+    have no actions then are removed too. Raises InvalidValue if fewer than two states would remain.
     """
     aimed, reached = np.zeros(len(space), dtype=int), np.zeros(len(space), dtype=bool)
     for made in transitions:
@@ -45,9 +46,10 @@ def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTE
 
 
 def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, span: int = SHORTCUT_SPAN) -> Space:
-    """Add actions between the pairs of states that most often followed each other on a path, and are no neighbours yet.
+    """Return a space with more actions: between pairs of states that often followed each other on a path, and are no neighbours yet.
 
-    `count`: number of pairs, joined in both directions; `span`: transitions between the two, at most.
+    `transitions`: from which the paths are taken. `count`: number of pairs, those that occurred most often; each is joined in both
+    directions. `span`: largest number of transitions between the two states of a pair.
     """
     known = set(edges_of(space.goals))
     path: list[int] = []
@@ -65,9 +67,9 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 
 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
-    """Return the transitions of one space that exist in another space over the same joints, numbered again from 1.
+    """Return those transitions of the space `old` that exist in the space `new`, over the same joints, with new numbers from 1.
 
-    Start and goal states are matched by their samples; the outcome is the new space's state of the recorded pose.
+    Start and goal states are matched by their samples. The outcome is the state of `new` that contains the recorded pose.
     """
     same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tabular plant: every action draws its outcome from given probabilities, for fast tests and known ground truth."""
+"""A plant given by a table: every action draws its outcome from given probabilities, for fast tests and known ground truth."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ NEGLIGIBLE = 1e-4  # a probability
 class TabularPlant(InstantPlant):
     """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
 
-    It is an OutcomeModel too: the ground truth of the model that an agent learns on it.  The draw of action number n depends on the
-    seed and n alone, so setting `state` and `actions` continues a run elsewhere.
+    It is also an `OutcomeModel`: the true model of what an agent learns on this plant. The random choice of action number n depends only on
+    the seed and n; to continue a run in another object, set `state` and `actions`.
 
     Args:
         space: the states and actions.
-        outcomes: states reached, shape (S, A, B).
-        probabilities: of these, shape (S, A, B); they sum to 1 over B where there is an action.  Actions of a state with the same goal
-            cannot be distinguished, so they must have the same outcomes; the actions of a DiscreteSpace can be distinguished.
-        seed: of the draws.
+        outcomes: (S, A, B) the states in which each action may end.
+        probabilities: (S, A, B) of the outcomes; the sum over B is 1 for each action that exists. Actions of a state with the same goal
+            cannot be distinguished, so they must have the same outcomes; the actions of a `DiscreteSpace` can be distinguished.
+        seed: seed of the random choices.
         start: the first state.
 
     Raises:
@@ -54,41 +54,44 @@ class TabularPlant(InstantPlant):
             {int(goal): a for a, goal in reversed(list(enumerate(space.actions(s))))} for s in range(len(space))
         ]
         self.state = start
-        """The state of the part."""
+        """The present state of the part."""
         self.actions = 0
         """Number of actions that have ended."""
         self._block, self._uniform = -1, np.empty(0)
 
     @property
     def outcomes(self) -> Ints:
-        """The states that each action may reach, shape (S, A, B); meaningless where the probability is 0."""
+        """The states in which each action may end, shape (S, A, B); meaningless where the probability is 0."""
         return read_only(self._outcomes)
 
     @property
     def probabilities(self) -> Array:
-        """Their probabilities, shape (S, A, B), all 0 where there is no action (read only)."""
+        """The probabilities of the outcomes of each action, shape (S, A, B); all 0 where there is no action (read only)."""
         return read_only(self._probabilities)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A hash of the table of transitions, as a plain JSON value."""
+        """A hash of the tables of outcomes and probabilities, as a JSON value."""
         reached = np.where(self._probabilities > 0.0, self._outcomes, NO_ACTION).astype("<i8")
         return {"table": hashlib.sha256(reached.tobytes() + np.round(self._probabilities, 9).tobytes()).hexdigest()[:16]}
 
     @property
     def q(self) -> Array:
-        """Positions of all motors, shape (n,), in [rad]: the part as measured, all others at home."""
+        """The positions of all motors, shape (n,), in [rad]: the part is at the sample of its state, all others are at home."""
         q = self.robot.home.copy()
         q[self.robot.part(self.space.part).slice] = self.space.target(self.state)
         return q
 
     def measure(self, part: str) -> Array:
-        """Return the sample of the part's state, shape (n_part,), in [rad]."""
+        """Return the pose of the part, the sample of its present state, shape (n_part,), in [rad]."""
         self._check_part(part)
         return self.space.target(self.state)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Draw the outcome of the action from the part's state towards `target` (n_part,) rad; each takes 1 s."""
+        """Draw the outcome of the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
+
+        Raises InvalidValue if the state has no such action.
+        """
         self._check_part(part)
         action = self._action_to(target)
         chosen = self._cumulative[self.state, action].searchsorted(self._draw(), side="right")
@@ -116,14 +119,14 @@ class TabularPlant(InstantPlant):
 
 
 def ideal(space: Space) -> tuple[Ints, Array]:
-    """Return outcomes and probabilities, shape (S, A, 1), of a world in which every action succeeds."""
+    """Return outcomes and probabilities, each (S, A, 1), of a world in which every action ends in its goal state."""
     exists = space.goals != NO_ACTION
     outcomes: Ints = np.where(exists, space.goals, 0)[:, :, None]
     return outcomes, exists[:, :, None].astype(np.float64)
 
 
 class TabularWorld(NamedTuple):
-    """A world as tables, each (S, A, B): the states that an action may reach, their probabilities, and the rewards there."""
+    """A world as tables, each (S, A, B): the states in which an action may end, their probabilities, and the reward of each outcome."""
 
     outcomes: Ints
     probabilities: Array
@@ -131,16 +134,16 @@ class TabularWorld(NamedTuple):
 
     @property
     def mean_reward(self) -> Array:
-        """The expected reward of each action, shape (S, A)."""
+        """The expected reward of each action, the sum of probability times reward, shape (S, A)."""
         mean: Array = (self.probabilities * self.rewards).sum(axis=-1)
         return mean
 
 
 def river_swim(length: int = 6) -> TabularWorld:
-    """Return the row of states with a current to the left (Strehl and Littman 2008).
+    """Return a world of `length` states in a row, with a current that pushes to the left (Strehl and Littman 2008).
 
-    Left (0) always succeeds, right (1) mostly does not.  Right in the last state has the reward 1, left in the first 0.005; a run starts
-    in the first state.  Random directions need a number of steps that grows with 2^length to reach the right end.
+    Action 0 (left) always succeeds; action 1 (right) mostly fails. Right in the last state has the reward 1, left in the first state 0.005.
+    A run starts in the first state. With random actions the number of steps to the last state grows as 2^length.
     """
     states = np.arange(length)
     left, right = np.maximum(states - 1, 0), np.minimum(states + 1, length - 1)
@@ -154,11 +157,11 @@ def river_swim(length: int = 6) -> TabularWorld:
 
 
 def deep_sea(depth: int = 10) -> TabularWorld:
-    """Return the triangular world in which each action moves down by one row, to the left (0) or to the right (1) (Osband 2019).
+    """Return a world of `depth` rows of states in a triangle; each action moves down by one row (Osband 2019).
 
-    State r (r + 1) / 2 + c is in row r and column c <= r.  All outcomes are certain; from the last row every action leads to the top.
-    Each move to the right costs 0.01 / depth.  The reward 1 is given for a move to the right in the last column of the last row; only
-    one of 2^depth sequences of actions leads to it.
+    State r (r + 1) / 2 + c is in row r and column c <= r. Action 0 moves to the left, action 1 to the right; all outcomes are certain. From
+    the last row every action leads to the top. Each move to the right costs 0.01 / depth. A move to the right in the last column of the
+    last row has the reward 1; only one of 2^depth sequences of actions leads to it.
     """
     goals = []
     for row in range(depth):
@@ -178,18 +181,18 @@ def half_space(
     memory: float = 0.15,
     noise: tuple[float, float] = (0.01, 0.06),
 ) -> tuple[Ints, Array]:
-    """Return outcomes and probabilities, shape (S, A, B), of a world in which a plane cuts off the extreme states, as cables do.
+    """Return outcomes and probabilities, each (S, A, B), of a world in which a plane cuts off extreme states, as the robot's cables do.
 
-    An action settles at the projection of its goal onto the free side, shifted towards its start, plus normal
-    noise.  With the arm's four joints in the published order the plane cuts off the states with low pitch, high
-    roll and high yaw: 24, 51 and 78 of rank 3.
+    An action ends at the projection of its goal onto the free side of the plane, shifted towards its start, plus normal noise. With the
+    default plane and the arm's four joints in the published order, it cuts off the states with low pitch, high roll and high yaw: 24, 51
+    and 78 of the 81 states.
 
     Args:
         space: a lattice.
-        normal: of the plane, towards the forbidden side, one component per joint, in fractions of the ranges.
-        depth: where the plane lies: 0 at the extreme states' samples, 1 at the next ones'.
-        memory: share of the distance from the goal to the start by which the outcome is shifted.
-        noise: standard deviation per joint, in fractions of the range, of actions with a free goal and of the others.
+        normal: normal of the plane, towards the forbidden side: one component for each joint, in fractions of its range.
+        depth: position of the plane: 0: at the samples of the states farthest along the normal; 1: at those of the next states.
+        memory: fraction of the distance from the goal to the start by which the outcome is shifted.
+        noise: standard deviation for each joint, in fractions of its range: of actions with a free goal, and of all others.
     """
     if len(normal) != len(space.joints) or not any(normal):
         raise InvalidValue(f"normal={normal!r}: give one component for each of {', '.join(space.joints)}, not all 0.")

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 
 def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
-    """Return KL(P || T) in nats of two distributions over the same bins, given as counts or probabilities (thesis eq. 6.5).
+    """Return the Kullback-Leibler divergence KL(P || T) in nats of two distributions over the same outcomes (thesis eq. 6.5).
 
-    `p`, `t`: shape (bins,), every component above zero (else it is undefined, thesis 6.4.2); they are normalised here.
+    `p`, `t`: counts or probabilities, shape (bins,), all above 0 (otherwise it is undefined, thesis 6.4.2); they are normalised here.
+    Raises InvalidValue.
     """
     new, old = np.asarray(p, dtype=np.float64), np.asarray(t, dtype=np.float64)
     if new.ndim != 1 or new.shape != old.shape or not len(new):
@@ -39,9 +40,11 @@ def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
 
 
 def information_gain(count: float, total: float) -> float:
-    """Return KL(P || T) in nats for an observation that adds 1 to one bin: `count`, above 0, of that bin and `total` of all, both before.
+    """Return the information gain in nats of an observation that adds 1 to the count of one outcome.
 
-    It is the closed form of eq. 6.5 for this case: all other probabilities change by the factor total / (total + 1).
+    `count`: the count of this outcome, above 0, and `total`: the sum over all outcomes, both before the observation. The gain is the
+    Kullback-Leibler divergence KL(P || T) of the distribution P after the observation from T before it. This is a closed form of eq. 6.5,
+    because all other probabilities change by the factor total / (total + 1).
     """
     gain = (count + 1.0) / (total + 1.0) * log1p(1.0 / count) - log1p(1.0 / total)
     return max(0.0, gain)  # rounding
@@ -51,28 +54,28 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def widened(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """Return a copy with one more bin, zero."""
+    """Return a copy of a table with one more outcome (last axis), filled with 0."""
     return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, 1)])
 
 
 def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """Return a view that cannot be written to."""
+    """Return a view of an array through which the array cannot be changed."""
     view = array.view()
     view.setflags(write=False)
     return view
 
 
 class DebiasedCounts(Tabled):
-    """Probabilities from real counts over a weak prior: an OutcomeModel that its transition model keeps up to date.
+    """Outcome probabilities from real counts and a weak prior; its `TransitionModel` keeps them up to date.
 
-    The counts that Algorithms 6 and 8 imagine keep the reward finite, but after n successes they give an action that never failed a
-    probability of 2 / (4 + n) to fail.
+    The imagined counts of Algorithms 6 and 8 keep the reward finite, but bias plans: after n successes, an action that never failed still
+    has a probability of 2 / (4 + n) to fail.
 
     Args:
-        model: the outcome model with the same bins.
-        real: how often each outcome was really observed, shape (S, A, B).
-        weight: sums of `real` over the bins, shape (S, A).
-        goal, stay: prior counts of the first two bins, for reaching the goal and for staying; the others have none.
+        model: the outcome model, whose outcomes are used.
+        real: (S, A, B) how often each outcome was really observed.
+        weight: (S, A) the sums of `real` over the outcomes.
+        goal, stay: imagined counts of an action's success (it ends in its goal) and of its failure (it stays); other outcomes have none.
     """
 
     def __init__(self, model: OutcomeModel, real: Array, weight: Array, goal: float, stay: float) -> None:
@@ -89,21 +92,21 @@ class DebiasedCounts(Tabled):
 
     @property
     def outcomes(self) -> Ints:
-        """The state of each bin, shape (S, A, B); meaningless where the probability is 0."""
+        """The state of each outcome of each action, shape (S, A, B); meaningless where the probability is 0."""
         return self._model.outcomes
 
     @property
     def probabilities(self) -> Array:
-        """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
+        """The probability of each outcome, shape (S, A, B): the sum over B is 1, or 0 where there is no action (read only)."""
         return read_only(self._probabilities)
 
     def update(self, counts: OutcomeCounts, state: int, action: int) -> None:
-        """Update the probabilities of a state-action from its real counts."""
+        """Update the probabilities of a state-action from its real counts in `counts`."""
         believed = self._believed or self._believe()
         _core().believe(counts.at, believed.at, state, action)
 
     def widen(self) -> None:
-        """Add one more bin."""
+        """Add one more outcome, of probability 0, to the tables of all state-actions."""
         self._prior, self._probabilities = np.append(self._prior, 0.0), widened(self._probabilities)
         self._believed = self._table = None
 
@@ -131,25 +134,34 @@ DETECTORS = "none", "run_length"
 NEW_BIN = 1.0  # imagined count of the bins beyond these two: Algorithm 6
 
 Divergence = Callable[[Array, Array], float]
-"""A function of the distributions after and before an observation, each (bins,), above 0, of sum 1, that returns its reward in nats."""
+"""A function of the distributions of outcomes after and before an observation that returns the reward of the observation in nats.
+
+Both distributions: shape (bins,), all above 0, of sum 1.
+"""
 
 DIVERGENCES: dict[str, Divergence] = {"kail": kl_divergence, "kl": kl_divergence}
-"""KL divergence over the bins of the state-action, and over all states; the core computes both in closed form."""
+"""By name, the divergences of the library: "kail" is over the observed outcomes of a state-action, "kl" over all states.
+
+The core computes both in closed form.
+"""
 
 
 class TransitionModel(Tabled):
-    """Outcome counts of every state-action in bins of variable number, and the last information gain as reward (thesis 6.4.3).
+    """Counts of the outcomes of every state-action, and as reward the information gain of its last observation (thesis 6.4.3).
 
-    An observation takes a few microseconds for any size of the space; memory grows with the number of different outcomes.
+    Each distinct outcome state of a state-action has a bin with its count; a new outcome adds a bin. An observation takes a few
+    microseconds for any size of the space; memory grows with the number of different outcomes.
 
     Args:
         space: the states and actions.
-        initial: "50-50" (each action is imagined to fail once and to succeed once) or "60-40" (to fail once and to succeed twice).
-        divergence: the reward of an observation: "kail" (Algorithm 6: KL divergence over the bins of the state-action), "kl" (thesis
-            6.4.2: over all states, each imagined once), a function of the distributions over the bins after and before the
-            observation, or `module:name` of one, see `Divergence`.  The probabilities are the same with all.
-        forgetting: in (0, 1]; the real counts of a state-action are multiplied by it before each of its observations.
-        detector: of changed outcomes, "none" or "run_length", by which the real counts are those since the last change, see `OutcomeRuns`.
+        initial: the outcomes that each action is imagined to have had before its first try: "50-50": one failure (it stays) and one success
+            (it reaches its goal); "60-40": one failure and two successes.
+        divergence: the reward of an observation: "kail" (Algorithm 6: KL divergence over the bins of the state-action); "kl" (thesis 6.4.2:
+            over all states, each imagined once); a function, see `Divergence`; or the text `module:name` of such a function. It does not
+            change the probabilities.
+        forgetting: in (0, 1]; the real counts of a state-action are multiplied by this before each of its observations.
+        detector: "run_length": detect changes of the outcomes; the real counts are then the expected numbers since the last change, see
+            `OutcomeRuns`. "none": all observations count.
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -202,49 +214,69 @@ class TransitionModel(Tabled):
 
     @property
     def reward(self) -> Array:
-        """The last information gain of each state-action, shape (S, A), in nats; -inf where there is no action (read only)."""
+        """The information gain of each state-action's last observation, shape (S, A), in nats; -inf where there is no action (read only).
+
+        Before the first try it is the gain of an imagined success. With a detector it increases if a neighbour's outcomes seem to have
+        changed.
+        """
         return read_only(self._reward)
 
     @property
     def tries(self) -> Ints:
-        """Number of real observations of each state-action, shape (S, A) (read only)."""
+        """The number of real observations of each state-action, shape (S, A) (read only)."""
         return read_only(self._tries)
 
     @property
     def outcomes(self) -> Ints:
-        """The state of each bin in order of first observation, shape (S, A, B); meaningless where the probability is 0."""
+        """The outcome state of each bin, in order of first observation, shape (S, A, B); meaningless where the probability is 0.
+
+        A bin is one distinct outcome of a state-action; B is the largest number of bins.
+        """
         return read_only(self._outcomes)
 
     @property
     def probabilities(self) -> Array:
-        """The probability of each bin, shape (S, A, B): sums to 1 over B, or 0 where there is no action (read only)."""
+        """The probability of each bin, shape (S, A, B): the sum over B is 1, or 0 where there is no action (read only).
+
+        A bin is one distinct outcome of a state-action; B is the largest number of bins.
+        """
         return read_only(self._probabilities)
 
     @property
     def counts(self) -> Array:
-        """T(s, a) of the thesis, imagined observations included, shape (S, A, B), 0 where there is no bin (read only)."""
+        """The count of each bin, T(s, a) of the thesis, shape (S, A, B); 0 where there is no bin (read only).
+
+        A bin is one distinct outcome of a state-action; B is the largest number of bins. Imagined observations are included.
+        """
         return read_only(self._counts)
 
     @property
     def totals(self) -> Array:
-        """The sum N of the counts in the closed form of the reward, shape (S, A); 0 where there is no action (read only)."""
+        """The sum of counts N in the closed form of the reward (eq. 6.5), shape (S, A); 0 where there is no action (read only)."""
         return read_only(self._totals)
 
     @property
     def imagined(self) -> Array:
-        """Imagined part of each bin's count, shape (B,): the first two bins are staying and the goal (read only)."""
+        """The imagined part of each bin's count, shape (B,): of staying, of reaching the goal, and of further outcomes (read only).
+
+        A bin is one distinct outcome of a state-action; the imagined part is the same for all state-actions.
+        """
         return read_only(self._imagined)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
-        """Return the states observed and their counts T(s, a), imagined ones included, in order of first observation."""
+        """Return the outcome states of a state-action and their counts T(s, a), both (bins,), in order of first observation.
+
+        Imagined observations are included.
+        """
         self.space.goal(state, action)
         used = self._bins[state, action]
         return self._outcomes[state, action, :used].copy(), self._counts[state, action, :used].copy()
 
     def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
-        """Return beliefs for plans from the real counts and a weak prior; they follow later observations of this model.
+        """Return outcome probabilities for plans: from the real counts and a weak prior. Later observations of this model update them.
 
-        `goal`, `stay`: prior counts instead of Algorithm 8's imagined ones, the first above 0.  The same numbers return the same object.
+        `goal`, `stay`: imagined counts of success (above 0) and of failure (at least 0), in place of the imagined counts of Algorithm 8.
+        For the same numbers the same object is returned. Raises InvalidValue.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")
@@ -254,7 +286,7 @@ class TransitionModel(Tabled):
         return self._debiased[goal, stay]
 
     def gain(self, state: int, action: int, outcome: int) -> float:
-        """Return the reward that observing this outcome would give now, in nats; changes nothing."""
+        """Return the reward in nats that an observation of this outcome state would give now; nothing is changed."""
         self._check(state, action, outcome)
         if self._runs is not None:
             return self._gain_since_change(int(state), int(action), int(outcome))
@@ -265,7 +297,7 @@ class TransitionModel(Tabled):
         return found
 
     def observe(self, state: int, action: int, outcome: int) -> float:
-        """Count one real transition and return its reward in nats (Algorithm 6).
+        """Count one real transition from `state` by `action` to the state `outcome`; return its reward in nats (Algorithm 6).
 
         Raises InvalidValue for a state or action that the space does not have.
         """

@@ -24,28 +24,31 @@ BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to exc
 
 
 class OutcomeModel(Protocol):
-    """The interface of a transition model for planning: the outcomes of actions and their probabilities."""
+    """The interface of a transition model for planning: the outcomes of actions and their probabilities.
+
+    S: states, A: largest number of actions of a state, B: largest number of outcomes of an action.
+    """
 
     @property
     def outcomes(self) -> Ints:
-        """States reached, shape (S, A, B)."""
+        """The states in which each action may end, shape (S, A, B); meaningless where the probability is 0."""
 
     @property
     def probabilities(self) -> Array:
-        """Probabilities of the outcomes, shape (S, A, B); all 0 for an action that a state does not have."""
+        """The probabilities of the outcomes of each action, shape (S, A, B); all 0 for an action that a state does not have."""
 
 
 class Tabled(ABC):
-    """An `OutcomeModel` that caches its tables in the form that the core reads, and builds them again after its arrays are replaced.
+    """Base of an `OutcomeModel` that caches a table of its outcomes and probabilities in the form that the core reads.
 
-    The cache belongs to one object: a copy makes its own.
+    A subclass sets `_table` to None when it replaces its arrays; the table is then built again. A copy of an object builds its own table.
     """
 
     _table: TransitionTable | None = None
 
     @property
     def table(self) -> TransitionTable:
-        """Outcomes and probabilities as the core reads them."""
+        """Outcomes and probabilities as a table for the core."""
         if self._table is None:
             self._table = self._tabled()
         return self._table
@@ -64,20 +67,20 @@ def value_iteration(
     relative: bool = False,
     method: Literal["jacobi", "modified"] = "jacobi",
 ) -> tuple[Array, Array]:
-    """Compute the values V (S,) and Q (S, A) of the greedy policy (thesis Algorithm 7).
+    """Compute the values of states V (S,) and of actions Q (S, A) under the best policy, by value iteration (thesis Algorithm 7).
 
-    The sweeps stop when no value changes by the tolerance or more.  The thesis prints the change without its absolute
-    value, which would stop at once when values must fall (negative rewards, or a warm start after a reward decreased).
+    The sweeps stop when no value changes by the tolerance or more. The thesis prints the change without its absolute value; the sweeps
+    would then stop at once when values must decrease (negative rewards, or a start from earlier values after a reward has decreased).
 
     Args:
         model: the outcomes of the actions; a state without actions keeps its starting value.
-        reward: (S, A); -inf excludes an action; entries without an action are ignored.
-        discount: in [0, 1).
+        reward: (S, A) reward of each action; -inf excludes an action; entries without an action are ignored.
+        discount: factor of future rewards, in [0, 1).
         tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the limit.
-        start: (S,) values to start from, zero if None.
-        relative: the tolerance is in units of the largest |reward| of an action (of 1, if all are 0), else in units of the reward.
+        start: (S,) values with which the first sweep begins; None: 0.
+        relative: True: the tolerance is in units of the largest |reward| of an action (of 1 if all are 0); False: in units of the reward.
         method: "jacobi": Algorithm 7: every sweep updates all actions, until no action value changes; "modified": modified policy
-            iteration, faster: each such sweep is followed by sweeps over the best action of each state alone, until no state value
+            iteration, faster: after each such sweep, further sweeps update only the best action of each state, until no state value
             changes.
 
     Returns:
@@ -85,6 +88,7 @@ def value_iteration(
 
     Raises:
         InvalidValue: an argument is not valid; the message gives the valid values.
+        UnknownName: there is no such method.
     """
     core, address = _core()
     if isinstance(model, Tabled):
@@ -115,9 +119,9 @@ def value_iteration(
 
 
 def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, Ints, Array]:
-    """Return probabilities (S, A, B), outcomes (S, A, B) and reward (S, A) in the types of the solvers, copied only if necessary.
+    """Return probabilities (S, A, B), outcomes (S, A, B) and reward (S, A) in the array types of the solvers, copied only if necessary.
 
-    Raises InvalidValue if the shapes do not fit or the discount is out of range.
+    Raises InvalidValue if the shapes do not fit or the discount is not in [0, 1).
     """
     probabilities = np.asarray(model.probabilities, dtype=np.float64, order="C")
     outcomes = np.asarray(model.outcomes, dtype=np.int64, order="C")
@@ -147,10 +151,10 @@ _MARGIN = 1e-13  # of the largest value, by which a better action must be better
 
 
 def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) -> tuple[Array, Array]:
-    """Compute the values V (S,) and Q (S, A) of the optimal policy; each policy is evaluated by a sparse linear solve (Howard 1960).
+    """Compute the values of states V (S,) and of actions Q (S, A) under the optimal policy, by policy iteration (Howard 1960).
 
-    Exact but for rounding.  Arguments and results as of `value_iteration`; a state without actions has value 0.
-    Raises InvalidValue.
+    Each policy is evaluated by a sparse linear solve, so the result is exact except for rounding errors. `model`, `reward` (S, A) and
+    `discount` are as in `value_iteration`. Q is -inf where there is no action; a state without actions has value 0. Raises InvalidValue.
     """
     probabilities, outcomes, reward = tables(model, reward, discount)
     exists = probabilities.any(axis=-1) & (reward != -np.inf)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""State spaces of random samples: states are their Voronoi cells (thesis 6.2)."""
+"""State spaces of random samples: the states are the Voronoi cells of the samples (thesis 6.2)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from mobee.robot.robot import Robot
 
 
 class Voronoi(Space):
-    """States are the Voronoi cells of samples drawn at random, or given; actions go to the nearest samples.
+    """A space whose samples are drawn at random, or given; actions aim at the nearest samples.
 
-    Distances are in fractions of the joint ranges.  Making thousands of states takes seconds; memory grows in proportion to their number.
+    A state is the Voronoi cell of its sample. Distances are in fractions of the joint ranges. To make thousands of states takes seconds;
+    memory grows in proportion to their number.
 
     Args:
         robot: the robot; samples are drawn within its motor limits.
         joints: motor names, all of one part.
         samples: number of samples to draw uniformly in the joint ranges, or the samples themselves, shape (S, d), in [rad].
-        seed: of the draw; ignored if the samples are given.
-        neighbours: number of nearest samples that each state has actions to.  None: 16, or all others if there are fewer.
-        tie_seed: seed of the draw among equally near samples at the last rank (given samples may have ties).
+        seed: seed of the random samples; ignored if the samples are given.
+        neighbours: number of nearest samples to which each state has actions. None: 16, or all others if there are fewer.
+        tie_seed: if several samples are equally near, but not all of them become neighbours, a random choice with this seed decides.
         rest: fraction of its range at which each other motor of the part stays.
 
     Raises:
@@ -55,7 +56,10 @@ class Voronoi(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the resulting space, for the record of a run (plain JSON values)."""
+        """The constructor's arguments and a digest of the space, as JSON values.
+
+        `mobee.learning.record.space_from` rebuilds the space from them.
+        """
         samples = len(self) if self.seed is not None else self.samples.tolist()
         made = {"samples": samples, "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
         return self._made | made | {"kind": "voronoi"}

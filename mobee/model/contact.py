@@ -26,8 +26,9 @@ Column = NDArray[np.int64]
 class Contact:
     """An overlap of two shapes of the robot, or of a shape of the robot (`first`) and a world object (`second`).
 
-    Moving `first` by depth * normal separates them.  Root frame.  A link of -1 stands for a free world object; an attached
-    one has the link that carries it.
+    `first`, `second`: names. `kind`: whether two "solid" volumes overlap, or a "field" is involved. Moving `first` by depth * normal
+    separates the two. `depth`: m. `normal`: (3,) unit vector, root frame. `point`: (3,) m, root frame, midway between the two deepest
+    points. `first_link`, `second_link`: indices of their links; -1: a free world object. An attached object has the link that carries it.
     """
 
     first: str
@@ -41,16 +42,20 @@ class Contact:
 
 
 class ContactTable:
-    """c contacts of a batch of poses, one row each, sorted by pose, kind, first and second; fields as in Contact.
+    """A table of the contacts in a batch of poses, with one row for each of the c contacts, sorted by pose, kind, first and second.
 
-    Names are given by index: the robot's shapes, then the world's objects.
+    The columns are those of `mobee.model.contact.Contact`. Shapes and world objects are numbered: first the robot's shapes, then the
+    world's objects; `name` returns the name of a number.
     """
 
     # A table is made for every pose and is often never read: its rows become arrays when they are first read.
     __slots__ = ("_objects", "_rows", "_shapes")
 
     def __init__(self, shapes: tuple[str, ...], objects: tuple[str, ...], rows: tuple[Column, Array] | bytearray) -> None:
-        """`rows`: the arrays `numbers` and `reals`, or both in one block as the core writes them, all numbers first."""
+        """Make a table from the names of the robot's shapes and of the world's objects, and from the rows.
+
+        `rows`: the arrays `numbers` (c, 6) and `reals` (c, 7), or both in one block of bytes as the core writes them, all numbers first.
+        """
         self._shapes = shapes
         self._objects = objects
         self._rows = rows
@@ -59,7 +64,7 @@ class ContactTable:
         return len(self.reals)
 
     def name(self, index: int) -> str:
-        """Return the name of the shape or object with an index of `first` or `second`."""
+        """Return the name of a shape or world object; `index`: its number, as in the columns `first` and `second`."""
         count = len(self._shapes)
         return self._shapes[index] if index < count else self._objects[index - count]
 
@@ -75,61 +80,61 @@ class ContactTable:
 
     @property
     def numbers(self) -> Column:
-        """(c, 6): pose, kind, first, second, first link, second link."""
+        """The integer columns of all contacts, (c, 6): pose, kind, first, second, first link, second link."""
         return self._arrays()[0]
 
     @property
     def reals(self) -> Array:
-        """(c, 7): depth [m], normal (3), point (3) [m]."""
+        """The real columns of all contacts, (c, 7): depth [m], normal (3 columns), point (3 columns, m, root frame)."""
         return self._arrays()[1]
 
     @property
     def pose(self) -> Column:
-        """The pose of each contact, (c,): index in the flattened batch."""
+        """The pose of each contact, (c,): index of the pose in the batch, flattened to one dimension."""
         return self.numbers[:, 0]
 
     @property
     def kind(self) -> Column:
-        """The kind of each contact, (c,): index in KINDS."""
+        """The kind of each contact, (c,): 0 for solids, 1 if a field is involved."""
         return self.numbers[:, 1]
 
     @property
     def first(self) -> Column:
-        """The first volume of each contact, (c,): an index, see `name`."""
+        """The first volume of each contact, (c,): the number of a shape of the robot."""
         return self.numbers[:, 2]
 
     @property
     def second(self) -> Column:
-        """The second volume of each contact, (c,): an index, see `name`."""
+        """The second volume of each contact, (c,): the number of a shape, or the number of shapes plus that of a world object."""
         return self.numbers[:, 3]
 
     @property
     def first_link(self) -> Column:
-        """The link of each first volume, (c,)."""
+        """The index of the link of each first volume, (c,)."""
         return self.numbers[:, 4]
 
     @property
     def second_link(self) -> Column:
-        """The link of each second volume, -1 for a free world object, (c,)."""
+        """The index of the link of each second volume, (c,); -1 for a free world object."""
         return self.numbers[:, 5]
 
     @property
     def depth(self) -> Array:
-        """Depths, (c,) m."""
+        """The depth of each contact, (c,) m."""
         return self.reals[:, 0]
 
     @property
     def normal(self) -> Array:
-        """Normals, (c, 3) unit vectors."""
+        """The normal of each contact, (c, 3), root frame: the unit vector in whose direction `first` must move to separate the two."""
         return self.reals[:, 1:4]
 
     @property
     def point(self) -> Array:
-        """Points, (c, 3) m."""
+        """The point of each contact, (c, 3) m, root frame: midway between the two deepest points."""
         return self.reals[:, 4:7]
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Return the rows as Contact objects."""
+        """Return the rows of the table as Contact objects, in the same order."""
         return tuple(
             Contact(self.name(a), self.name(b), KINDS[kind], depth, real[1:4], real[4:7], link_a, link_b)
             for (_, kind, a, b, link_a, link_b), depth, real in zip(
@@ -152,17 +157,26 @@ def _read(rows: bytearray) -> tuple[Column, Array]:
 
 
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
-    """Return for every part the names of the world objects in contact (fields included) with a link that it moves; for one pose."""
+    """Return for every part, by name, the sorted names of the world objects that touch a solid or field of a link that the part moves.
+
+    `pose`: one pose, not a batch.
+    """
     return {part: touched_by(pose, part) for part in pose.robot.parts}
 
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
-    """Return the sorted names of the world objects in contact (fields included) with a link that the part moves; for one pose."""
+    """Return the sorted names of the world objects that touch a solid or field of a link that the part moves.
+
+    `pose`: one pose, not a batch. `part`: name of the part.
+    """
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
-    """Return the sorted names of the world objects that touch a link of `moved`; `table` holds the contacts of one pose."""
+    """Return the sorted names of the free world objects that touch a solid or field of one of the links `moved` (indices).
+
+    `table`: the contacts of one pose.
+    """
     rows = table.numbers.tolist()
     found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}
     return tuple(sorted(map(table.name, found)))
@@ -170,7 +184,7 @@ def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def links_moved(robot: Robot) -> dict[str, frozenset[int]]:
-    """Return for every part the links that its motors move: the driven links and all links that these carry."""
+    """Return for every part, by name, the indices of the links that its motors move: the driven links and all links mounted on them."""
     matrix, _ = robot.coupling
     found: dict[str, frozenset[int]] = {}
     for name, part in robot.parts.items():

@@ -22,13 +22,16 @@ OBJECTS_PER_CELL = 8  # of the grid, on average
 
 @per_robot
 def robot_handle(robot: Robot) -> core.Handle:
-    """Return the handle of the robot in the core."""
+    """Return the handle of the robot in the compiled core, without carried objects; the robot's tables are sent to the core once."""
     return core.robot(*robot_tables(robot).for_core())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A robot among the free objects of one snapshot; immutable."""
+    """A robot in the world of one snapshot, as the compiled core has it; immutable.
+
+    `handle`: of the scene in the core. `nothing`: an empty contact table, for all poses without contacts.
+    """
 
     snapshot: Snapshot
     handle: core.Handle
@@ -47,14 +50,14 @@ class _Room(core.Room):
         self.cut = False
 
     def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:
-        """Set the arguments of the next evaluations of one pose."""
+        """Set the scene, the reaching hands and `cut` for the next evaluations of one pose, and return the scene."""
         self.ask(scene.handle, hand_numbers(reaching), cut)
         self.scene, self.reaching, self.cut = scene, reaching, cut
         return scene
 
 
 class Engine:
-    """Evaluates poses of one robot; evaluations in several threads do not wait for each other."""
+    """Evaluates poses of one robot in the compiled core; evaluations in several threads do not wait for each other."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -66,18 +69,21 @@ class Engine:
         self._rooms: list[_Room] = []  # buffers that no evaluation uses now
 
     def transforms(self, q: Array) -> Array:
-        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
+        """Return the transform of every link in the poses q (B, n) rad, (B, L, 4, 4): from its place at zero pose, in the root frame."""
         return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
+        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.
+
+        `link`: index of the link. `point`: (3,) m, position of the point in the root frame at zero pose.
+        """
         return core.jacobians(self._bare, q, link, point)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the sum of J^T (depth * normal) over those of fields, (B, n).
+        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
 
-        `reaching`: the hands whose contacts with targets are ignored; `cut`: a contact acts only on the motors of its own part, as in
-        the original program. The results are the same for any number of threads.
+        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
+        motors of its own part, as in the original program. The results are the same for any number of threads.
         """
         scene = self.scene_of(snapshot)
         try:
@@ -89,7 +95,10 @@ class Engine:
         return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
+        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+
+        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        """
         try:
             room = self._rooms.pop()  # atomic: other threads take buffers too
         except IndexError:
@@ -107,11 +116,17 @@ class Engine:
         return found
 
     def table(self, snapshot: Snapshot, numbers: core.Ints, reals: Array) -> ContactTable:
-        """Return the contact table of rows that the core has written."""
+        """Return a contact table of rows that the core has written.
+
+        `snapshot`: the world in which the contacts were computed. `numbers` (c, 6), `reals` (c, 7): the columns of `ContactTable`.
+        """
         return ContactTable(self._shapes, snapshot.names, (numbers, reals))
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
-        """Return the robot among the free objects of a snapshot; the same object for the same snapshot."""
+        """Return the scene of the robot in the world of a snapshot; repeated calls with the same snapshot return the same object.
+
+        Raises UnknownName for an object that is attached to a link which the robot does not have.
+        """
         known = self._scene
         if known is not None and known.snapshot is snapshot:
             return known

@@ -33,26 +33,30 @@ _COLLISION = fcl.CollisionRequest(enable_contact=True)
 
 
 class FclEngine:
-    """Evaluates poses of one robot; the results equal those of the compiled engine within fcl's tolerance."""
+    """Evaluates poses of one robot with python-fcl; the results equal the results of the compiled engine up to fcl's tolerance, 1e-6 m."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._pairs: tuple[Snapshot | None, Hands, tuple[Ints, Ints, Ints] | None] = None, NO_HANDS, None
 
     def transforms(self, q: Array) -> Array:
-        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
+        """Return the transform of every link in the poses q (B, n) rad, (B, L, 4, 4): from its place at zero pose, in the root frame."""
         return link_transforms(self.robot, q)
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
+        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.
+
+        `link`: index of the link. `point`: (3,) m, position of the point in the root frame at zero pose.
+        """
         transforms = link_transforms(self.robot, q)
         moved = transforms[:, link, :3, :3] @ point + transforms[:, link, :3, 3]
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n) [rad], and the projection of the contacts of fields to the motors, (B, n).
+        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
 
-        `reaching`, `cut`: see `mobee.model.engine.Engine.contacts`; `threads` is ignored.
+        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
+        motors of its own part, as in the original program. `threads` is ignored.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -65,7 +69,10 @@ class FclEngine:
         return _table(self.robot, snapshot, numbers, reals), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
+        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+
+        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
 
@@ -213,12 +220,12 @@ SOLID, FIELD = 0, 1
 
 
 def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
-    """Return first volume, second volume and kind (0 solid, 1 field) of every tested pair; volumes are shapes, then objects.
+    """Return the p tested pairs of volumes as three arrays (p,): first volume, second volume and kind (0 solid, 1 field).
 
-    Pairs of shapes are the robot's own list. A free object is tested against every shape but those of the base, and a target is not tested
-    against the hands that are `reaching`. An attached object is tested as a solid against the shapes and objects on all links that its own
-    link is tested against, and against free objects. Ghosts are not tested. Raises UnknownName for an object that is attached to a link
-    which the robot does not have.
+    Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of shapes are those of the robot's lists. A free object
+    is tested against every shape but those of the base; a target is not tested against the hands that are `reaching`. An attached object
+    is tested as a solid against free objects, and against the shapes and attached objects of all links against which its own link is
+    tested. Ghosts are not tested. Raises UnknownName for an object that is attached to a link which the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

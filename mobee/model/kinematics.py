@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy; rotations as quaternions.
+"""Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy; conversion of rotations and quaternions.
 
-Quaternions are in the order w, x, y, z; only this module knows it.
+Quaternions are in the order w, x, y, z.
 """
 
 from __future__ import annotations
@@ -16,7 +16,14 @@ from mobee.robot.robot import Joint, Robot, per_robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tables:
-    """Constants of a robot: a joint's motion is I + sin(a) S + (1 - cos(a)) C + a D, Rodrigues' formula about a line of the root frame."""
+    """The constants of a robot from which its forward kinematics is computed; n motors, J joints.
+
+    At the angle or length a, the motion of a joint is the matrix (4, 4) I + sin(a) S + (1 - cos(a)) C + a D: Rodrigues' formula for a
+    rotation about a line of the root frame. S is `sine`, C is `cosine`, D is `slide` (None: every joint is revolute).
+    `coupling` (n, J), `offset` (J,): joint positions = q @ coupling + offset. `axes` (J, 3), `points` (J, 3) m: of the joints, root
+    frame, zero pose. `revolute`: (J,) 1 or 0. `ancestry`: for each link, the joints between the base and the link. `rounds`: for each
+    round of pointer jumping, the links and the ancestors whose matrices are multiplied.
+    """
 
     coupling: Array  # (n, J), transposed: joint angles = q @ coupling + offset
     offset: Array  # (J,)
@@ -32,7 +39,7 @@ class Tables:
 
 @per_robot
 def tables(robot: Robot) -> Tables:
-    """Return the constants of a robot."""
+    """Return the constants of a robot from which its forward kinematics is computed; they are computed once for each robot."""
     count = len(robot.joints)
     sine, cosine, slide = (np.zeros((count, 4, 4)) for _ in range(3))
     for j, joint in enumerate(robot.joints):
@@ -88,7 +95,7 @@ def _doubling_rounds(joints: tuple[Joint, ...]) -> tuple[tuple[Ints, Ints], ...]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return cross products over the last dimension, (..., 3); np.cross costs several times as much on a few rows."""
+    """Return the cross products of a and b over the last dimension, (..., 3); faster than np.cross for a few rows."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
@@ -119,15 +126,18 @@ def link_transforms(robot: Robot, q: Array) -> Array:
 
 
 def joint_axes(robot: Robot, transforms: Array) -> tuple[Array, Array]:
-    """Return the joints' axes and points at this pose, root frame: two arrays (..., J, 3), unit vectors and m, from (..., L, 4, 4)."""
+    """Return the axis (unit vector) and a point on the axis [m] of each joint in a pose, root frame: two arrays (..., J, 3).
+
+    `transforms`: (..., L, 4, 4) of all links in this pose, as from `link_transforms`.
+    """
     return _moved_axes(robot, transforms, np.arange(len(robot.joints)))
 
 
 def point_jacobian(robot: Robot, transforms: Array, link: int, point: Array) -> Array:
-    """Return the Jacobian of a point that is fixed to a link (thesis eq. 5.1), (..., 6, n).
+    """Return the Jacobian of a point that is fixed to a link (thesis eq. 5.1), (..., 6, n), with a column for each motor.
 
-    Three rows of velocity [m/rad], then three of angular velocity, root frame, per motor.
-    `transforms`: (..., L, 4, 4); `point`: (..., 3) m in the root frame at this pose.
+    Three rows are of velocity [m/rad], then three of angular velocity, root frame. `transforms`: (..., L, 4, 4) of all links in this pose,
+    as from `link_transforms`. `link`: index of the link. `point`: (..., 3) m, root frame, in this pose.
     """
     t = tables(robot)
     chain = t.ancestry[link]

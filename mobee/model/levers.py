@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The levers of contacts, and how the pushes of contacts depend on them where a robot has a least lever."""
+"""The levers of contacts, and how the pushes of contacts depend on the levers if a robot has a least lever."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from mobee.robot.robot import LEVER, Robot
 
 
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
-    """Return the lever of a contact of two links [m]: the norm of the derivatives of its depth by the motor positions.
+    """Return the lever of a contact of two links [m/rad]: the norm of the derivatives of its depth with respect to the motor positions.
 
-    A joint that moves both links does not count; a motor that slides is in the unit of `motor_units`. `transforms`: (L, 4, 4). `point` (3,)
-    m and `normal` (3,): root frame, at this pose. A link below 0 is a free object.
+    A joint that moves both links does not count. The unit of a motor that slides is a length that counts as 1 rad
+    (`mobee.robot.motor_units`). `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object. `point` (3,) m and `normal`
+    (3,) of the contact: root frame, in this pose.
     """
     change = np.zeros(len(robot.motors))
     for link, sign in zip(links, (1.0, -1.0), strict=True):
@@ -25,11 +26,12 @@ def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array,
 
 
 def push_factors(robot: Robot, transforms: Array, links: Ints, depths: Array, points: Array, normals: Array) -> Array:
-    """Return the factors (c,) of the pushes of contacts of fields, depth * normal: all 1 unless the robot has a least lever.
+    """Return the factors (c,) by which the pushes depth * normal of c contacts of fields are multiplied.
 
-    Then the factor is LEVER^2 / (lever^2 + least_lever^2), times the share of the contact in the depth of all contacts of its two links:
-    our extension of thesis eq. 5.11, see docs/law.md.
-    `links` (c, 2), `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3); all free objects count as one link.
+    They are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2 / (lever^2 + least_lever^2), with LEVER = 0.5 m, times the depth
+    of the contact divided by the sum of the depths of all contacts between its two links: our extension of thesis eq. 5.11 (docs/law.md).
+    `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects (-1) count as one link. `depths` (c,) m, `points`
+    (c, 3) m, `normals` (c, 3): of the contacts, root frame.
     """
     factors = np.ones(len(depths))
     if robot.least_lever <= 0.0:

@@ -16,21 +16,28 @@ from mobee.robot.robot import Robot, per_robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Masses:
-    """The links of a robot that have a mass."""
+    """The masses of a robot, for the B links that have one.
+
+    `links`: (B,) indices. `weights`: (B,) kg. `moments`: (B, 4, 1), the mass [kg] times (x, y, z, 1) of its centre [m], root frame, zero
+    pose.
+    """
 
     links: Ints  # (B,)
     weights: Array  # (B,) kg
     moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
 
     def moved(self, transforms: Array) -> Array:
-        """Return mass times centre (..., B, 3) kg m, root frame, from all links' transforms (..., L, 4, 4)."""
+        """Return the mass times the centre of mass of each link, (..., B, 3) kg m, root frame, in a pose.
+
+        `transforms`: (..., L, 4, 4) of all links in this pose.
+        """
         moments: Array = (transforms[..., self.links, :3, :] @ self.moments)[..., 0]
         return moments
 
 
 @per_robot
 def masses(robot: Robot) -> Masses:
-    """Return the masses of a robot; B is 0 if its file has none."""
+    """Return the masses of the robot's links; the arrays have length 0 if the robot's file has no masses."""
     links = np.array([body.link for body in robot.bodies], dtype=np.intp)
     weights = np.array([body.mass for body in robot.bodies])
     centres = np.array([[*body.centre, 1.0] for body in robot.bodies]).reshape(len(links), 4)
@@ -38,7 +45,10 @@ def masses(robot: Robot) -> Masses:
 
 
 def centre_of_mass(robot: Robot, transforms: Array) -> Array:
-    """Return the centre of mass (..., 3) m, root frame, from all links' transforms (..., L, 4, 4); raises InvalidValue without masses."""
+    """Return the centre of mass of the whole robot in a pose, (..., 3) m, root frame; raises InvalidValue if the robot has no masses.
+
+    `transforms`: (..., L, 4, 4) of all links in this pose.
+    """
     if not robot.bodies:
         raise InvalidValue(f"{robot.name!r} has no masses (<mass> in its file), so it has no centre of mass.")
     known = masses(robot)
@@ -48,7 +58,7 @@ def centre_of_mass(robot: Robot, transforms: Array) -> Array:
 
 @per_robot
 def centre_of_mass_at_home(robot: Robot) -> Array:
-    """Return the centre of mass (3,) m in the robot's home posture."""
+    """Return the centre of mass of the whole robot at home, (3,) m, root frame; raises InvalidValue if the robot has no masses."""
     return centre_of_mass(robot, link_transforms(robot, robot.home))
 
 
@@ -68,10 +78,10 @@ class _Carriers:
 
 
 def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
-    """Return the torques [N m] that hold the robot still against its weight, (..., n): the gradient of the potential energy.
+    """Return the motor torques [N m] that hold the robot still against its weight, (..., n): the gradient of the potential energy.
 
-    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame. For the motor of a prismatic joint, which counts
-    in m, it is the force [N]. Zeros where the robot has no masses.
+    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame. For the motor of a prismatic joint, whose position is
+    in m, the value is a force [N]. All are 0 if the robot has no masses. Raises InvalidValue for a wrong shape of q.
     """
     q = _checked(robot, q)
     if not robot.bodies:
@@ -89,7 +99,10 @@ def gravity_torque(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
 
 
 def potential_energy(robot: Robot, q: Array, gravity: ArrayLike = EARTH) -> Array:
-    """Return the potential energy [J] of the robot's masses, (...,), zero at the root frame's origin; arguments: see `gravity_torque`."""
+    """Return the potential energy [J] of the robot's masses, (...,); it is 0 for a mass at the origin of the root frame.
+
+    `q`: (..., n) motor positions in rad; `gravity`: (3,) m/s^2 in the root frame. Raises InvalidValue for a wrong shape of q.
+    """
     q = _checked(robot, q)
     if not robot.bodies:
         return np.zeros(q.shape[:-1])

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
 _FLOAT = np.dtype(np.float64)
 
 Reaching = str | Sequence[str] | None
-"""The marker that reaches for the targets, or the markers; None: no marker."""
+"""The name of the marker that reaches for the targets, or the names of up to two markers; None: no marker."""
 
 
 class Model:
     """A robot in a world: evaluates poses, in any number of threads, while other threads edit the world.
 
-    Each evaluation uses one snapshot of the world and never waits for an edit. `engine`: "compiled", or "fcl", the slow reference.
+    Each evaluation uses one snapshot of the world and never waits for an edit. `world`: None: an empty one. `engine`: "compiled", or "fcl",
+    an independent and slow reference. Raises InvalidValue or UnknownName for other arguments.
     """
 
     def __init__(self, robot: Robot, world: World | None = None, engine: Literal["compiled", "fcl"] = "compiled") -> None:
@@ -48,7 +49,10 @@ class Model:
         self._hand_of: dict[str, Hand] = {}
 
     def hands(self, reaching: Reaching) -> Hands:
-        """Return the hands of the markers that reach; raises UnknownName, and InvalidValue for more than two markers."""
+        """Return the hand of each marker that reaches: the links whose contacts with targets are ignored.
+
+        `reaching`: name of a marker, names of up to two markers, or None. Raises UnknownName, and InvalidValue for more than two markers.
+        """
         markers = () if reaching is None else (reaching,) if isinstance(reaching, str) else tuple(reaching)
         known = self._hands_of.get(markers)
         if known is None:
@@ -58,9 +62,10 @@ class Model:
         return known
 
     def hand(self, marker: str) -> Hand:
-        """Return the links whose contacts with targets are ignored while a marker reaches: the marker's link and all that it carries.
+        """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
-        The fields of links before it in the same part are ignored too, from the first link whose field contains the marker at home.
+        These are the marker's link and all links that it carries. If fields of earlier links of the same part contain the marker at home,
+        the fields of the earliest such link (nearest to the base) and of all links that it carries are ignored too.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -90,16 +95,17 @@ class Model:
         return None
 
     def evaluate(self, q: ArrayLike, threads: int = 1, reaching: Reaching = None) -> Pose:
-        """Return the pose at q, (n,) or (..., n) rad in the order of robot.motors, in the present world, which it does not change.
+        """Return the pose of the robot at q in the present world, or a batch of poses; the world is not changed.
 
         Args:
-            q: motor positions.
-            threads: their number; each evaluates a block of a batch, and the results are bit-equal for any number.
-            reaching: a marker, or up to two, that reach for the targets: contacts of their hands with targets are ignored (see `hand`).
+            q: motor positions, (n,) or (..., n) rad, in the order of robot.motors.
+            threads: number of threads; each evaluates a block of a batch, and the results are bit-equal for any number.
+            reaching: the marker, or up to two markers, that reach for the targets: contacts of their hands (`Model.hand`) with targets are
+                ignored.
 
         Raises:
-            InvalidValue: for any other shape or NaN.
-            UnknownName: for a marker that the robot does not have.
+            InvalidValue: q has another shape or is not finite.
+            UnknownName: the robot does not have the marker.
         """
         one = self._one_pose(q)
         value: Array | bytes = self._checked(q) if one is None else one
@@ -108,9 +114,10 @@ class Model:
         return Pose(self.robot, self._engine, value, self.world.snapshot, NO_HANDS if reaching is None else self.hands(reaching), threads)
 
     def track(self, skin: float = 0.02) -> Track:
-        """Return an evaluator for poses that follow each other closely, as while the robot moves; make one for each thread.
+        """Return an evaluator that is faster for poses of which each is near the one before, as in a motion; make one for each thread.
 
-        `skin` [m]: pairs of volumes nearer than this are kept in a list. The engine "fcl" has no such list and evaluates every pair.
+        `skin`: m; the evaluator keeps a list of the pairs of volumes that are nearer than this. The engine "fcl" has no such list and
+        evaluates every pair. Raises InvalidValue unless the skin is finite and above 0.
         """
         if not 0.0 < skin < math.inf:
             raise InvalidValue(f"skin {skin} m: must be a finite distance above 0")
@@ -119,16 +126,20 @@ class Model:
         return Track(self, self._engine, skin)
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
-        """Return the marker's Jacobian, (..., 6, n): linear rows [m/rad] then angular, root frame, per motor (thesis eq. 5.1)."""
+        """Return the Jacobian of a marker in the poses q (..., n) rad, (..., 6, n) in the root frame (thesis eq. 5.1).
+
+        Three rows are linear [m/rad], then three angular; there is a column for each motor. Raises InvalidValue, UnknownName.
+        """
         value = self._checked(q)
         m = self.robot.marker(marker)
         found = self._engine.jacobians(value.reshape(-1, self._motors), m.link, m.position)
         return found.reshape(*value.shape[:-1], 6, self._motors)
 
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
-        """Attach a world object to a link, with which it then moves; its place relative to the link is that in the pose q (n,) rad.
+        """Attach a world object to a link, so that it moves with the link from now on.
 
-        That pose becomes the world's present pose, see `World.follow`. Raises UnknownName and InvalidValue.
+        Its pose relative to the link is that while the robot is at q (n,) rad. The world takes q as the robot's present pose
+        (`World.follow`). Raises UnknownName and InvalidValue.
         """
         pose = self.evaluate(q)
         carrier = link_pose(pose, link)
@@ -171,7 +182,7 @@ def _engine(robot: Robot, name: str) -> Engine:
 
 
 def engine_of(robot: Robot) -> NativeEngine:
-    """Return the compiled engine of a robot; the first call in a process loads the core."""
+    """Return a new compiled engine for a robot; the first call in a process loads the compiled core."""
     from mobee.model.engine import Engine
 
     return Engine(robot)

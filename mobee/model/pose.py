@@ -19,30 +19,43 @@ from mobee.robot.robot import Robot
 
 
 class Finder(Protocol):
-    """An object that computes contacts."""
+    """An object that computes the contacts of poses, as an engine or a list of neighbouring pairs (`mobee.model.track.Neighbours`)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the projection of those of fields to the motors, (B, n), see `Pose.projection`."""
+        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+
+        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored.
+        """
 
 
 class Engine(Protocol):
     """An engine that evaluates poses: the compiled one, or python-fcl as its independent reference."""
 
     def transforms(self, q: Array) -> Array:
-        """Return the transforms of every link in the poses q (B, n), (B, L, 4, 4)."""
+        """Return the transform of every link in the poses q (B, n) rad, (B, L, 4, 4): from its place at zero pose, in the root frame."""
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """Return the Jacobians (B, 6, n) of a link's point (3,), root frame at zero pose, in the poses q (B, n)."""
+        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.
+
+        `link`: index of the link. `point`: (3,) m, position of the point in the root frame at zero pose.
+        """
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n), and the projection of the contacts of fields to the motors, (B, n)."""
+        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+
+        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
+        motors of its own part, as in the original program.
+        """
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose and their projection to the motors (n,); `q`: the bytes of the pose (n,)."""
+        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+
+        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        """
 
 
 class Pose:
-    """The robot at one q or at a batch of them, in the world as it was when `Model.evaluate` was called.
+    """The robot at one q, or at a batch of several q, in the world at the time of the call of `Model.evaluate`.
 
     Every result is computed when it is first read, and kept.
     """
@@ -52,7 +65,11 @@ class Pose:
     # Not functools.cached_property: before Python 3.12 it takes one lock for all poses, and no evaluation may wait for another.
 
     def __init__(self, robot: Robot, engine: Engine, q: Array | bytes, snapshot: Snapshot, reaching: Hands, threads: int = 1) -> None:
-        """`q`: (..., n) rad, or the bytes of one pose (n,), which is faster."""
+        """Make a pose without computing anything; users call `Model.evaluate`.
+
+        `q`: (..., n) rad, or one pose (n,) as bytes of float64, which is faster. `snapshot`: of the world. `reaching`: the hands whose
+        contacts with targets are ignored. `threads`: number of threads for a batch.
+        """
         self.robot = robot
         self._given = q
         self._engine = engine
@@ -73,7 +90,7 @@ class Pose:
 
     @property
     def transforms(self) -> Array:
-        """The transform of every link, (..., L, 4, 4), from its place at zero pose to its place at q, root frame."""
+        """The transform of every link, (..., L, 4, 4), which maps a point's position at zero pose to its position at q, root frame."""
         if self._transforms is None:
             found = self._engine.transforms(self._flat)
             self._transforms = found.reshape(*self.q.shape[:-1], *found.shape[1:])
@@ -96,12 +113,15 @@ class Pose:
         return self.transforms[..., m.link, :3, :3] @ m.normal
 
     def point_jacobian(self, link: int, point: Array) -> Array:
-        """Return the Jacobian of a point (..., 3) m, root frame at q, that is fixed to a link: (..., 6, n), linear rows, then angular."""
+        """Return the Jacobian of a point that is fixed to a link, (..., 6, n), root frame: three linear rows [m/rad], then three angular.
+
+        `link`: index of the link. `point`: (..., 3) m, position of the point in the root frame at q.
+        """
         return point_jacobian(self.robot, self.transforms, link, point)
 
     @property
     def table(self) -> ContactTable:
-        """Every overlap of the tested pairs in every pose, as columns."""
+        """All contacts of the tested pairs in every pose, as a table with columns."""
         evaluated = self._evaluated
         if evaluated is None:
             evaluated = self._evaluated = self._computed(False)
@@ -111,7 +131,8 @@ class Pose:
     def projection(self) -> Array:
         """The contacts of fields projected to the motors: sum of J^T (depth * normal), (..., n) in [m^2/rad] (the sum in thesis eq. 5.11).
 
-        The two links of a self-contact get opposite vectors. A contact acts on all motors from its link down to the base.
+        In a contact of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its
+        link down to the base. With a least lever of the robot the pushes have factors (`mobee.model.levers.push_factors`).
         """
         evaluated = self._evaluated
         if evaluated is None:
@@ -120,15 +141,16 @@ class Pose:
 
     @property
     def projection_of_part(self) -> Array:
-        """The same as `projection`, but each contact acts only on the motors of its own part: a contact of an arm not on the torso's.
+        """The contacts of fields projected to the motors, as `projection`, but each push acts only on the motors of its link's own part.
 
-        The original program of 2014 projected contacts like this.
+        So a contact of an arm does not act on the motors of the torso. The original program of 2014 projected contacts like this. Shape
+        (..., n) in [m^2/rad].
         """
         return self._computed(True)[1]
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """Every overlap of the tested pairs, solids before fields; for one pose only (InvalidValue for a batch)."""
+        """All contacts of the tested pairs in this pose, solids before fields; raises InvalidValue for a batch of poses."""
         if self.q.ndim != 1:
             raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use table, or evaluate one q.")
         if self._contacts is None:
@@ -137,16 +159,17 @@ class Pose:
 
     @property
     def count(self) -> int | Ints:
-        """The number of solid contacts: an int for one pose, (...,) integers for a batch."""
+        """The number of contacts of solids: an int for one pose, (...,) integers for a batch."""
         table = self.table
         counted = np.bincount(table.pose[table.kind == 0], minlength=len(self._flat))
         return int(counted[0]) if self.q.ndim == 1 else counted.reshape(self.q.shape[:-1])
 
     @property
     def objects(self) -> dict[str, WorldObject]:
-        """The world's objects at the time of this evaluation; for one pose only. Attached objects are at their position in this pose.
+        """The world's objects at the time of this evaluation, by name; for one pose, not a batch.
 
-        Raises UnknownName if an object is attached to a link that the robot does not have.
+        Attached objects are given as free objects at their place in this pose. Raises UnknownName if an object is attached to a link that
+        the robot does not have.
         """
         return {
             name: thing if thing.link is None else placed(thing, link_pose(self, thing.link))
@@ -154,7 +177,7 @@ class Pose:
         }
 
     def each(self) -> Iterator[Pose]:
-        """Yield the poses of a batch one by one; contacts are computed again when they are read."""
+        """Yield the poses of a batch one by one; link transforms are kept, contacts are computed again when they are read."""
         transforms = self.transforms.reshape(-1, *self.transforms.shape[-3:])
         for q, placed_links in zip(self._flat, transforms, strict=True):
             one = Pose(self.robot, self._engine, q, self._snapshot, self._reaching)
@@ -162,7 +185,7 @@ class Pose:
             yield one
 
     def compute_contacts(self, finder: Finder) -> None:
-        """Compute the contacts now, with the given finder instead of the model's engine."""
+        """Compute and keep the contacts now, with `finder` instead of the model's engine."""
         table, torque = finder.contacts(self._flat, self._snapshot, self._reaching)
         self._evaluated = table, torque.reshape(self.q.shape)
 

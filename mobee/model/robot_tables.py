@@ -26,7 +26,10 @@ _Edges = tuple[NDArray[np.int32], NDArray[np.int32]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """A world object that a link carries: a shape of that link."""
+    """A world object that is attached to a link, as a further shape of that link.
+
+    `link`: index of the link. `row`: one row of VOLUME (`mobee.model.volumes`), in the link's frame.
+    """
 
     link: int
     row: Volumes  # () VOLUME, in the link's frame
@@ -34,7 +37,16 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """The tables that core/robot.cpp reads: of S shapes in the order of C clusters, of J joints, and of the corners of all hulls."""
+    """The tables that core/robot.cpp reads: of S shapes in the order of C clusters, of J joints, and of the V corners of all hulls.
+
+    `motors`: their number. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) link that
+    carries it; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that it moves belongs to another part than `parent`;
+    `axis` (J, 3); `point` (J, 3) m; `motor` (K, J) its motors, at most K; `scale` (K, J) joint angle per motor angle; `offset` (J,);
+    `travel` (K, J) its motion when the motor moves by an angle of 1 in the control law. Shapes: `volume` (S,) rows of VOLUME; `link` (S,);
+    `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,); `meets_world` (S,) whether it is tested against free
+    objects; `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners:
+    `corner` (V, 3) m, in the axes of the hull; `edge_start` (V + 1,) first edge of each corner; `edge`: the corner at the other end.
+    """
 
     motors: int
     own_shapes: int  # without carried objects
@@ -60,7 +72,7 @@ class RobotTables:
     least_lever: float  # m
 
     def for_core(self) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
-        """Return numbers and arrays as `mobee._core.engine.robot` takes them."""
+        """Return the single numbers and the contiguous arrays, each by name, in the form that `mobee._core.engine.robot` needs."""
         integers = ("parent", "slides", "border", "motor", "link", "name", "field", "meets_world", "cluster")
         others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge", "travel")
         arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.int64) for name in integers}
@@ -80,7 +92,10 @@ class RobotTables:
 
 
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
-    """Return the tables of a robot with the objects that its links carry; raises InvalidValue if its indices are inconsistent."""
+    """Return the core's tables of a robot, with the objects attached to its links as further shapes.
+
+    Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range.
+    """
     _check(robot)
     rows, corner, edges = _rows(robot.shapes)
     rows = np.concatenate([rows, *(one.row.reshape(1) for one in carried)])
@@ -191,7 +206,10 @@ def _tested(robot: Robot, carried: Sequence[Carried]) -> Flags:
 
 
 def meets(robot: Robot, link: int, other: int) -> bool:
-    """Return whether an object on `link` is tested against the link `other`: if they are two links, and tested against each other."""
+    """Return whether an object attached to `link` is tested for contacts against the link `other` (indices).
+
+    It is if they are two different links, and the pair is not excluded from the tests.
+    """
     pair: LinkPair = frozenset((link, other))
     return link != other and pair not in robot.untested
 
@@ -223,9 +241,10 @@ _CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 
 
 def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
-    """Return the groups of shapes, each a list of indices.
+    """Return the clusters of shapes that share a bounding sphere in the core, each a list of indices of shapes.
 
-    A shape with an index of `own` or more is a carried object; each carried object is a separate group.
+    `rows`: (S,) rows of VOLUME. `link`: (S,) link of each shape. `field`: (S,) whether it is a field. `own`: number of the robot's own
+    shapes; the shapes after them are carried objects, each of which is a separate cluster.
     """
     groups = _CACHE.get(robot)  # carried objects change while the robot moves, its own groups never do
     if groups is None:

@@ -25,11 +25,11 @@ _CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """An immutable state of the world; each edit makes the next one.
+    """An immutable state of the world; each edit of the world makes the next snapshot.
 
-    `names`, `rows` and `roles` are in the order of `objects`, in which they were added. `rows` (N,): see `mobee.model.volumes`; those
-    of attached objects are in the frame of their link. `roles` (N,): OBSTACLE, TARGET, GHOST, or for attached objects ATTACHED and
-    ATTACHED_GHOST.
+    `version`: number of edits. `objects`: by name, in the order in which they were added; `names`, `rows` and `roles` have the same order.
+    `rows` (N,): the volumes as rows of VOLUME (`mobee.model.volumes`); those of attached objects are in the frame of their link. `roles`
+    (N,): OBSTACLE, TARGET, GHOST, or for attached objects ATTACHED and ATTACHED_GHOST. `attached`: names of the attached objects.
     """
 
     version: int
@@ -44,7 +44,7 @@ EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empt
 
 
 def extended(old: Snapshot, new: WorldObject) -> Snapshot:
-    """Return the next snapshot, with one more object at the end."""
+    """Return the snapshot after `old`, with the object `new` added at the end."""
     count, role = len(old.names), _code(new)
     rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
     rows[:count], rows[count] = old.rows, volume_row(new)
@@ -54,7 +54,7 @@ def extended(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def changed(old: Snapshot, new: WorldObject) -> Snapshot:
-    """Return the next snapshot, with the object of that name replaced."""
+    """Return the snapshot after `old`, in which the object `new` replaces the object with the same name."""
     place, role = old.names.index(new.name), _code(new)
     rows, roles, attached = old.rows.copy(), old.roles, old.attached
     rows[place] = volume_row(new)
@@ -66,7 +66,7 @@ def changed(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def shortened(old: Snapshot, name: str) -> Snapshot:
-    """Return the next snapshot, without the object of that name."""
+    """Return the snapshot after `old`, without the object with the given name."""
     place, count = old.names.index(name), len(old.names)
     rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
     rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
@@ -93,7 +93,11 @@ MAX_HANDS = 2  # hands that may reach at once; as `most_hands` in core/scene.hpp
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """The links of one hand, by index. Contacts with targets are ignored for both links and for all links that they carry."""
+    """The links of one reaching hand, by index, whose contacts with targets are ignored.
+
+    `link`: of this link, and of all links that it carries, solids and fields are ignored. `fields`: of this link, and of all links that it
+    carries, only fields are ignored; it is the same link as `link`, or an earlier link of the part.
+    """
 
     link: int  # all of its volumes are exempt
     fields: int  # its fields are exempt; the same link, or one before it
@@ -105,7 +109,10 @@ NO_HANDS: Hands = ()
 
 @lru_cache(maxsize=64)
 def hand_numbers(reaching: Hands) -> tuple[int, ...]:
-    """Return the hands as the core takes them (`Hands` in core/scene.hpp): two links for each, -1 where there is no hand."""
+    """Return the hands in the form that the core needs (`Hands` in core/scene.hpp): four link indices, two for each hand; -1: no hand.
+
+    Raises ValueError for more than two hands.
+    """
     found = [number for hand in reaching for number in (hand.link, hand.fields)]
     if len(found) > 2 * MAX_HANDS:
         raise ValueError(f"{len(reaching)} hands reach at once; at most {MAX_HANDS} may")

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
 
 class Neighbours:
-    """Computes the contacts of a robot in consecutive poses, with a list of the pairs nearer than `skin` [m]; for one thread at a time.
+    """Computes the contacts of a robot in consecutive poses, with a list of the pairs of volumes that are near each other.
 
-    `cut`: see `Engine.contacts`.
+    An object is for one thread at a time. `skin`: m; pairs nearer than this are in the list. `cut`: True: a contact acts only on the motors
+    of its own part, as in the original program.
     """
 
     def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
@@ -30,13 +31,20 @@ class Neighbours:
         self._known: tuple[Scene, Hands] | None = None
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return what `Engine.contacts` returns, for the poses q (B, n) one after the other."""
+        """Return all contacts in the consecutive poses q (B, n) rad, and the projection of the contacts of fields, (B, n) m^2/rad.
+
+        The projection is the sum of J^T (depth * normal). `snapshot`: of the world. `reaching`: the hands whose contacts with targets are
+        ignored.
+        """
         self.enter(snapshot, reaching)
         numbers, reals, torque = self._core.follow(q)
         return self._engine.table(snapshot, numbers, reals), torque
 
     def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
-        """Use this world in all later calls, with a new list of pairs if it changed; return the address of the core's `Neighbours`."""
+        """Set the world and the reaching hands for later computations; return the memory address of the core's object `Neighbours`.
+
+        If the world or the hands have changed, the list of near pairs is made anew.
+        """
         scene = self._engine.scene_of(snapshot)
         known = self._known
         if known is None or known[0] is not scene or known[1] != reaching:
@@ -46,21 +54,26 @@ class Neighbours:
 
 
 class Track:
-    """Evaluates poses of one model that follow each other closely: the same results as `Model.evaluate`, faster.
+    """Evaluates consecutive poses of one model, of which each is near the one before: the same results as `Model.evaluate`, faster.
 
-    Pairs of volumes that cannot touch until one of them has moved by half the skin are not checked until then. A track is cheap to make
-    and serves one thread at a time. Where the steps are large it is as fast as `Model.evaluate`.
+    Pairs of volumes that are farther apart than the skin are not checked until a volume has moved by half the skin. A track takes little
+    time to make and is for one thread at a time. For large steps between poses it is as fast as `Model.evaluate`.
     """
 
     def __init__(self, model: Model, engine: object, skin: float) -> None:
-        """`engine`: that of the model; one without neighbour lists, python-fcl, evaluates every pair."""
+        """Make a track; users call `Model.track`.
+
+        `engine`: of the model; the engine of python-fcl has no list of near pairs and evaluates every pair. `skin`: m; pairs of volumes
+        nearer than this are in the list.
+        """
         self._model = model
         self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
 
     def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
-        """Return the pose at q (n,), or the poses along a path (..., n) rad in this order; arguments and errors: see `Model.evaluate`.
+        """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
 
-        The contacts are computed at once, not when they are read.
+        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The contacts are computed at once,
+        not when they are read. Raises InvalidValue, UnknownName as `Model.evaluate`.
         """
         pose = self._model.evaluate(q, reaching=reaching)
         if self._neighbours is not None:

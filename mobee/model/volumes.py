@@ -23,8 +23,9 @@ VOLUME = np.dtype(
         ("bound", np.float64),
     ]
 )
-"""`VolumeRow` of core/robot.hpp.  Half sizes: sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges; convex (first
-corner in the table of corners, number of corners, 0).  `bound`: radius of the ball about the position that contains the volume."""
+"""The type of a row that describes a volume, `VolumeRow` of core/robot.hpp.  `kind`: 0 sphere, 1 capsule, 2 cylinder, 3 box, 4 convex.
+`half` [m]: sphere (r, 0, 0); capsule and cylinder (r, half height, 0); box half edges; convex (first corner in the table of corners,
+number of corners, 0).  `bound`: radius [m] of the ball about the position that contains the volume."""
 
 Volumes = NDArray[Any]  # of VOLUME
 
@@ -34,23 +35,26 @@ class Volume(Protocol):
 
     @property
     def kind(self) -> ShapeKind:
-        """The form."""
+        """The kind of volume: "sphere", "capsule", "cylinder", "box" or "convex"."""
 
     @property
     def size(self) -> tuple[float, ...]:
-        """Its lengths [m], see `Shape`."""
+        """The lengths of the volume [m], as in `mobee.robot.robot.Shape.size`."""
 
     @property
     def position(self) -> Array:
-        """Its position (3,) m."""
+        """The position of the volume (3,) m."""
 
     @property
     def rotation(self) -> Array:
-        """Its rotation (3, 3)."""
+        """The rotation of the volume (3, 3)."""
 
 
 def bound(volume: Volume, vertices: Array | None = None) -> float:
-    """Return the radius [m] of the ball about a volume's position that contains it; a convex volume needs its vertices (v, 3) m."""
+    """Return the radius [m] of the smallest ball about a volume's position that contains the volume.
+
+    `vertices`: (v, 3) m, of a convex volume, relative to its position; None for the other kinds.
+    """
     if vertices is not None:
         return float(np.sqrt((vertices * vertices).sum(axis=1)).max())
     size = volume.size
@@ -61,14 +65,17 @@ def bound(volume: Volume, vertices: Array | None = None) -> float:
 
 
 def volume_row(volume: Volume) -> Volumes:
-    """Return the row () of a sphere, capsule, cylinder or box."""
+    """Return the description of a sphere, capsule, cylinder or box for the core: one row of VOLUME, shape ()."""
     size = volume.size
     half = [length / 2.0 for length in size] if volume.kind == "box" else [size[0], size[1] / 2.0 if len(size) > 1 else 0.0, 0.0]
     return _row(volume, half, bound(volume))
 
 
 def convex_row(volume: Volume, vertices: Array, first: int) -> Volumes:
-    """Return the row () of a convex volume whose vertices (v, 3) m begin at `first` in the table of corners."""
+    """Return the description of a convex volume for the core: one row of VOLUME, shape ().
+
+    `vertices`: (v, 3) m, relative to its position. `first`: index of the first vertex in the core's table of corners.
+    """
     return _row(volume, [first, len(vertices), 0.0], bound(volume, vertices))
 
 

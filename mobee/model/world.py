@@ -41,17 +41,18 @@ class LinkPoses(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The robot."""
+        """The robot that has this pose."""
 
     @property
     def transforms(self) -> Array:
-        """The transforms of its links, (L, 4, 4)."""
+        """The transform of every link, (L, 4, 4), which maps a point's position at zero pose to its position in this pose, root frame."""
 
 
 class World:
-    """A set of named objects; every edit makes a new snapshot, so that any thread may edit while others evaluate.
+    """A set of named objects around the robot; any thread may edit it while others evaluate, because every edit makes a new snapshot.
 
-    Roles: an "obstacle" repels the robot; a "target" repels all of it but the hand that reaches for it; a "ghost" is only drawn.
+    Roles of an object: an "obstacle" repels the robot; a "target" repels all links except the hand that reaches for it; a "ghost" is only
+    drawn.
     """
 
     def __init__(self) -> None:
@@ -61,17 +62,17 @@ class World:
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest snapshot; reading it takes no lock."""
+        """The newest snapshot, an immutable copy of the world; reading it does not wait for an edit."""
         return self._snapshot
 
     @property
     def objects(self) -> Mapping[str, WorldObject]:
-        """The objects by name, read-only, in the order in which they were added."""
+        """The objects of the world by name, read-only, in the order in which they were added."""
         return self._snapshot.objects
 
     @property
     def version(self) -> int:
-        """The number of edits so far."""
+        """The number of edits of the world so far."""
         return self._snapshot.version
 
     def add(
@@ -86,10 +87,12 @@ class World:
         mass: float | None = None,
         friction: float = FRICTION,
     ) -> None:
-        """Add an object; position (3,) m and rotation (3, 3) in the root frame; raises InvalidValue if the name is taken or empty.
+        """Add an object at `position` (3,) m with `rotation` (3, 3), root frame; `rotation` None: not rotated.
 
-        `mass`: kg, of an object that MuJoCo moves when it is pushed, with this coefficient of `friction`; None: it does not move. The
-        model and the offline plant use neither: to them every object is where it was put.
+        `role`: "obstacle", "target" or "ghost". `color`: red, green, blue and optionally opacity, each 0 to 1; None: not stated. `mass`:
+        kg, of an object that the physics engine MuJoCo moves when it is pushed, with this coefficient of `friction`; None: it does not
+        move. The model and the offline plant do not use mass and friction: for them every object stays where it was put. Raises
+        InvalidValue if the name is taken or empty, or a value is not valid.
         """
         valid_name(name)
         volume, at = valid_shape(name, shape), valid_position(name, position)
@@ -104,7 +107,10 @@ class World:
             self._snapshot = extended(self._snapshot, new)
 
     def move(self, name: str, *, position: ArrayLike | None = None, rotation: ArrayLike | None = None) -> None:
-        """Change position (3,) m, rotation (3, 3) or both of an object, in the root frame; raises InvalidValue for an attached object."""
+        """Set the position (3,) m, the rotation (3, 3) or both of an object, in the root frame; None: it is not changed.
+
+        Raises UnknownName, and InvalidValue for an attached object.
+        """
         at = None if position is None else valid_position(name, position)
         turn = None if rotation is None else valid_rotation(name, rotation)
         with self._lock:
@@ -115,7 +121,7 @@ class World:
             self._snapshot = changed(self._snapshot, moved)
 
     def remove(self, name: str) -> None:
-        """Remove an object; raises UnknownName."""
+        """Remove an object from the world; raises UnknownName."""
         with self._lock:
             self._get(name)
             self._snapshot = shortened(self._snapshot, name)
@@ -129,9 +135,9 @@ class World:
     def attach(self, name: str, link: str, relative: tuple[ArrayLike, ArrayLike] | None = None) -> None:
         """Attach an object to a link of the robot: it moves with the link, and contacts between the two are ignored.
 
-        `relative`: position (3,) m and rotation (3, 3) in the link's frame, which is the root frame at zero pose. Without it the
-        object keeps the place that it has relative to the link in the pose of the last `follow`; `Model.attach` takes q instead.
-        Raises UnknownName, and InvalidValue for values that are not valid or where no pose is known.
+        `relative`: position (3,) m and rotation (3, 3) of the object in the link's frame, which is the root frame at zero pose. None: the
+        object keeps its present place relative to the link, in the robot's pose of the last call of `follow`; `Model.attach` takes the
+        pose as an argument. Raises UnknownName, and InvalidValue for values that are not valid or if no pose is known.
         """
         pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
         with self._lock:
@@ -145,7 +151,10 @@ class World:
             self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
 
     def detach(self, name: str) -> None:
-        """Detach an object, which stays at its place in the pose of the last `follow`; raises UnknownName and InvalidValue."""
+        """Detach an object from its link; it stays at the place that it has in the robot's pose of the last call of `follow`.
+
+        Raises UnknownName, and InvalidValue if the object is not attached or no pose is known.
+        """
         with self._lock:
             old = self._get(name)
             if old.link is None:
@@ -163,7 +172,10 @@ class World:
 
 
 def link_pose(seen: LinkPoses | None, link: str) -> Array:
-    """Return the transform (4, 4) of a link; raises UnknownName, and InvalidValue where no pose is known."""
+    """Return the transform (4, 4) of the named link, from its place at zero pose to its place in a pose of the robot, root frame.
+
+    `seen`: the pose; None: no pose is known, which raises InvalidValue. Raises UnknownName for an unknown link.
+    """
     if seen is None:
         raise InvalidValue(
             f"the world does not know where link {link!r} is: call world.follow(model.evaluate(q)) first, or give `relative`."

@@ -18,7 +18,11 @@ ROLES: dict[str, Role] = {"obstacle": "obstacle", "target": "target", "ghost": "
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """Load a shipped world by name (see `shipped_worlds`), or the world of an .xml file; raises the errors of `load_robot`."""
+    """Load a shipped world by name (`mobee.model.world_file.shipped_worlds`), or the world of an .xml file by path.
+
+    Raises UnknownName with the nearest shipped name, InvalidValue for an argument of another type, and RobotFileError with file, line,
+    field and remedy.
+    """
     return read_world(find_file(name_or_path, WORLDS, "world"))
 
 
@@ -28,9 +32,9 @@ def shipped_worlds() -> tuple[str, ...]:
 
 
 def read_world(path: Path) -> World:
-    """Read the world of an XML file of any version; positions in [m] in the root frame, angles in [deg].
+    """Return the world that an XML file of any version describes; the file has positions in m, root frame, and angles in degrees.
 
-    Raises RobotFileError with file, line, field and remedy; warns of everything that it ignores or repairs.
+    Raises RobotFileError with file, line, field and remedy; warns of everything that is ignored or repaired.
     """
     root = read_xml(path, repair=True)
     if root.tag not in WORLD_TAGS:

@@ -22,41 +22,44 @@ SMALLEST, LARGEST = 1e-9, 1e5  # m: valid lengths; between them depths and force
 class Geometry:
     """A primitive shape, centred at its own origin.
 
-    `size` in m: sphere (r,); capsule and cylinder (r, height along local z, a capsule's caps lie beyond it);
-    box (x, y, z) full edges.
+    `kind`: "sphere", "capsule", "cylinder" or "box". `size` in m: sphere (r,); capsule and cylinder (r, height along local z; a capsule's
+    caps are beyond it); box (x, y, z), full edges.
     """
 
     kind: ShapeKind
     size: tuple[float, ...]
 
     def grown(self, margin: float) -> Geometry:
-        """Return the shape with its surface moved outward by a margin [m], inward if it is negative."""
+        """Return a copy of the shape with its surface moved outward by `margin` m; a negative margin moves it inward."""
         factors = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[self.kind]
         return Geometry(self.kind, tuple(size + factor * margin for size, factor in zip(self.size, factors, strict=True)))
 
 
 def sphere(radius: float) -> Geometry:
-    """Return a sphere of this radius [m]; raises InvalidValue unless it is 1e-9 to 1e5."""
+    """Return a sphere with this radius [m]; raises InvalidValue unless the radius is 1e-9 to 1e5 m."""
     return Geometry("sphere", _lengths("sphere", radius=radius))
 
 
 def box(x: float, y: float, z: float) -> Geometry:
-    """Return a box with these full edges [m] along its own axes; raises InvalidValue unless they are 1e-9 to 1e5."""
+    """Return a box with these full edges [m] along its own axes; raises InvalidValue unless each is 1e-9 to 1e5 m."""
     return Geometry("box", _lengths("box", x=x, y=y, z=z))
 
 
 def cylinder(radius: float, height: float) -> Geometry:
-    """Return a cylinder about its own z [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
+    """Return a cylinder about its own z axis with this radius and height [m]; raises InvalidValue unless each is 1e-9 to 1e5 m."""
     return Geometry("cylinder", _lengths("cylinder", radius=radius, height=height))
 
 
 def capsule(radius: float, height: float) -> Geometry:
-    """Return a cylinder about its own z with a half sphere beyond each end [m]; raises InvalidValue unless both are 1e-9 to 1e5."""
+    """Return a capsule: a cylinder about its own z axis with this radius and height [m], with a half sphere beyond each end.
+
+    Raises InvalidValue unless each length is 1e-9 to 1e5 m.
+    """
     return Geometry("capsule", _lengths("capsule", radius=radius, height=height))
 
 
 def is_length(value: object) -> bool:
-    """Return whether the value is a number from SMALLEST to LARGEST."""
+    """Return whether the value is a number that is valid as a length: 1e-9 to 1e5 m."""
     return isinstance(value, Real) and not isinstance(value, bool) and SMALLEST <= float(value) <= LARGEST
 
 
@@ -80,7 +83,10 @@ _MAX_LENGTH_ERROR, _MAX_SKEW = 1.1e-5, 1e-6  # of a rotation: of the squares of 
 class WorldObject:
     """A volume in the world.
 
-    `position`, `rotation`: in the root frame; once attached, in the frame of `link`, which is the root frame at zero pose.
+    `kind`, `size`: as in `Geometry`. `position` (3,) m, `rotation` (3, 3): in the root frame; of an attached object, in the frame of
+    `link`, which is the root frame at zero pose. `role`: "obstacle", "target" or "ghost". `color`: red, green, blue and opacity, each 0 to
+    1; None: not stated. `link`: name of the link that carries it; None: it is free. `mass`: kg, of an object that a physics engine moves
+    when it is pushed; None: it does not move. `friction`: coefficient of an object with a mass, with everything that it touches.
     """
 
     name: str
@@ -96,31 +102,34 @@ class WorldObject:
 
     @property
     def movable(self) -> bool:
-        """Whether a physics engine moves it: it can be pushed, lifted and knocked over."""
+        """Whether the object has a mass, so that a physics engine moves it: it can be pushed, lifted and knocked over."""
         return self.mass is not None
 
 
 def placed(thing: WorldObject, link_pose: Array) -> WorldObject:
-    """Return an attached object as a free one, at its place while its link has the pose `link_pose` (4, 4)."""
+    """Return a free copy of an attached object, at the place that it has while the transform of its link is `link_pose` (4, 4)."""
     turn, shift = link_pose[:3, :3], link_pose[:3, 3]
     return replace(thing, position=turn @ thing.position + shift, rotation=turn @ thing.rotation, link=None)
 
 
 def seen_from(link_pose: Array, thing: WorldObject) -> tuple[Array, Array]:
-    """Return position (3,) and rotation (3, 3) of a free object in the frame of a link, whose pose is `link_pose` (4, 4)."""
+    """Return the position (3,) m and the rotation (3, 3) of a free object in the frame of a link whose transform is `link_pose` (4, 4)."""
     back = link_pose[:3, :3].T
     return back @ (thing.position - link_pose[:3, 3]), back @ thing.rotation
 
 
 def valid_name(name: str) -> str:
-    """Return the name; raises InvalidValue unless it is text that is not empty."""
+    """Return the name of a world object unchanged; raises InvalidValue unless it is text that is not empty."""
     if not isinstance(name, str) or not name:
         raise InvalidValue(f"world object {name!r}: its name must be text that is not empty.")
     return name
 
 
 def valid_shape(name: str, shape: Geometry) -> Geometry:
-    """Return the shape; raises InvalidValue unless it is one of the four primitives with valid lengths."""
+    """Return the shape of a world object unchanged; raises InvalidValue unless it is a sphere, capsule, cylinder or box of valid lengths.
+
+    `name`: of the object, for the message.
+    """
     if not isinstance(shape, Geometry):
         raise InvalidValue(f"world object {name!r}: shape {shape!r}; it must be a Geometry, as sphere(0.1), box, cylinder or capsule.")
     lengths = LENGTHS.get(shape.kind)
@@ -133,7 +142,7 @@ def valid_shape(name: str, shape: Geometry) -> Geometry:
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers."""
+    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers. `name`: of the object, for the message."""
     value = _numbers(given)
     if value is None or value.shape != (3,) or not np.isfinite(value).all():
         raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
@@ -141,7 +150,10 @@ def valid_position(name: str, given: ArrayLike) -> Array:
 
 
 def valid_rotation(name: str, given: ArrayLike) -> Array:
-    """Return a copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed."""
+    """Return a copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed.
+
+    `name`: of the object, for the message.
+    """
     value = _numbers(given)
     if value is None or value.shape != (3, 3) or not _is_rotation(value):
         raise InvalidValue(f"world object {name!r}: rotation {given!r}; it must be a (3, 3) rotation matrix.")
@@ -170,21 +182,27 @@ def _is_rotation(value: Array) -> bool:
 
 
 def valid_role(name: str, role: Role) -> Role:
-    """Return the role; raises InvalidValue for anything but "obstacle", "target" and "ghost"."""
+    """Return the role unchanged; raises InvalidValue unless it is "obstacle", "target" or "ghost".
+
+    `name`: of the object, for the message.
+    """
     if role not in get_args(Role):
         raise InvalidValue(f"world object {name!r}: role {role!r}; valid: {', '.join(get_args(Role))}.")
     return role
 
 
 def valid_mass(name: str, mass: float | None) -> float | None:
-    """Return the mass [kg], None for an object that does not move; raises InvalidValue unless it is above 0 and at most 10 t."""
+    """Return the mass [kg] as a float, or None for an object that does not move; raises InvalidValue unless it is above 0, at most 10 t.
+
+    `name`: of the object, for the message.
+    """
     if mass is not None and not (_is_number(mass) and 0.0 < mass <= HEAVIEST):
         raise InvalidValue(f"world object {name!r}: mass {mass!r}; it must be above 0 and at most {HEAVIEST:g} kg.")
     return None if mass is None else float(mass)
 
 
 def valid_friction(name: str, friction: float) -> float:
-    """Return the coefficient of friction; raises InvalidValue unless it is 0 to 10."""
+    """Return the coefficient of friction as a float; raises InvalidValue unless it is 0 to 10. `name`: of the object, for the message."""
     if not (_is_number(friction) and 0.0 <= friction <= ROUGHEST):
         raise InvalidValue(f"world object {name!r}: friction {friction!r}; it must be a coefficient of 0 to {ROUGHEST:g}.")
     return float(friction)
@@ -195,7 +213,10 @@ def _is_number(value: object) -> bool:
 
 
 def valid_color(name: str, given: Sequence[float] | None) -> Color | None:
-    """Return red, green, blue and opacity (1 if not given); raises InvalidValue unless each is 0 to 1."""
+    """Return a colour as (red, green, blue, opacity), the opacity 1 if not given; None for None.
+
+    `name`: of the object, for the message. Raises InvalidValue unless there are 3 or 4 numbers, each 0 to 1.
+    """
     if given is None:
         return None
     channels = tuple(float(c) for c in given)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The definitions in readable NumPy: each function beside its equation, for one pose or one tick.
+"""The definitions of model, law and learning in readable NumPy: each function beside its equation, for one pose or one tick.
 
 The programs run a compiled form of the same functions; tests compare the two. Nothing else in the library imports this package.
 

@@ -26,7 +26,13 @@ YIELD = 0.25  # rad/s^2: an opposing force of this size ends the motion with a m
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """The input of the law in one tick; arrays (n,) in the order of `robot.motors`."""
+    """The input of the control law in one tick; arrays (n,) in the order of `robot.motors`.
+
+    `q`: rad, measured. `velocity`: q', rad/s, the law's own state, not a difference of encoder values. `attractor`: q*, rad. `contacts`: at
+    q, as `Model.evaluate(q).contacts` returns them. `force`: f of eq. 5.9, a client's force on the motors, rad/s^2; None: none. `pushes`:
+    f_m of eq. 5.10, by marker: force (3,), or force and moment (6,), root frame. `propagate`: "tree": a contact acts on all motors down to
+    the base; "part": on the motors of the touching part only. `goal_velocity`: q*', rad/s, of an attractor that moves; None: it is at rest.
+    """
 
     robot: Robot
     gains: Gains
@@ -41,30 +47,36 @@ class State:
 
 
 def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
-    """Saturate v element by element (eq. 5.8): L(v) = m v / (m / k + |v|), below m = `maximum` in size, of slope k = `slope` at 0."""
+    """Saturate v element by element (eq. 5.8): return L(v) = m v / (m / k + |v|).
+
+    The absolute value stays below m = `maximum`; the slope at 0 is k = `slope`.
+    """
     return maximum * v / (maximum / slope + np.abs(v))
 
 
 def squash_norm(v: Array, maximum: float, slope: float) -> Array:
-    """Saturate the norm of v as eq. 5.8 does an element; the direction stays."""
+    """Saturate the norm of the vector v: return m v / (m / k + |v|) as in eq. 5.8, where |v| is the norm, so that v keeps its direction.
+
+    The norm stays below m = `maximum`; the slope at 0 is k = `slope`.
+    """
     return maximum * v / (maximum / slope + float(np.linalg.norm(v)))
 
 
 def spring(s: State) -> Array:
-    """Return the pull of the attractor, L(K (q* - q)), on the right-hand side of eq. 5.7."""
+    """Return the pull of the attractor, L(K (q* - q)), (n,) rad/s^2, as a term on the right-hand side of eq. 5.7."""
     return squash(s.attractor - s.q, s.gains.of_robot("max_spring", s.robot), s.gains.of_robot("stiffness", s.robot))
 
 
 def damping(s: State) -> Array:
-    """Return the damping, -C q', on the right-hand side of eq. 5.7."""
+    """Return the damping, -C q', (n,) rad/s^2, as a term on the right-hand side of eq. 5.7."""
     return -s.gains.of_robot("damping", s.robot) * s.velocity
 
 
 def following(s: State, outside: Array) -> Array:
-    """Return C q*', which makes the damping relative to the velocity of a moving attractor.
+    """Return C q*', (n,) rad/s^2, which makes the damping relative to the velocity of a moving attractor; 0 if the attractor is at rest.
 
-    `outside` (n,): the sum of all forces but spring and damping.  A motor yields to a force that
-    opposes this velocity: it follows less, and not at all from YIELD on.
+    `outside` (n,) rad/s^2: the sum of all forces except spring and damping.  A motor yields to such a force if it opposes the velocity of
+    the attractor: C q*' is reduced in proportion to the force, and is 0 for a force of YIELD (0.25 rad/s^2) or more.
     """
     if s.goal_velocity is None:
         return np.zeros(len(s.q))
@@ -75,12 +87,12 @@ def following(s: State, outside: Array) -> Array:
 
 
 def config_force(s: State) -> Array:
-    """Return f_config = L(f) (eq. 5.9), where f is the client's force on the motors."""
+    """Return f_config = L(f) (eq. 5.9), (n,) rad/s^2, where f is the client's force on the motors."""
     return bounded_client(s.robot, s.gains, s.force) if s.force is not None else np.zeros(len(s.q))
 
 
 def work_force(s: State) -> Array:
-    """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10)."""
+    """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10), (n,) rad/s^2."""
     torque = np.zeros(len(s.q))
     for marker, push in s.pushes.items():
         torque += marker_jacobian(s.robot, s.q, marker)[: len(push)].T @ push
@@ -88,7 +100,11 @@ def work_force(s: State) -> Array:
 
 
 def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
-    """Saturate a client's force: every motor by itself (eq. 5.8 as printed), or the norm of each part, keeping its direction."""
+    """Saturate a client's force f (n,) rad/s^2: L of eqs. 5.9 and 5.10.
+
+    With `gains.client_squash` "each", every motor is saturated separately (eq. 5.8 as printed). Otherwise the norm of the force on each
+    part is saturated, so that the force on the part keeps its direction.
+    """
     maximum, slope = gains.of_robot("max_client", robot), gains.of_robot("client_slope", robot)
     if gains.client_squash == "each":
         return squash(f, maximum, slope)
@@ -99,17 +115,22 @@ def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
 
 
 def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Array:
-    """Saturate the norm of the force on several motors; where their bounds differ, the smallest factor counts for all of them."""
+    """Saturate the norm of the force f (k,) on several motors, so that it keeps its direction.
+
+    `maximum`, `slope` (k,): bound and slope at 0 of each motor, as in eq. 5.8; if they differ, all motors get the smallest factor. `unit`
+    (k,): the motion of each motor that counts as 1 rad (`mobee.robot.motor_units`).
+    """
     length = float(np.linalg.norm(f / unit))
     shares = maximum / unit / (maximum / unit / slope + length)
     return f * shares.min(initial=np.inf) if len(f) else f
 
 
 def limit_force(s: State) -> Array:
-    """Return f_lim (eqs. 5.12, 5.13): zero inside [q_min + zone, q_max - zone], beyond it a ramp inward of slope f_max / delta.
+    """Return f_lim (eqs. 5.12, 5.13), (n,) rad/s^2, which pushes the motors out of the zones at their limits.
 
-    The ramp continues beyond the limit. The thesis misprints the ranges of the cases; here the force is continuous and points inward.
-    A zone is delta = `limit_width` wide, and narrower where a range is narrow or where the zone ends at home (`limit_zones`).
+    It is 0 inside [q_min + zone, q_max - zone]. Outside it is a ramp that points inward, with slope f_max / delta, and continues beyond the
+    limit. The thesis misprints the ranges of the cases; here the force is continuous and points inward. A zone has the width delta =
+    `limit_width`; it is narrower if the range is narrow or the zone ends at home (`mobee.robot.motor_units.limit_zones`).
     """
     width = s.gains.of_robot("limit_width", s.robot)
     (low, high), (below, above) = s.robot.limits.T, limit_zones(s.robot, width).T
@@ -119,15 +140,16 @@ def limit_force(s: State) -> Array:
 
 
 def clause_force(s: State) -> Array:
-    """Return f_cst (eqs. 5.14 to 5.17), which keeps all clauses satisfied; a clause acts while none of its rows holds with margin.
+    """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied, in the variant of the law that `gains.law` names.
 
-    A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
+    A clause acts while none of its rows holds with a margin of `constraint_width`. A row holds when a.q + b > 0, the convention of the
+    robot files; the thesis prints n.q < b (eq. 5.14).
     """
     return clauses_2014(s) if s.gains.law == "published_2014" else clauses_default(s)
 
 
 def clauses_default(s: State) -> Array:
-    """Return f_cst of the default law: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
+    """Return f_cst of the default law, (n,) rad/s^2: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
 
     The size of the push is computed from the row that is nearest to being satisfied, so that the force is continuous.
     """
@@ -141,7 +163,11 @@ def clauses_default(s: State) -> Array:
 
 
 def clauses_2014(s: State) -> Array:
-    """Return f_cst of the 2014 program: the zone is in units of a.q + b, every row pushes by its own deficit, the sum is clipped to +-1."""
+    """Return f_cst of the 2014 program, (n,) rad/s^2.
+
+    The width of the zone is in units of a.q + b. Every row of an acting clause pushes in proportion to its own deficit, which is 0 where
+    the zone begins and 1 at the boundary. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
+    """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
         deficit = 1.0 - (clause.a @ s.q + clause.b) / s.gains.constraint_width
@@ -151,7 +177,7 @@ def clauses_2014(s: State) -> Array:
 
 
 def contact_force(s: State) -> Array:
-    """Return the collision force f_coll = L(sum over contact points g of J(g)^T f_g) (eq. 5.11).
+    """Return the collision force f_coll = L(sum over contact points g of J(g)^T f_g) (eq. 5.11), (n,) rad/s^2.
 
     f_g = +-depth * normal, in m: each contact of fields pushes the two volumes apart, in proportion to its depth.
     `projected` computes the sum, `bounded_contact` is L.
@@ -162,9 +188,8 @@ def contact_force(s: State) -> Array:
 def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Literal["tree", "part"] = "tree") -> Array:
     """Return the sum in eq. 5.11: J(g)^T f_g over both sides g of every contact of fields, f_g = +-depth * normal; (n,) in m^2/rad.
 
-    `propagate`: "tree": a contact acts on all motors down to the base; "part": on those of the part that touches, as in the original
-    program. `Model` and python-fcl compute the depths, each by its own method. For a robot with a least lever f_g is multiplied by
-    `push_factor`.
+    `propagate`: "tree": a contact acts on all motors from its link down to the base; "part": only on the motors of the part that touches,
+    as in the original program. For a robot with a least lever, f_g is multiplied by `push_factor`.
     """
     frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
@@ -179,10 +204,12 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 
 
 def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
-    """Return 1; for a robot with a least lever, LEVER^2 / (|J|^2 + least_lever^2) times the contact's share in the depth between its links.
+    """Return the factor by which the push of a contact of fields is multiplied; 1 for a robot without a least lever.
 
-    J is the change of the depth when each motor moves by 1 rad (one that slides: by its `unit`). With this factor J^T pushes along the
-    smallest motion that ends the contact, for any lever, and the contacts between two links push as one.
+    For a robot with a least lever it is LEVER^2 / (|J|^2 + least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by
+    the sum of the depths of all contacts of fields between the same two links. J (n,) is the change of the depth per motion of each motor
+    by 1 rad (of a slide, by its `unit`). With this factor J^T pushes along the smallest motion that ends the contact, for any lever, and
+    all contacts between two links together push as one. `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
     """
     if robot.least_lever == 0.0:
         return 1.0
@@ -197,7 +224,10 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
 
 
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
-    """Saturate the sum of eq. 5.11, (n,), by its norm over each part (L of eq. 5.8); the 2014 program squares it first, in degrees."""
+    """Return L of the sum in eq. 5.11: saturate the norm of the force on each part as in eq. 5.8; returns (n,) rad/s^2.
+
+    `torque`: the sum, (n,) m^2/rad. The program of 2014 squares the norm, in degrees, before it is saturated.
+    """
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit
     for part in robot.parts.values():
@@ -209,7 +239,7 @@ def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
 
 
 def joints_of_part(robot: Robot, link: int) -> list[int]:
-    """Return the joints between a link and the first link of its part."""
+    """Return the indices of the joints of a link's own part between the link and the base, the nearest to the link first."""
     part, chain = part_of(robot, link), []
     for j in joints_to(robot, link):
         if part_of(robot, j + 1) != part:
@@ -219,7 +249,10 @@ def joints_of_part(robot: Robot, link: int) -> list[int]:
 
 
 def part_of(robot: Robot, link: int) -> str | None:
-    """Return the part of a link: that of the first motor that drives its joint, else the part of its parent link; None for the base."""
+    """Return the name of the part that moves a link: of the motor that drives its joint, else the part of its parent link.
+
+    `link`: index. None for the base, and for links that no motor moves.
+    """
     matrix, _ = robot.coupling
     for j in joints_to(robot, link):
         driven = np.flatnonzero(matrix[j])

@@ -28,14 +28,17 @@ def cross_matrix(v: Array) -> Array:
 
 
 def rotation(axis: Array, angle: float) -> Array:
-    """Return the rotation by an angle about a unit axis u (Rodrigues): R = I + sin(a) [u] + (1 - cos(a)) [u]^2."""
+    """Return the rotation (3, 3) by an angle a [rad] about a unit axis u (3,): R = I + sin(a) [u] + (1 - cos(a)) [u]^2 (Rodrigues)."""
     turn = cross_matrix(axis)
     turned: Array = np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * turn @ turn
     return turned
 
 
 def joint_motion(joint: Joint, position: float) -> Array:
-    """Return the transform of one joint, (4, 4): a rotation about its axis, x -> R (x - p) + p, or a translation along it."""
+    """Return the transform of one joint, (4, 4): a rotation about its axis, x -> R (x - p) + p, or a translation along its axis.
+
+    `position`: of the joint, rad or m.
+    """
     motion = np.eye(4)
     if joint.kind == "revolute":
         motion[:3, :3] = rotation(joint.axis, position)
@@ -46,7 +49,7 @@ def joint_motion(joint: Joint, position: float) -> Array:
 
 
 def link_frames(robot: Robot, q: Array) -> Array:
-    """Return the transform of every link from its zero pose, (L, 4, 4): the product of the transforms of the joints that carry it."""
+    """Return the transform of every link from zero pose to q (n,) rad, (L, 4, 4), root frame: the product over the joints that carry it."""
     frames = [np.eye(4)]  # link 0 is the base
     for joint, position in zip(robot.joints, joint_positions(robot, q), strict=True):
         frames.append(frames[joint.parent] @ joint_motion(joint, position))  # joint j moves link j + 1
@@ -54,20 +57,20 @@ def link_frames(robot: Robot, q: Array) -> Array:
 
 
 def moved(frame: Array, point: Array) -> Array:
-    """Return a point (3,) transformed by a frame (4, 4)."""
+    """Return the point (3,) m that results when the transform `frame` (4, 4) is applied to a point (3,) m."""
     found: Array = frame[:3, :3] @ point + frame[:3, 3]
     return found
 
 
 def marker_at(robot: Robot, frames: Array, name: str) -> tuple[Array, Array]:
-    """Return position (3,) m and normal (3,) of a marker in the root frame."""
+    """Return the position (3,) m and the normal (3,) of the named marker, root frame; `frames`: (L, 4, 4), as from `link_frames`."""
     marker = robot.marker(name)
     frame = frames[marker.link]
     return moved(frame, marker.position), frame[:3, :3] @ marker.normal
 
 
 def joints_to(robot: Robot, link: int) -> list[int]:
-    """Return the joints between a link and the base, the nearest to the link first."""
+    """Return the indices of the joints between a link (index) and the base, the nearest to the link first."""
     chain = []
     while link > 0:
         chain.append(link - 1)
@@ -76,7 +79,10 @@ def joints_to(robot: Robot, link: int) -> list[int]:
 
 
 def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
-    """Return one joint's column of the Jacobian (eq. 5.1) at a point (3,) that it carries: velocity, then angular velocity, (6,)."""
+    """Return the column of joint j in the Jacobian (eq. 5.1) of a point that it carries, (6,): velocity, then angular velocity.
+
+    `frames`: (L, 4, 4), as from `link_frames`. `point`: (3,) m, root frame, in the pose of `frames`.
+    """
     joint, frame = robot.joints[j], frames[j + 1]  # a joint leaves its own axis where it is, so its link carries the axis too
     axis = frame[:3, :3] @ joint.axis
     if joint.kind == "prismatic":
@@ -85,7 +91,10 @@ def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
 
 
 def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
-    """Return J(q) = dx / dq of a point (3,) of a link, root frame now (eq. 5.1): (6, n), linear rows, then angular, per motor."""
+    """Return the Jacobian J(q) = dx / dq of a point that is fixed to a link (eq. 5.1), (6, n): linear rows, then angular, root frame.
+
+    `frames`: (L, 4, 4), as from `link_frames`. `link`: index. `point`: (3,) m, root frame, in the pose of `frames`.
+    """
     per_joint = np.zeros((6, len(robot.joints)))
     for j in joints_to(robot, link):
         per_joint[:, j] = joint_column(robot, frames, j, point)
@@ -95,13 +104,16 @@ def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
 
 
 def marker_jacobian(robot: Robot, q: Array, name: str) -> Array:
-    """Return the Jacobian of a marker at q (n,) rad, (6, n)."""
+    """Return the Jacobian of the named marker at q (n,) rad, (6, n): linear rows [m/rad], then angular, root frame."""
     frames = link_frames(robot, q)
     return jacobian(robot, frames, robot.marker(name).link, marker_at(robot, frames, name)[0])
 
 
 def weight_torque(robot: Robot, q: Array) -> Array:
-    """Return the torques that carry the robot's weight, (n,) N m: -sum of J^T m g over the masses; zeros where the file has none."""
+    """Return the motor torques that carry the robot's weight at q (n,) rad, (n,) N m: -sum of J^T m g over the masses.
+
+    They are 0 if the robot's file has no masses.
+    """
     frames, torque = link_frames(robot, q), np.zeros(len(q))
     for body in robot.bodies:
         centre = moved(frames[body.link], body.centre)

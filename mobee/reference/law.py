@@ -47,7 +47,11 @@ LEASH = 0.3  # s at full speed: how far the position reference may run ahead of 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The state of the dynamical system; arrays (n,)."""
+    """The state of the dynamical system; arrays (n,) in the order of `robot.motors`.
+
+    `velocity`: rad/s, the system's own q'. `acceleration`: rad/s^2, of the commanded velocity. `sent`: rad/s, the velocity that was
+    commanded last; it differs from `velocity` only for a part that was just put in hold. `reference`: rad, the position command.
+    """
 
     velocity: Array  # rad/s, the system's own q'
     acceleration: Array  # rad/s^2, of the commanded velocity
@@ -56,7 +60,10 @@ class Motion:
 
 
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
-    """Return q" of eq. 5.7 with mass 1: the sum of the terms, and C q*' for an attractor that moves, (n,) rad/s^2."""
+    """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
+
+    `terms`: the forces, each a function of the state; spring and damping are recognised among them.
+    """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
         force = term(state)
@@ -67,16 +74,20 @@ def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
 
 
 def at_rest(robot: Robot, gains: Gains, q: Array) -> Motion:
-    """Return the state at rest at the measured q (n,) rad; the reference of a motor of weight 0 is clipped to its limits."""
+    """Return the state of the dynamical system at rest at the measured q (n,) rad.
+
+    The position reference is q; for a motor of weight 0 in the gains, q clipped to the motor's limits.
+    """
     still = np.zeros(len(q))
     return Motion(still, still, still, np.where(gains.weight(robot.motors) > 0, q, np.clip(q, *robot.limits.T)))
 
 
 def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt: float, speed_scale: float = 1.0) -> Motion:
-    """Advance by dt [s], semi-implicitly: first the velocity, then the position, from the measured q and `wanted` = q" of eq. 5.7.
+    """Advance the dynamical system by dt [s], semi-implicitly (first the velocity, then the position), and return the new state.
 
-    The commanded velocity stays within the motors' limits of velocity (times `speed_scale`) and acceleration. The position reference
-    integrates it, but waits where it is `LEASH` ahead of the motor. Motors of weight 0 are never moved.
+    `q` (n,) rad: measured. `wanted` (n,) rad/s^2: q" of eq. 5.7. The commanded velocity stays within the motors' limits of velocity (times
+    `speed_scale`) and acceleration. The position reference integrates the velocity, but waits while it is ahead of the measured position by
+    the distance of LEASH (0.3 s) at full speed. Motors of weight 0 in the gains are never moved.
     """
     fastest = INSIDE * speed_scale * np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = INSIDE * np.array([motor.max_acceleration for motor in robot.motor_table])
@@ -96,23 +107,30 @@ def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt
 
 
 def hold(robot: Robot, motion: Motion, part: str) -> Motion:
-    """Set a part's own velocity to 0; the commanded velocity follows as fast as the acceleration limit allows."""
+    """Return the state after the part is put in hold: its velocity and acceleration are 0.
+
+    The commanded velocity (`sent`) is not changed here; in later steps it decreases as fast as the acceleration limit allows.
+    """
     stopped = np.zeros(len(motion.velocity), dtype=bool)
     stopped[robot.part(part).slice] = True
     return replace(motion, velocity=np.where(stopped, 0.0, motion.velocity), acceleration=np.where(stopped, 0.0, motion.acceleration))
 
 
 def torque(robot: Robot, motion: Motion, q: Array) -> Array:
-    """Return the torque command (n,) N m: inertia, friction, and the robot's weight at q (n,) rad."""
+    """Return the torque command, (n,) N m: the torques for acceleration, viscous friction and the robot's weight at q (n,) rad.
+
+    Each is clipped to the motor's largest torque.
+    """
     most = np.array([motor.max_torque for motor in robot.motor_table])
     wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + weight_torque(robot, q)
     return np.clip(wanted, -most, most)
 
 
 def is_settled(robot: Robot, gains: Gains, motion: Motion, part: str) -> bool:
-    """Return whether a part has come to rest (thesis 6.1): no motor is commanded beyond the settle speed and acceleration.
+    """Return whether a part has settled (thesis 6.1): no motor is commanded beyond the settle speed and the settle acceleration.
 
-    This is checked `first_check` s after the action began, then every `interval` s, until `timeout`.
+    The bounds are in `gains.settle`. The caller checks this `first_check` s after the action began, then every `interval` s, until
+    `timeout`.
     """
     where, unit = robot.part(part).slice, fine_units(robot)
     slow = np.abs(motion.velocity) <= gains.settle.speed * unit

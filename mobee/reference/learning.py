@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The transition model and planning of a curious agent: Algorithms 6 and 7 and the start of Algorithm 8 (thesis 6.4, 6.5).
 
-T(s, a) (thesis eq. 6.1) is the distribution of the states in which action a of state s ends. It is kept as counts of observed
-outcomes, only for states that were an outcome: eqs. 6.2 to 6.4 say which states those can be.
+T(s, a) (thesis eq. 6.1) is the distribution of the states in which action a of state s ends. It is stored as counts of observed
+outcomes, with a count only for states that were an outcome; eqs. 6.2 to 6.4 say which states can be outcomes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ IMAGINED = {"50-50": ("stay", "goal"), "60-40": ("stay", "goal", "goal")}  # out
 
 
 def observe(bins: Bins, outcome: int) -> tuple[Bins, float]:
-    """Count an outcome of a state-action (Algorithm 6); return the new counts and the reward R = KL(P || T) in nats (eq. 6.5).
+    """Count an outcome (state) of a state-action (Algorithm 6); return the new counts and the reward R = KL(P || T) in nats (eq. 6.5).
 
     T is the distribution before the observation, P that after it: sum over the bins j of ln(P_j / T_j) P_j. Examples: eqs. 6.6 to 6.9.
     """
@@ -28,7 +28,11 @@ def observe(bins: Bins, outcome: int) -> tuple[Bins, float]:
 
 
 def imagined(state: int, goal: int, initial: str = "50-50") -> tuple[Bins, float]:
-    """Return the counts of an action before it was tried, from imagined outcomes, and its first reward (Algorithm 8, table 6.1)."""
+    """Return the counts of an action before it is tried, from imagined outcomes, and its first reward in nats (Algorithm 8, table 6.1).
+
+    `state`, `goal`: the state of the action and its goal. `initial`: "50-50" (one failure, which stays in the state, and one success) or
+    "60-40" (one failure and two successes).
+    """
     bins, reward = Bins(), 0.0
     for end in IMAGINED[initial]:
         bins, reward = observe(bins, state if end == "stay" else goal)
@@ -36,30 +40,34 @@ def imagined(state: int, goal: int, initial: str = "50-50") -> tuple[Bins, float
 
 
 def forget(bins: Bins, floor: Bins, factor: float) -> Bins:
-    """Multiply the real counts by `factor`, before each observation of an agent that forgets; imagined counts stay.
+    """Multiply the counts of real observations by `factor` and return all counts; an agent that forgets does this before each observation.
 
-    `floor`: the imagined counts; 1 for every other bin.
+    Imagined counts are not changed. `floor`: the imagined count of each bin; 1 for a bin that it does not contain.
     """
     return {end: floor.get(end, 1.0) + factor * (count - floor.get(end, 1.0)) for end, count in bins.items()}
 
 
 def observe_among_all(counts: Array, outcome: int) -> tuple[Array, float]:
-    """Count an outcome among all states, each counted once before (thesis 6.4.2); return the new counts (S,) and the reward in nats."""
+    """Count an outcome in a model with a bin for each state (thesis 6.4.2); return the new counts (S,) and the reward in nats.
+
+    `counts`: (S,), 1 for each state before the first observation. `outcome`: index of a state.
+    """
     after = counts.copy()
     after[outcome] += 1.0
     return after, kl_divergence(after, counts)
 
 
 def probabilities(bins: Bins) -> Bins:
-    """Return T(s, a) as a distribution: each count divided by their sum (thesis eq. 6.1)."""
+    """Return T(s, a) as a distribution, state -> probability: each count divided by the sum of all counts (thesis eq. 6.1)."""
     total = sum(bins.values())
     return {end: count / total for end, count in bins.items()}
 
 
 def action_values(outcomes: Ints, chances: Array, reward: Array, discount: float, values: Array) -> Array:
-    """Return Q(s, a) = R(s, a) + discount * sum over s' of T(s, a, s') V(s'), (S, A), from `outcomes` and `chances` (S, A, B).
+    """Return Q(s, a) = R(s, a) + discount * sum over s' of T(s, a, s') V(s'), (S, A).
 
-    -inf where there is no action: where the reward is -inf, or all chances are 0.
+    `outcomes` (S, A, B): the states s' of the B bins of each state-action; `chances` (S, A, B): their probabilities T. `reward` (S, A): R.
+    `values` (S,): V. A state-action does not exist if its reward is -inf or all its probabilities are 0; its Q is -inf.
     """
     exists = chances.any(axis=-1) & (reward != -np.inf)
     return np.where(exists, reward + discount * (chances * values[outcomes]).sum(axis=-1), -np.inf)
@@ -68,10 +76,11 @@ def action_values(outcomes: Ints, chances: Array, reward: Array, discount: float
 def value_iteration(
     outcomes: Ints, chances: Array, reward: Array, discount: float = 0.9, tolerance: float = 1e-3, start: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return V (S,) and Q (S, A), by sweeps until no action's value changes by the tolerance or more (Algorithm 7).
+    """Return V (S,) and Q (S, A), computed by sweeps until no Q changes by `tolerance` or more (Algorithm 7).
 
-    The thesis prints the change without its absolute value, which would stop at once where values have to fall. A state without
-    actions keeps its value of `start` (S,), 0 if None.
+    `outcomes` (S, A, B): the states in the B bins of each state-action; `chances` (S, A, B): their probabilities. `reward` (S, A); -inf:
+    no such action. `start` (S,): first values, None: 0; a state without actions keeps its value. The thesis prints the change without its
+    absolute value, with which the sweeps would end too early whenever values have to decrease.
     """
     values = np.zeros(len(outcomes)) if start is None else start
     exists = chances.any(axis=-1) & (reward != -np.inf)

@@ -26,7 +26,13 @@ WORD = 2**64 - 1  # mask of 64 bits
 
 @dataclass(slots=True, eq=False)
 class MotorState:
-    """The state of all motors of a robot; arrays (n,). `line`: delayed commands, a row for each substep, the newest last."""
+    """The state of all n motors of a robot; arrays (n,). A motor has a motor side and a joint side, with play between them.
+
+    `q` (rad), `velocity` (rad/s): of the joint side. `motor_q`, `motor_velocity`: of the motor side. `mode`: "position", "velocity",
+    "torque" or "hold". `reference`: rad, rad/s or N m, by mode. `resting`, `rest`: in hold, whether the motor is at rest, and where [rad].
+    `load`: N m, the robot's weight, which acts on motors in torque mode. `line`: the delayed commands (rad/s; N m in torque mode), one (n,)
+    for each substep, the newest last.
+    """
 
     q: Array  # rad, joint side
     velocity: Array  # rad/s, joint side
@@ -41,22 +47,23 @@ class MotorState:
 
 
 def at_rest(robot: Robot, parameters: MotorParameters, q: Array, dt: float) -> MotorState:
-    """Return the state with every motor in hold at q (n,) rad; `dt`: the length of all substeps [s]."""
+    """Return the state of the motors with every motor in hold and at rest at q (n,) rad; `dt`: the length of a substep [s]."""
     n, zero = len(q), np.zeros(len(q))
     line = [zero] * (int(substeps_late(robot, parameters, dt).max(initial=0)) + 1)
     return MotorState(q, zero, q, zero, np.full(n, "hold", dtype="<U8"), zero, np.ones(n, dtype=bool), q, zero, line)
 
 
 def substeps_late(robot: Robot, parameters: MotorParameters, dt: float) -> NDArray[np.int_]:
-    """Return the delay of each motor, rounded to substeps of dt [s]."""
+    """Return the delay of each motor's commands, (n,), as a whole number of substeps of dt [s]."""
     return np.round(parameters.of_robot("delay", robot) / dt).astype(int)
 
 
 def command(s: MotorState, where: slice, mode: str, reference: Array | None = None) -> None:
-    """Set mode and reference of some motors; a hold has no reference.
+    """Set the mode and the reference of some motors, in place; `where`: their slice of q.
 
-    Where the mode changes, the delayed commands would have another unit: they are replaced by the motor's present velocity, or by the
-    torque that carries its load. In torque mode the gear is rigid, so the motor side starts at the joint's position.
+    `mode`: "position" (reference in rad), "velocity" (rad/s), "torque" (N m) or "hold" (None). If the mode of a motor changes, its delayed
+    commands would have another unit: they are replaced by the motor's present velocity, or by the torque that carries its load. In torque
+    mode the gear is rigid, so the motor side starts at the joint's position.
     """
     if reference is not None:
         s.reference = s.reference.copy()
@@ -72,7 +79,7 @@ def command(s: MotorState, where: slice, mode: str, reference: Array | None = No
 
 
 def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> Array:
-    """Advance the motor side by a substep of dt [s]; return where it drags the joint side, (n,) rad."""
+    """Advance the motor sides by a substep of dt [s]; return the positions (n,) rad to which they drag the joint sides."""
     fastest = np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = np.array([motor.max_acceleration for motor in robot.motor_table])
     strongest = np.array([motor.max_torque for motor in robot.motor_table])
@@ -91,20 +98,27 @@ def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -
 
 
 def servo(s: MotorState, position: Array, fastest: Array) -> Array:
-    """Return the velocity (n,) rad/s towards a position (n,) rad."""
+    """Return the velocity (n,) rad/s with which the motors move towards a position (n,) rad, proportional to the distance.
+
+    `fastest` (n,) rad/s: the largest velocities.
+    """
     return np.clip(SERVO_GAIN * (position - s.motor_q), -fastest, fastest)
 
 
 def velocity_response(s: MotorState, asked: Array, lag: Array, friction: Array, dt: float) -> Array:
-    """Return the velocity after a substep dt under the velocity command `asked`: lag dv/dt = u - v - friction sign(v), solved exactly."""
+    """Return the velocity (n,) rad/s after a substep of dt [s] under the velocity command u = `asked` (n,) rad/s.
+
+    It is the exact solution of lag dv/dt = u - v - friction sign(v), with `lag` (n,) s and `friction` (n,) rad/s.
+    """
     share = np.where(lag > 0.0, 1.0 - np.exp(-dt / np.where(lag > 0.0, lag, 1.0)), 1.0)
     return nearer_to_zero(s.motor_velocity + share * (asked - s.motor_velocity), share * friction)
 
 
 def torque_response(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
-    """Return the velocity after a substep dt under the torque `asked`, within the motors' limits on velocity and acceleration.
+    """Return the velocity (n,) rad/s after a substep of dt [s] under the torque tau = `asked` (n,) N m.
 
-    I dv/dt = tau - load - B v - B friction sign(v)
+    I dv/dt = tau - load - B v - B friction sign(v), with the inertia I, the viscous friction B and `friction` (n,) rad/s. `fastest` (n,)
+    rad/s and `hardest` (n,) rad/s^2 bound velocity and acceleration.
     """
     push = np.clip((asked - s.load - VISCOUS * s.motor_velocity) / INERTIA, -hardest, hardest)
     slowed = nearer_to_zero(s.motor_velocity + push * dt, VISCOUS * friction / INERTIA * dt)
@@ -112,7 +126,10 @@ def torque_response(s: MotorState, asked: Array, friction: Array, fastest: Array
 
 
 def held(s: MotorState, fastest: Array, change: Array) -> Array:
-    """Return the velocity of a motor that brakes to rest and then stays there."""
+    """Return the velocity (n,) rad/s of motors in hold, which brake to rest and then stay at this position; updates `rest`, `resting`.
+
+    `fastest` (n,) rad/s: the largest velocities. `change` (n,) rad/s: the largest change of the velocity in this substep.
+    """
     arrived = (s.mode == "hold") & ~s.resting & (np.abs(s.motor_velocity) <= change)
     s.rest = np.where(arrived, s.motor_q, s.rest)
     s.resting = s.resting | arrived
@@ -121,12 +138,15 @@ def held(s: MotorState, fastest: Array, change: Array) -> Array:
 
 
 def nearer_to_zero(x: Array, by: Array) -> Array:
-    """Return x reduced in size by `by`, at most to 0 (Coulomb's friction)."""
+    """Return x with its absolute value reduced by `by`, but not below 0, element by element (Coulomb friction)."""
     return np.copysign(np.maximum(np.abs(x) - by, 0.0), x)
 
 
 def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
-    """Set the joint side (n,) rad at the end of a substep; the motor side follows within the play, also when the joint is blocked."""
+    """Set the positions q (n,) rad of the joint sides at the end of a substep of dt [s], and their velocities, in place.
+
+    The motor side stays within the play of the joint side, also when the joint is blocked; in torque mode both move together.
+    """
     torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
     s.velocity, s.q = (q - s.q) / dt, q
     s.motor_q = np.where(torque, q, np.clip(s.motor_q, q - half, q + half))
@@ -134,19 +154,22 @@ def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt
 
 
 def substep(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> None:
-    """Advance a robot without physics by dt [s]: the joints follow their motors, as far as the hard stops."""
+    """Advance the motors of a robot without a physics engine by dt [s], in place: the joints follow their motors up to the hard stops."""
     adopt(robot, parameters, s, np.clip(drive(robot, parameters, s, dt), *robot.limits.T), dt)
 
 
 def encoders(robot: Robot, parameters: MotorParameters, s: MotorState, seed: int, k: int, dt: float) -> Array:
-    """Return the encoder values (n,) rad at tick k, with white noise whose strength does not depend on the tick's length dt [s]."""
+    """Return the encoder values (n,) rad at tick k, with white noise that depends on `seed`.
+
+    The noise of a tick is scaled by 1 / sqrt(dt), so that its spectral density does not depend on the length dt [s] of a tick.
+    """
     strength = parameters.encoder_noise * math.sqrt(NOISE_PERIOD / dt) * fine_units(robot)
     read: Array = s.q + strength * np.array([normal(seed, k, motor) for motor in range(len(s.q))])
     return read
 
 
 def normal(seed: int, k: int, motor: int) -> float:
-    """Return a standard normal number, a pure function of seed, tick and motor (Box and Muller)."""
+    """Return a random number of the standard normal distribution, a pure function of the seed, the tick k and the motor (Box-Muller)."""
     one = mixed(mixed(mixed(seed & WORD) ^ k) ^ mixed(motor // 2))
     radius = math.sqrt(-2.0 * math.log(((one >> 11) + 1) * 2.0**-53))
     angle = 2.0 * math.pi * ((mixed(one) >> 11) * 2.0**-53)
@@ -154,7 +177,7 @@ def normal(seed: int, k: int, motor: int) -> float:
 
 
 def mixed(x: int) -> int:
-    """Return the next number of splitmix64 after x (Steele, Lea, Flood 2014)."""
+    """Return a 64-bit hash of the 64-bit number x: one step of the generator splitmix64 (Steele, Lea, Flood 2014)."""
     x = (x + 0x9E3779B97F4A7C15) & WORD
     x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & WORD
     x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & WORD

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plant in plain Python, tick by tick: robot, motors, model and law, with the law as a list of terms.
 
-It is where a new force can be tried before it is compiled (see `law`): hundreds of times slower than `mobee.OfflinePlant`, with the
-same numbers up to rounding.
+It is for trying a new force before the force is compiled (`mobee.reference.law`). It is hundreds of times slower than
+`mobee.OfflinePlant`, with the same numbers up to rounding.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROUNDING = 1e-9  # s: tolerance of times, which are sums of ticks
 
 
 class Plant:
-    """A plant in the velocity modality, as the original; a command moves the motors from the next tick on."""
+    """A plant whose motors receive velocity commands, as in the original program; a command moves the motors from the next tick on."""
 
     def __init__(
         self,
@@ -34,7 +34,11 @@ class Plant:
         dt: float = 0.01,
         terms: Sequence[law.Term] = law.TERMS,
     ) -> None:
-        """Start at rest at the robot's home; `seed`: of the encoders' noise; `dt`: the tick [s]; `terms`: the forces of eq. 5.7."""
+        """Make a plant at rest at the robot's home.
+
+        `seed`: of the encoders' noise. `gains`, `parameters`: of the law and the motors; None: the defaults. `dt`: length of a tick [s].
+        `terms`: the forces of eq. 5.7, each a function of the `State`.
+        """
         self.model, self.robot, self.seed, self.dt, self.terms = model, model.robot, seed, dt, terms
         self.gains = Gains.default() if gains is None else gains
         self.parameters = MotorParameters() if parameters is None else parameters
@@ -48,7 +52,7 @@ class Plant:
         self.q = self.robot.home.copy()  # the last encoder values, rad
 
     def tick(self) -> None:
-        """Run one control tick: the command comes into force; encoders, contacts, law; then the motors move."""
+        """Run one control tick: apply the last command, read the encoders, compute contacts and the law, and move the motors."""
         self.ticks += 1
         if self.ticks > 1:
             motors.command(self.motors, slice(None), "velocity", self.motion.velocity)
@@ -59,12 +63,15 @@ class Plant:
 
     @property
     def state(self) -> State:
-        """The input of the law at the last encoder values."""
+        """The input of the control law at the last encoder values; every access computes the contacts."""
         contacts = self.model.evaluate(self.q).contacts
         return State(self.robot, self.gains, self.q, self.motion.velocity, self.attractor, contacts, self.force, self.pushes)
 
     def act(self, part: str, target: Array) -> bool:
-        """Go towards a target (n_part,) rad until the part has settled (thesis 6.1); return False if its time is up before."""
+        """Set the part's attractor to `target` (n_part,) rad and run ticks until the part has settled (thesis 6.1).
+
+        Returns True, or False if the part has not settled before the timeout of the settle test.
+        """
         self.attractor[self.robot.part(part).slice] = target
         settle, since = self.gains.settle, 0.0
         look = settle.first_check

@@ -47,7 +47,12 @@ NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that no motor moves
 
 @dataclass(slots=True, eq=False)
 class Reach:
-    """A reach in progress: its motors, and the state of the default law from tick to tick."""
+    """A reach in progress: its motors, and the state of the default law from tick to tick.
+
+    `motors`: (m,) indices of the motors that are pulled. `seen`: (6,) m, the error, averaged against the encoders' noise. `remaining`: m,
+    the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then. `escape`: (m,) rad, the last direction out of a singular
+    pose; None: none.
+    """
 
     robot: Robot
     gains: Gains
@@ -62,12 +67,15 @@ class Reach:
 
     @property
     def is_approaching(self) -> bool:
-        """Whether the marker has not arrived and still comes nearer; if so, the reach is not over, however slow the motors are."""
+        """Whether the marker has not arrived and still comes nearer: then the reach must continue, even if all motors are slow."""
         return self.remaining > 0.75 * TOLERANCE and self.since < WAIT
 
 
 def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
-    """Return a reach with the motors of a part, or of the whole body, that may be moved and that move the marker."""
+    """Return the state of a new reach of `marker` for `target`.
+
+    Its motors are those of the named part, or of the whole body if `part` is None, that move the marker and have a weight above 0.
+    """
     moving = (robot.coupling[0][joints_to(robot, robot.marker(marker).link)] != 0.0).any(axis=0) & (gains.weight(robot.motors) > 0)
     if part is not None:
         moving[: robot.part(part).slice.start] = moving[robot.part(part).slice.stop :] = False
@@ -76,7 +84,12 @@ def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: Rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The errors of the marker in a pose, and its derivatives."""
+    """The errors of a reaching marker in a pose, and the derivatives of its position and rotation.
+
+    `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
+    n*. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
+    `drives`: (k, m), motion of these joints for each of the m pulled motors, in the motor's unit of the law.
+    """
 
     error: Array  # (3,) m, from the marker to its goal
     turn: Array  # (3,) n x n*, the axis about which the normal should turn
@@ -86,13 +99,13 @@ class View:
 
     @property
     def jacobian(self) -> Array:
-        """The marker's Jacobian with respect to the pulled motors, (6, m)."""
+        """The marker's Jacobian with respect to the m pulled motors, (6, m): linear rows, then angular, root frame."""
         found: Array = self.columns.T @ self.drives
         return found
 
 
 def view(r: Reach, q: Array) -> View:
-    """Return the errors of the marker's position and normal, and their derivatives by the joints, at q (n,) [rad]."""
+    """Return the errors of the marker's position and normal at q (n,) rad, and the derivatives by the joints."""
     frames, target = link_frames(r.robot, q), r.target
     place, normal = marker_at(r.robot, frames, r.marker)
     error = target.position - place
@@ -109,7 +122,10 @@ def view(r: Reach, q: Array) -> View:
 
 
 def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
-    """Return the force of a reach in eq. 5.7, (n,) rad/s^2; `against` (n,): all other forces but the springs; `dt`: the tick [s]."""
+    """Return the force of a reach as a term of eq. 5.7, (n,) rad/s^2, and update the state of the reach.
+
+    `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the springs.
+    """
     total, seen = np.zeros(len(s.q)), view(r, s.q)
     if r.gains.law == "published_2014":
         total[r.motors] = bounded(r, published(r, seen))
@@ -122,7 +138,7 @@ def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
 
 
 def bounded(r: Reach, force: Array) -> Array:
-    """Saturate a force on the pulled motors (m,), with the bounds of a client's force."""
+    """Saturate a force on the m pulled motors, (m,), with the bounds of a client's force; returns (m,) in the units of the motors."""
     maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
     unit = motor_units(r.robot)[r.motors]
     if r.gains.client_squash == "each":
@@ -131,16 +147,21 @@ def bounded(r: Reach, force: Array) -> Array:
 
 
 def published(r: Reach, v: View) -> Array:
-    """Return the force of the 2014 program: J^T f, f = 5000 (x* - x); for a normal the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*)."""
+    """Return the force of the 2014 program on the m pulled motors, (m,), not yet saturated: J^T f.
+
+    The force on the marker is 5000 (x* - x). For a wanted normal n* the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*) is added. The 5000 are
+    deg/s^2 for a lever and a distance of 1 m; here they are converted to rad/s^2.
+    """
     twist = 0.5 * float(np.linalg.norm(v.error)) * (1.0 - v.facing) * v.turn
     force: Array = FORCE_GAIN * v.jacobian.T @ np.concatenate([v.error, twist])
     return force
 
 
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
-    """Return the force of the default law on the pulled motors (m,), not yet bounded, and the shift of their springs, (m,).
+    """Return the force of the default law on the m pulled motors, (m,), not yet saturated, and the shift of their springs, (m,) rad.
 
-    The shift moves the arm out of a singular pose.  `against` (n,): all other forces but the springs.
+    The shift moves the arm out of a singular pose; it is 0 in other poses.  `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all
+    other forces except the springs. The state of the reach is updated.
     """
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
@@ -159,14 +180,20 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
 
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
-    """Return Jacobian (rows, m) and error (rows,), in m: three rows, or six with a wanted normal."""
+    """Return the Jacobian (rows, m) and the error (rows,) of the reach, in m: three rows, or six if the target has a wanted normal.
+
+    The last three rows are those of the rotation, multiplied by ARM (0.1 m).
+    """
     if r.target.normal is None and not r.target.faces:
         return v.jacobian[:3], v.error
     return v.jacobian * np.repeat([1.0, ARM], 3)[:, None], np.concatenate([v.error, ARM * v.turn])
 
 
 def note_error(r: Reach, error: Array, dt: float) -> None:
-    """Average the error over SMOOTH, and count the time since it last decreased."""
+    """Update the averaged error of the reach with `error` [m], and the time since the averaged error last decreased.
+
+    The average is exponential with the time constant SMOOTH (0.25 s); `dt`: the tick [s].
+    """
     seen = r.seen[: len(error)]
     seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
     r.remaining = float(np.linalg.norm(seen))
@@ -176,7 +203,11 @@ def note_error(r: Reach, error: Array, dt: float) -> None:
 
 
 def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
-    """Return E: the velocity of each motor for a torque of 1, slope of the squash over damping; 0 for a motor at its limit."""
+    """Return the mobility E of the m pulled motors, (m,): the velocity of each motor per unit of force.
+
+    It is the slope of the saturation at 0 divided by the damping, and 0 for a motor in the outer half of a limit zone that the reach would
+    move farther outward. `slope` (m,): the decrease of half the squared error along each motor.
+    """
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
     kept = ((q < low)[r.motors] & (slope < 0.0)) | ((q > high)[r.motors] & (slope > 0.0))
@@ -185,7 +216,11 @@ def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
 
 
 def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Array) -> Array:
-    """Return the force on the marker (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable pull."""
+    """Return the force on the marker, (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable motion.
+
+    `marker_mobility` (rows, rows): J E J^T / size. `pull` (rows,): the wanted motion. `mobility` (m,): E. The damping is doubled until the
+    stiffness from the curvature of the marker's path is below RATE (5 1/s).
+    """
     soft = SOFT
     while True:
         push: Array = np.asarray(np.linalg.solve(marker_mobility + soft * np.eye(len(marker_mobility)), pull), dtype=np.float64)
@@ -196,9 +231,10 @@ def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Arr
 
 
 def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
-    """Return the stiffness that comes from the curvature of the marker's path: -E^1/2 (push . d2x/dq2) E^1/2, (m, m).
+    """Return the stiffness that the curvature of the marker's path adds to the reach, (m, m): -E^1/2 (push . d2x/dq2) E^1/2.
 
-    For joints a and b, with a nearer to the base, the second derivative of the path is the cross product of a's axis and b's motion.
+    `push` (rows,): the force on the marker. `mobility` (m,): E. For joints a and b, with a nearer to the base, the second derivative of the
+    path is the cross product of the axis of a and the marker's motion with b.
     """
     count = len(v.columns)
     along = np.zeros((count, count))
@@ -214,7 +250,10 @@ def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
 
 
 def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[float, Array]:
-    """Return the largest eigenvalue of a symmetric matrix and its vector, by power iteration; entries of motors with mobility 0 are 0."""
+    """Return the largest eigenvalue of a symmetric matrix (m, m), and its eigenvector (m,), by power iteration with `turns` steps.
+
+    The entries of the eigenvector are 0 for motors with a `mobility` (m,) of 0.
+    """
     shift = float(np.linalg.norm(matrix))  # makes it the largest in absolute value too
     vector: Array = 1.0 + 0.1 * np.arange(len(matrix), dtype=np.float64)
     length = 0.0
@@ -226,7 +265,11 @@ def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[floa
 
 
 def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobility: Array, size: float, pull: Array) -> Array:
-    """Return the force (m,) without its component against limits and other forces: the motors slide along these as along a wall."""
+    """Return the force on the m pulled motors, (m,), without its component against limits and other forces.
+
+    So the motors slide along limits and contacts as along a wall. `against` (n,) rad/s^2: the sum of all other forces except the springs.
+    `force` (m,): of the reach without walls. `mobility` (m,): E. `size`: norm of J E J^T. `pull` (rows,): the wanted motion of the marker.
+    """
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]
     limited = np.where(limit * force < 0.0, np.abs(limit) / unit, 0.0)  # of each motor alone
@@ -247,7 +290,11 @@ def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobil
 
 
 def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
-    """Return a direction (m,) out of a singular pose: the error decreases along it and against it; zeros if there is none."""
+    """Return a unit vector (m,) of motor motions that leads out of a singular pose; 0 if there is none.
+
+    Along this vector, and along its opposite, the error decreases to second order (negative curvature). The sign is that of the last tick;
+    in the first tick the vector points towards the middle of the motors' ranges. `mobility` (m,): E. `size`: norm of J E J^T.
+    """
     curve = np.empty((len(r.motors), len(r.motors)))
     for k, motor in enumerate(r.motors):
         probe = np.zeros(len(q))
@@ -266,7 +313,7 @@ def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
 
 
 def slope_at(r: Reach, q: Array) -> Array:
-    """Return the decrease of half the squared error along each pulled motor, at q (n,) rad."""
+    """Return the decrease of half the squared error per motion of each of the m pulled motors, (m,), at q (n,) rad."""
     jacobian, error = rows(r, view(r, q))
     slope: Array = jacobian.T @ error
     return slope

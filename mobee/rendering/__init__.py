@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of robots and worlds, computed on the CPU and without a display: what an eye sees, poses, filmstrips, clouds of points."""
+"""Pictures of robots and worlds, computed on the CPU and without a display: camera pictures, poses, filmstrips, clouds of points."""

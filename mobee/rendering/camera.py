@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras: parallel, with the same scale at every distance, or perspective, as an eye."""
+"""Cameras of pictures: parallel (the scale is the same at every distance) or perspective (as an eye)."""
 
 from __future__ import annotations
 
@@ -32,11 +32,16 @@ NEAREST = 0.03  # m: a perspective camera does not see what is nearer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A picture of width x height pixels, of `scale` pixels per metre.
+    """A camera whose picture has width x height pixels.
 
-    `axes` (3, 3): rows are right, up and ahead of the camera, in the root frame.  `corner`: right and up [m] of the picture's upper left
-    corner.  `eye` (3,) m, root frame: where the rays of a perspective picture begin; scale and corner are then those of the plane
-    1 m ahead of it.  None: the rays are parallel.
+    Attributes:
+        axes: (3, 3), rows are the directions right, up and ahead of the camera, in the root frame.
+        corner: (2,) m, upper left corner of the picture, to the right and up in these axes.
+        scale: pixels per metre.
+        width: columns.
+        height: rows.
+        eye: (3,) m, root frame, where the rays of a perspective picture begin; corner and scale then belong to the plane 1 m ahead of it.
+            None: the rays are parallel.
     """
 
     axes: Array
@@ -47,17 +52,17 @@ class Camera:
     eye: Array | None = None
 
     def finer(self, times: int) -> Camera:
-        """Return a camera of the same view with `times` as many pixels in both directions."""
+        """Return a camera with the same view and `times` as many pixels in both directions."""
         return replace(self, scale=self.scale * times, width=self.width * times, height=self.height * times)
 
     def pixels(self, points: Array) -> Array:
-        """Return column and row (..., 2), from the upper left corner, of points (..., 3) m in the picture of a parallel camera."""
+        """Return the column and row (..., 2), from the upper left corner, of points (..., 3) m, root frame; for parallel cameras only."""
         flat = points @ self.axes[:2].T - self.corner
         found: Array = self.scale * flat * np.array([1.0, -1.0])
         return found
 
     def rays(self) -> Rays:
-        """Return the rays through the middles of the pixels."""
+        """Return the rays through the centres of the pixels, in the form that the compiled core reads."""
         axes, step = self.axes * np.array([[1.0], [-1.0], [1.0]]), 1.0 / self.scale
         left, top = float(self.corner[0]) + 0.5 * step, 0.5 * step - float(self.corner[1])
         if self.eye is None:
@@ -66,13 +71,20 @@ class Camera:
 
 
 def eye_camera(position: Array, axes: Array, width: int, height: int, view_deg: float) -> Camera:
-    """Return the perspective camera at a position (3,) m with a vertical field of view [degrees]; `axes` as those of Camera."""
+    """Return the perspective camera at `position` (3,) m, root frame.
+
+    `axes`: (3, 3), rows are the directions right, up and ahead. `view_deg`: vertical field of view [degrees]. `width`, `height`: pixels.
+    """
     scale = 0.5 * height / float(np.tan(0.5 * np.deg2rad(view_deg)))
     return Camera(axes, np.array([-0.5 * width, 0.5 * height]) / scale, scale, width, height, position)
 
 
 def camera_axes(view: str | tuple[float, float]) -> Array:
-    """Return the axes (3, 3) of a view: its name in VIEWS, or azimuth and elevation [degrees]; raises UnknownName."""
+    """Return the axes of a camera, (3, 3), rows right, up and ahead, for a view.
+
+    `view`: a name in VIEWS, or azimuth and elevation [degrees]; azimuth 0 is in front of a robot that looks along -x, as the iCub does, and
+    90 is at its right. Raises UnknownName for an unknown name.
+    """
     if isinstance(view, str):
         if view not in VIEWS:
             raise UnknownName("view", view, VIEWS)
@@ -84,7 +96,10 @@ def camera_axes(view: str | tuple[float, float]) -> Array:
 
 
 def framing(axes: Array, solids: Sequence[Solid], points: Array, height: int, margin: float = MARGIN) -> Camera:
-    """Return the parallel camera whose picture, `height` pixels high, holds solids and points (P, 3) m with a margin [m] around them."""
+    """Return the parallel camera whose picture shows all solids and points (P, 3) m, root frame, with a margin around them.
+
+    `axes`: (3, 3), rows right, up and ahead of the camera. `height`: rows of the picture. `margin`: m.
+    """
     seen = [points @ axes[:2].T] if len(points) else []
     for sign in (1.0, -1.0):
         if solids:
@@ -95,11 +110,15 @@ def framing(axes: Array, solids: Sequence[Solid], points: Array, height: int, ma
 
 
 class Raster:
-    """The nearest surface in each pixel of a picture.
+    """The nearest surface in each pixel of a picture of H x W pixels.
 
-    `depth` (H, W) m along the camera's axis, from the eye or, with parallel rays, from the root frame's origin; infinite where there is
-    nothing.  `normal` (H, W, 3), root frame.  `which` (H, W): the number of the solid, -1 where there is nothing; `group` likewise.
-    `color` (H, W, 3).
+    Attributes:
+        depth: (H, W) m along the camera's axis, from the eye or, with parallel rays, from the root frame's origin; infinite where there is
+            nothing.
+        normal: (H, W, 3), of the surface, root frame.
+        which: (H, W), number of the solid; -1 where there is nothing.
+        group: (H, W), group of the solid; -1 where there is nothing.
+        color: (H, W, 3), of the solid, 0 to 1.
     """
 
     def __init__(self, camera: Camera, solids: Sequence[Solid] = ()) -> None:
@@ -113,12 +132,12 @@ class Raster:
         self.color: Floats = colors[self.which]
 
     def points(self) -> Floats:
-        """Return the visible surface points (N, 3) m, root frame, one for each pixel that is not empty; for a parallel camera."""
+        """Return the visible surface points (N, 3) m, root frame, one for each pixel that shows a surface; for parallel cameras only."""
         return places(self.camera, self.depth, np.isfinite(self.depth))
 
 
 def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
-    """Return the points (N, 3) m, root frame, at the depths (H, W) m of a parallel camera's pixels, for the pixels `which` (H, W)."""
+    """Return the points (N, 3) m, root frame, that the pixels `which` (H, W) of a parallel camera show at the depths (H, W) m."""
     right, up = pixel_middles(camera)
     rows, columns = np.nonzero(which)
     found: Floats = np.stack([right[columns], up[rows], depth[which]], axis=1) @ camera.axes.astype(np.float32)
@@ -126,7 +145,10 @@ def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
 
 
 def pixel_middles(camera: Camera) -> tuple[Floats, Floats]:
-    """Return the middles of the pixels: of each column to the right (W,) m, and of each row upwards (H,) m, in the camera's axes."""
+    """Return the centres of a camera's pixels: of each column, to the right, (W,) m, and of each row, upwards, (H,) m.
+
+    Both are measured along the camera's axes.
+    """
     right = camera.corner[0] + (np.arange(camera.width) + 0.5) / camera.scale
     up = camera.corner[1] - (np.arange(camera.height) + 0.5) / camera.scale
     return right.astype(np.float32), up.astype(np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coloured volumes and meshes of a robot's links: those that its file draws, and the solids of links for which it draws nothing."""
+"""The coloured volumes and meshes that are drawn for a robot's links: the visuals of its file, else the solids of the link."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ PALENESS = 0.72  # share of white in the colour of parts that do not matter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkSolid:
-    """A coloured volume or mesh on a link of a part, in the root frame at zero pose.
+    """A coloured volume or mesh that is drawn on a link.
 
-    `collides`: it is one of the robot's solids; others are drawn only.
+    `link`: number of the link. `part`: name of the part that moves it. `solid`: in the root frame at the zero pose. `collides`: whether it
+    is one of the robot's solids; otherwise it is only drawn.
     """
 
     link: int
@@ -34,7 +35,10 @@ class LinkSolid:
     collides: bool
 
     def at(self, transforms: Array, white: float = 0.0) -> Solid:
-        """Return the solid at the pose of its link, with a share of white in its colour; `transforms`: (L, 4, 4), see link_transforms."""
+        """Return the solid at the present pose of its link.
+
+        `transforms`: (L, 4, 4) of all links, from `link_transforms`. `white`: share of white that is mixed into its colour, 0 to 1.
+        """
         link = transforms[self.link]
         red, green, blue = (white + (1.0 - white) * channel for channel in self.solid.color)
         position, rotation = link[:3, :3] @ self.solid.position + link[:3, 3], link[:3, :3] @ self.solid.rotation
@@ -43,9 +47,10 @@ class LinkSolid:
 
 @per_robot
 def link_solids(robot: Robot) -> tuple[LinkSolid, ...]:
-    """Return what is drawn of a robot, its large meshes simplified; warns in one line of meshes that cannot be read.
+    """Return all volumes and meshes that are drawn for a robot; large meshes are simplified.
 
-    A link is drawn as its visuals; one that has none, or whose meshes cannot be read, as its solids.
+    The visuals of a link are drawn; if a link has none, or if their meshes cannot be read, its solids are drawn. A warning in one line
+    lists meshes that cannot be read.
     """
     meshes = _meshes(robot)
     parts = _parts_of_links(robot)
@@ -62,7 +67,10 @@ def link_solids(robot: Robot) -> tuple[LinkSolid, ...]:
 
 
 def coarser(solids: Sequence[LinkSolid], budget: int) -> list[LinkSolid]:
-    """Return solids whose meshes have at most about `budget` triangles in all; for viewers without a graphics card."""
+    """Return the solids with simplified meshes that together have at most about `budget` triangles.
+
+    It is for viewers without a graphics card.
+    """
     meshes = {id(one.solid.mesh): one.solid.mesh for one in solids if one.solid.mesh is not None}
     counts = [len(one.solid.mesh.triangles) for one in solids if one.solid.mesh is not None]
     most = fair_most(counts, budget)
@@ -71,7 +79,10 @@ def coarser(solids: Sequence[LinkSolid], budget: int) -> list[LinkSolid]:
 
 
 def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
-    """Return what is drawn of a robot in one pose, one group per link; parts that are not in `bright` are pale, none if it is None."""
+    """Return the solids that are drawn for a robot in one pose; the solids of a link form a group.
+
+    `bright`: names of the parts in full colour, all others are pale; None: all parts are in full colour.
+    """
     vivid = set(pose.robot.parts if bright is None else bright)
     return [one.at(pose.transforms, 0.0 if one.part in vivid else PALENESS) for one in link_solids(pose.robot)]
 

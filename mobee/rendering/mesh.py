@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the meshes that a robot's file names, through trimesh, as triangles of one colour each, and makes large ones smaller."""
+"""Reads the meshes that a robot's file names, through trimesh, as triangles of one colour each, and simplifies large meshes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ REMEDY = 'pip install "mobee[meshes]"'
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """Triangles of one colour: corners (v, 3) m and their normals (v, 3), and the corners of each triangle (t, 3).
+    """Triangles of one colour, with normals for shading.
 
-    `middle` (3,) m, `radius` [m]: of a sphere that holds all corners.
+    `corners`: (v, 3) m. `normals`: (v, 3) of the corners. `triangles`: (t, 3) indices of corners. `middle` (3,) m and `radius` [m]: a
+    sphere that contains all corners. `color`: red, green, blue and opacity, 0 to 1; None: not given.
     """
 
     corners: NDArray[np.float32]
@@ -41,7 +42,10 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """Triangles (t, 3) of points (v, 3) m, as they are read."""
+    """Triangles of one colour as they are read from a file.
+
+    `points`: (v, 3) m. `triangles`: (t, 3) indices of points. `color`: red, green, blue and opacity, 0 to 1; None: not given.
+    """
 
     points: Array
     triangles: Ints
@@ -49,9 +53,9 @@ class Piece:
 
 
 def read_pieces(source: MeshSource) -> tuple[Piece, ...]:
-    """Return the triangles of a mesh, in the visual's own axes, a piece for each colour in its file.
+    """Return the triangles of a mesh in the axes of its visual, one piece for each object in its file.
 
-    Raises RobotFileError for a file that is missing or cannot be read, NotInstalled without the package that reads it.
+    Raises RobotFileError if the file is missing or cannot be read, and NotInstalled without the package that reads it.
     """
     candidates = mesh_places(source.file, source.robot_file)
     path = first_file(candidates)
@@ -124,7 +128,10 @@ def _merged(piece: Piece) -> Piece:
 
 
 def smaller(piece: Piece, most: int) -> Piece:
-    """Return the piece with at most about `most` triangles, by the collapse of edges (quadric error); raises NotInstalled."""
+    """Return the piece with at most about `most` triangles, simplified by edge collapses (quadric error).
+
+    Raises NotInstalled without the package fast-simplification.
+    """
     if len(piece.triangles) <= most:
         return piece
     try:
@@ -140,14 +147,17 @@ def smaller(piece: Piece, most: int) -> Piece:
 
 
 def simplified(mesh: Mesh, most: int) -> Mesh:
-    """Return a mesh with at most about `most` triangles; raises NotInstalled."""
+    """Return the mesh with at most about `most` triangles; raise NotInstalled without the package fast-simplification."""
     if len(mesh.triangles) <= most:
         return mesh
     return mesh_of(smaller(_merged(Piece(mesh.corners.astype(np.float64), mesh.triangles.astype(np.intp), mesh.color)), most))
 
 
 def fair_most(counts: Sequence[int], budget: int) -> int:
-    """Return the largest number of triangles of one piece for which all pieces together stay within a budget."""
+    """Return the largest limit for the triangles of one piece with which all pieces together stay within `budget` triangles.
+
+    `counts`: number of triangles of each piece.
+    """
     left = budget
     for rest, count in zip(range(len(counts), 0, -1), sorted(counts), strict=True):
         if count * rest > left:
@@ -157,7 +167,7 @@ def fair_most(counts: Sequence[int], budget: int) -> int:
 
 
 def mesh_of(piece: Piece) -> Mesh:
-    """Return the piece with normals: round where its faces meet flatly, with an edge where they meet at an angle."""
+    """Return the piece as a mesh with normals: smooth where faces meet at a small angle, with a visible edge otherwise."""
     corners = piece.points[piece.triangles]  # (t, 3, 3)
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(areas, axis=1, keepdims=True)
@@ -190,7 +200,7 @@ def _each_once(rows: NDArray[Any]) -> tuple[Ints, Ints]:
 
 
 def ellipsoid_piece(half: Sequence[float]) -> Piece:
-    """Return the triangles of an ellipsoid with half axes x, y, z [m]."""
+    """Return the triangles of an ellipsoid; `half`: its half axes along x, y and z [m]."""
     rows, columns = 12, 24
     angles, turns = np.linspace(0.0, np.pi, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
     ring = np.stack([np.cos(turns), np.sin(turns), np.zeros(columns)], axis=1)

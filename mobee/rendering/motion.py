@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motions to draw: poses one after the other, with the world's objects at each."""
+"""Motions for drawing: a sequence of poses, with the world's objects at each pose."""
 
 from __future__ import annotations
 
@@ -23,14 +23,17 @@ REST_SPEED = 0.002  # m/s: a pause counts as motion at this speed, so that it ge
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """T poses, their times [s] (T,), and the objects of the world at each, by name."""
+    """A sequence of T poses.
+
+    `times`: (T,) s. `objects`: the objects of the world at each pose, by name.
+    """
 
     poses: tuple[Pose, ...]
     times: Array
     objects: tuple[Mapping[str, WorldObject], ...]
 
     def __post_init__(self) -> None:
-        """Check; raises InvalidValue."""
+        """Check that there are as many times and objects as poses, and at least one; raise InvalidValue otherwise."""
         if not len(self.poses) == len(self.times) == len(self.objects) > 0:
             counts = f"{len(self.poses)} poses, {len(self.times)} times, {len(self.objects)} worlds"
             raise InvalidValue(f"a motion of {counts}: must be as many of each, at least one")
@@ -39,21 +42,24 @@ class Motion:
         return len(self.poses)
 
     def part(self, first: int, last: int) -> Motion:
-        """Return the motion from one pose to another, both included."""
+        """Return the motion from pose number `first` to pose number `last`, both included."""
         return Motion(self.poses[first : last + 1], self.times[first : last + 1], self.objects[first : last + 1])
 
     def path(self, marker: str) -> Array:
-        """Return the path of a marker, (T, 3) m in the root frame; raises UnknownName."""
+        """Return the positions of a marker in all poses, (T, 3) m, root frame; raise UnknownName if the robot has no such marker."""
         return np.array([pose.position(marker) for pose in self.poses])
 
     def moved(self) -> tuple[str, ...]:
-        """Return the parts of which some motor moved."""
+        """Return the names of the parts of which at least one motor moves by more than 0.02 (rad or m)."""
         q = np.array([pose.q for pose in self.poses])
         moves = np.ptp(q, axis=0) > MOVED
         return tuple(name for name, part in self.poses[0].robot.parts.items() if moves[part.slice].any())
 
     def moments(self, marker: str, count: int) -> Ints:
-        """Return the numbers of up to `count` poses, first and last included, between which the marker covers equal distances."""
+        """Return the numbers of up to `count` poses, the first and the last included, between which the marker moves equal distances.
+
+        They are the poses to draw in a filmstrip.
+        """
         steps = np.linalg.norm(np.diff(self.path(marker), axis=0), axis=1) + REST_SPEED * np.diff(self.times)
         covered = np.concatenate([[0.0], np.cumsum(steps)])
         shares = np.linspace(0.0, covered[-1], count) if count > 1 else covered[-1:]
@@ -63,7 +69,7 @@ class Motion:
 def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = None) -> Motion:
     """Return the motion through poses q (T, n) rad in the model's present world; attached objects move with their links.
 
-    `times`: (T,) s; 0, 1, 2, ... if None.
+    `times`: (T,) s; None: 0, 1, 2, ...
     """
     poses = tuple(model.evaluate(row) for row in np.atleast_2d(np.asarray(q, dtype=np.float64)))
     found = np.arange(len(poses), dtype=np.float64) if times is None else np.asarray(times, dtype=np.float64)
@@ -71,7 +77,7 @@ def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = N
 
 
 class Recording:
-    """Records the poses of a plant, from the present one on."""
+    """Records the poses of an offline plant, beginning with the present pose."""
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant
@@ -84,20 +90,23 @@ class Recording:
         return len(self._poses)
 
     def add(self, time: float) -> None:
-        """Add the plant's present pose, if it has one."""
+        """Add the plant's present pose at `time` [s]; nothing is added before the plant's first tick."""
         if (pose := self._plant.pose) is not None:
             self._poses.append(pose)
             self._times.append(time)
             self._objects.append(pose.objects)
 
     def motion(self) -> Motion:
-        """Return the motion so far; raises InvalidValue if no pose was recorded."""
+        """Return the motion recorded so far, with times from 0; raise InvalidValue if no pose was recorded."""
         return Motion(tuple(self._poses), np.array(self._times) - self._times[:1], tuple(self._objects))
 
 
 @contextmanager
 def recorded(plant: OfflinePlant, step: float = 0.05) -> Iterator[Recording]:
-    """Record a plant inside the `with` block, a pose every `step` s; this replaces the callback of `plant.every`."""
+    """Record an offline plant inside the `with` block, one pose every `step` seconds of simulated time.
+
+    The recording replaces the callback that was set with `plant.every`; afterwards no callback is set.
+    """
     recording = Recording(plant)
     plant.every(max(1, round(step / plant.dt)), recording.add)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colours of robots, worlds and plots: 8-bit red, green, blue (, opacity)."""
+"""The colours of robots, worlds and plots: 8-bit red, green, blue, and opacity where given."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ SHOWN_PARTS = 3  # of a robot with other parts: so many columns of plots fit on 
 
 
 def colors_of(parts: Collection[str]) -> dict[str, Color]:
-    """Return the parts that plots and learning curves show, with their colours: the iCub's torso and arms, or a robot's first parts."""
+    """Return the parts that plots and learning curves show, with their colours (8-bit red, green, blue).
+
+    They are the iCub's torso and arms, or the first three parts of another robot.
+    """
     if PARTS.keys() <= set(parts):
         return PARTS
     return dict(zip(list(parts)[:SHOWN_PARTS], PARTS.values(), strict=False))
@@ -41,20 +44,23 @@ MORE_PARTS: tuple[Color, ...] = ((124, 214, 150), (178, 150, 255), (240, 150, 90
 
 
 def colors_of_all(parts: Collection[str]) -> dict[str, Color]:
-    """All parts with their colours: those of `colors_of`, then others in turn."""
+    """Return all parts with their colours (8-bit red, green, blue): those of `colors_of`, then further colours in turn."""
     known = colors_of(parts)
     rest = [part for part in parts if part not in known]
     return {part: known[part] if part in known else MORE_PARTS[rest.index(part) % len(MORE_PARTS)] for part in parts}
 
 
 def faded(color: Color, share: float) -> Color:
-    """Return the colour, mixed with the dark background; `share`: of the colour, 0 to 1."""
+    """Return the colour mixed with the dark background; `share`: share of the colour, 0 to 1."""
     red, green, blue = (round(share * channel) for channel in color)
     return red, green, blue
 
 
 def of_object(kind: str, role: str, given: Sequence[float] | None = None) -> Rgba:
-    """Return the colour of an object as bytes: `given` (channels in 0..1) if there is one, else a colour by role and kind."""
+    """Return the colour of a world object as bytes red, green, blue, opacity.
+
+    `given`: red, green, blue, opacity, 0 to 1; None: the colour follows from role and kind.
+    """
     if given is not None:
         red, green, blue, opacity = (round(255 * channel) for channel in given)
         return red, green, blue, opacity

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of solids in parallel rays: lit from above, with shadows on themselves and on the floor, outlines, and smooth edges."""
+"""Draws solids with parallel rays: lit from above, with shadows on themselves and on the floor, outlines, and smooth edges."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ HOLLOW, HOLLOW_WIDTH, HOLLOW_DEPTH = 0.35, 0.02, 0.06  # how dark it is behind s
 
 
 def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, rays: int = RAYS, ground: Color = WHITE) -> Picture:
-    """Draw solids as a parallel camera sees them, with `rays` x `rays` rays per pixel.
+    """Draw solids as a parallel camera sees them; return the picture (height, width, 3), bytes red, green, blue.
 
-    `floor`: height [m] where shadows fall, or None.  `ground`: the colour behind all solids, 8-bit red, green, blue.
+    `floor`: height of the floor on which shadows fall [m]; None: no floor. `rays`: each pixel is the mean of `rays` x `rays` rays.
+    `ground`: the colour behind all solids, 8-bit red, green, blue.
     """
     lamp = _Lamp(camera, [solid for solid in solids if solid.opacity >= 1.0 and not solid.veiled])
     seen = Raster(camera.finer(rays), [solid for solid in solids if solid.opacity >= 1.0])

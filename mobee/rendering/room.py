@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A room around the robot and flat clutter on its table: backgrounds in which colour alone finds no object."""
+"""A room around the robot and flat clutter on its table: backgrounds in which objects cannot be found by colour alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,11 @@ EDGE = 0.03  # m, at the edge of a table that stays free
 
 
 def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
-    """Return walls with pictures on them, and things before the walls out of the robot's reach; a quarter of each have one of `colors`."""
+    """Return the solids of a room: walls with pictures on them, and things near the walls, out of the robot's reach.
+
+    A quarter of the pictures and things have one of `colors` (red, green, blue, 0 to 1), the colours of the objects that are searched.
+    `seed`: of the random choices.
+    """
     rng = np.random.default_rng([seed, _STREAM])
     low, high = FLOOR, CEILING
     solids = [
@@ -44,7 +48,10 @@ def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
 
 
 def clutter(objects: Iterable[WorldObject], seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
-    """Return sheets and discs of paper that lie flat on the boxes of a world, where no hand meets them; a quarter have one of `colors`."""
+    """Return sheets and discs of paper that lie flat on the boxes among the world's `objects`, so that no hand collides with them.
+
+    A quarter of them have one of `colors` (red, green, blue, 0 to 1). `seed`: of the random choices.
+    """
     rng = np.random.default_rng([seed, _STREAM, 1])
     solids = []
     for item in objects:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene of the cameras: the robot as its file draws it, and the world around it."""
+"""The scene that cameras see: the robot as its file draws it, and the world around it."""
 
 from __future__ import annotations
 
@@ -30,26 +30,29 @@ LAMP = Lamp((0.37, -0.24, 0.90), ambient=0.65, diffuse=0.4, nothing=BACKGROUND) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pixels:
-    """Pixels of a view: the rays that they need (None: those of the whole view), and the index of the ray of each, (K,)."""
+    """Some pixels of a view, with the rays that are computed for them.
+
+    `chosen`: the rays that are computed; None: all rays of the view. `rays`: (K,), for each pixel the index of its ray.
+    """
 
     chosen: Chosen | None
     rays: Ints
 
     @classmethod
     def some(cls, height: int, width: int, places: Ints) -> Pixels:
-        """Return the pixels at some places (K,), row * width + column, of a view."""
+        """Return some pixels of a view of height x width pixels; `places`: (K,) numbers row * width + column, which may repeat."""
         mask = np.zeros(height * width, np.bool_)
         mask[places] = True
         return cls(Chosen.of(mask.reshape(height, width)), (np.cumsum(mask) - 1)[places])
 
     @classmethod
     def every(cls, height: int, width: int) -> Pixels:
-        """Return all pixels of a view."""
+        """Return all pixels of a view of height x width pixels, row by row."""
         return cls(None, np.arange(height * width))
 
 
 class Scene:
-    """Mirrors the robot's links and the world's objects, and draws what a camera sees of them."""
+    """A copy of the robot's links and the world's objects, which draws what a camera sees."""
 
     def __init__(
         self,
@@ -61,7 +64,17 @@ class Scene:
         worn: Sequence[LinkSolid] = (),
         around: Sequence[Solid] = (),
     ) -> None:
-        """`cameras`: by name; None: those of the robot.  `worn`: drawn on links beside the robot; `around`: drawn where they are."""
+        """Make the scene with the robot at home and the objects at their present places.
+
+        Args:
+            robot: the robot.
+            world: its objects.
+            cameras: by name; None: those of the robot.
+            width: columns of a picture.
+            height: rows of a picture.
+            worn: further solids that are drawn on links, such as a tag.
+            around: further solids that do not move, in the root frame, such as a room.
+        """
         self._robot, self._size = robot, (width, height)
         self.cameras = dict(cameras_of(robot) if cameras is None else cameras)
         self._link_solids = (*link_solids(robot), *worn)
@@ -72,27 +85,30 @@ class Scene:
         self._every = Pixels.every(height, width)
 
     def intrinsics(self, name: str) -> Array:
-        """Return the matrix (3, 3) of a camera, with the middles of pixels at integers and the origin top left."""
+        """Return the camera matrix (3, 3) px of the camera `name`; centres of pixels are at integers, and the origin is top left."""
         view = self._view(name)
         left, up = view.corner * view.scale
         return np.array([[view.scale, 0.0, -left - 0.5], [0.0, view.scale, up - 0.5], [0.0, 0.0, 1.0]])
 
     def pose(self, q: Array) -> None:
-        """Set the robot's links to their poses at q (n,) rad."""
+        """Move the robot's links to their poses at q (n,) rad."""
         self._transforms = link_transforms(self._robot, q)
 
     def place(self, name: str, position: Array, quaternion: Array) -> None:
-        """Put an object of the world at (3,) m, quaternion wxyz; a name that the world does not have is ignored."""
+        """Move an object of the world; a name that the world does not have is ignored.
+
+        `position`: (3,) m, root frame. `quaternion`: (4,), wxyz.
+        """
         if name in self._objects:
             self._objects[name] = replace(self._objects[name], position=position, rotation=matrix_from_quaternion(quaternion))
 
     @property
     def transforms(self) -> Array:
-        """The transforms of the links (L, 4, 4), from link_transforms."""
+        """The present transforms of all links, (L, 4, 4), from link frames at the zero pose to the root frame."""
         return self._transforms
 
     def draw(self, name: str) -> Picture:
-        """Return the picture of a camera: (height, width, 3) bytes, red, green, blue."""
+        """Return the picture of the camera `name`, (height, width, 3) bytes red, green, blue."""
         width, height = self._size
         brightness = np.zeros((height * width, 3), np.float32)
         self.light(self._view(name), self.cameras[name].hidden, self._every, brightness)
@@ -100,14 +116,20 @@ class Scene:
         return picture.reshape(height, width, 3)
 
     def light(self, view: View, hidden: frozenset[int], pixels: Pixels, brightness: Floats) -> None:
-        """Add to the brightness (K, 3) of red, green and blue, 0 to 255, that of pixels of a view, without the `hidden` links."""
+        """Add the brightness of K pixels of a view to `brightness` (K, 3), which is changed: red, green and blue, 0 to 255.
+
+        `hidden`: numbers of links that are not drawn, such as the link of the camera. `pixels`: the K pixels.
+        """
         shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)
         _, which, normal = cast(packs.volumes, packs.surfaces, view.rays(), pixels.chosen)
         shade(which, normal, pixels.rays, shown.colors, LAMP, brightness)
 
     def objects_at(self, view: View, hidden: frozenset[int], pixels: Pixels) -> Ints:
-        """Return which object of the world pixels of a view show, by its number in the order of the world (K,); -1: anything else."""
+        """Return the number of the world object that each of K pixels of a view shows, (K,); -1: no object.
+
+        Objects are numbered in the order of the world. `hidden`: numbers of links that are not drawn. `pixels`: the K pixels.
+        """
         shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)
         which = cast(packs.volumes, packs.surfaces, view.rays(), pixels.chosen)[1]

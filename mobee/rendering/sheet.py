@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sheets of pictures as PNG files: filmstrips of motions, and the places of markers in many poses (as thesis figs. 3.1, 3.2).
+"""Sheets of pictures as PNG files: filmstrips of motions, and the positions of markers in many poses (as thesis figs. 3.1, 3.2).
 
-Of a plant:  `with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.
-Of poses (T, n) rad, such as a path of a roadmap:  `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
+Of a plant: `with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.
+Of poses (T, n) rad, such as a path of a roadmap: `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ POINT_GROUP = -3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """A picture, and the line below it."""
+    """A picture (H, W, 3) of a sheet, with the text `caption` below it."""
 
     picture: Picture
     caption: str = ""
@@ -48,11 +48,16 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strip:
-    """One motion of a filmstrip, a row for each view.
+    """One motion of a filmstrip, with a row of pictures for each view.
 
-    `views`: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.  `poses`: number.  `title`: above the row.  `caption`: returns
-    the line below a pose, given the motion and the pose's number; None: its time.  `bright`: parts that are not pale; None: those that
-    moved.
+    Attributes:
+        motion: the motion.
+        marker: name of the marker whose path is drawn.
+        views: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.
+        poses: number of pictures in a row.
+        title: text above the first row.
+        caption: takes the motion and the number of a pose, and returns the text below its picture; None: the time of the pose.
+        bright: parts in full colour, all others are pale; None: the parts that moved.
     """
 
     motion: Motion
@@ -65,13 +70,20 @@ class Strip:
 
 
 def filmstrip(strips: Sequence[Strip], path: Path, height: int = 300, colors: int = 256) -> Path:
-    """Write strips one below the other as a PNG of at most that many colours, each picture that many pixels high."""
+    """Write strips one below the other to a PNG file, and return its path.
+
+    `height`: height of each picture in pixels. `colors`: largest number of colours in the file. Raises InvalidValue or UnknownName for a
+    strip that is not valid, and NotInstalled without Matplotlib.
+    """
     rows = [(strip.title if number == 0 else "", row) for strip in strips for number, row in enumerate(panels(strip, height))]
     return write_sheet(rows, path, colors)
 
 
 def panels(strip: Strip, height: int) -> list[list[Panel]]:
-    """Return the pictures of a strip, a row for each view; raises InvalidValue, UnknownName."""
+    """Return the pictures of a strip, a list for each view; raise InvalidValue or UnknownName if the strip is not valid.
+
+    `height`: height of each picture in pixels.
+    """
     if strip.poses < 1 or not strip.views:
         raise InvalidValue(f"{strip.poses} poses in {len(strip.views)} views: must be at least one of each")
     motion = strip.motion
@@ -88,7 +100,11 @@ def panels(strip: Strip, height: int) -> list[list[Panel]]:
 
 
 def pictures_of(scenes: Sequence[Sequence[Solid]], view: View, height: int) -> list[Picture]:
-    """Return pictures of several scenes by one camera, whose frame holds the solids of all scenes that must be visible."""
+    """Return a picture of each scene, all drawn by the same camera.
+
+    The camera's frame contains the solids of all scenes except those that may lie outside (`Solid.aside`). `view`: name of `camera.VIEWS`,
+    or (azimuth, elevation) in degrees. `height`: height of each picture in pixels.
+    """
     about = [solid for scene in scenes for solid in focus(scene)]
     camera = framing(camera_axes(view), about, np.empty((0, 3)), height)
     floor = min(lowest(scene) for scene in scenes)
@@ -106,10 +122,22 @@ def marker_cloud(
     title: str = "",
     height: int = 400,
 ) -> Path:
-    """Write a PNG of the places of markers in the poses q (P, n) rad, and of the robot in the pose `shown` (n,), at home if None.
+    """Write a PNG file with the positions of markers in the poses q (P, n) rad, and with the robot; return its path.
 
-    `values` (P,) give the points' colours, blue for the smallest, orange for the largest; the height of each point if None.
-    Raises InvalidValue, UnknownName.
+    Args:
+        model: the robot in its world.
+        q: (P, n) rad.
+        markers: names.
+        path: of the file.
+        shown: (n,) rad, pose of the robot in the picture; None: home.
+        views: names of `camera.VIEWS`, or (azimuth, elevation) in degrees; a picture for each.
+        values: (P,), which give the points' colours, blue for the smallest, orange for the largest; None: the height of each point.
+        title: text above the pictures.
+        height: height of each picture in pixels.
+
+    Raises:
+        InvalidValue, UnknownName: an argument is not valid.
+        NotInstalled: Matplotlib is not installed.
     """
     pose, names = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))), [markers] if isinstance(markers, str) else list(markers)
     if not names or not len(pose.q):
@@ -125,7 +153,10 @@ def marker_cloud(
 
 
 def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
-    """Return the robot in a pose, the world around it, and points (P, 3) m in the colours of their values (P,)."""
+    """Return the solids of a picture: the robot in a pose, the world around it, and points `places` (P, 3) m as small balls.
+
+    `values`: (P,), which give the points' colours, blue for the smallest, orange for the largest.
+    """
     low, high = float(values.min()), float(values.max())
     shares = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
     colors = [_value_color(float(share)) for share in shares]
@@ -134,7 +165,10 @@ def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
 
 
 def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors: int = 256) -> Path:
-    """Write rows, each a title and panels from left to right, as a PNG of at most that many colours; raises NotInstalled."""
+    """Write rows of pictures to a PNG file, and return its path; a row is a title and its panels from left to right.
+
+    `colors`: largest number of colours in the file. Raises NotInstalled without Matplotlib.
+    """
     columns = [max(one.picture.shape[1] for one in column if one) for column in zip_longest(*(panels for _, panels in rows))]
     heights = [_row_height(title, panels) for title, panels in rows]
     width, height = sum(columns) + GAP * (len(columns) - 1) + 2 * MARGIN, sum(heights) + GAP * (len(rows) - 1) + 2 * MARGIN

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coloured volumes and meshes of a picture, and their construction from a world and a path."""
+"""Coloured volumes and meshes that a picture shows, and functions that make them from a world or a path."""
 
 from __future__ import annotations
 
@@ -32,11 +32,20 @@ TRAIL_GROUP, FIRST_OBJECT_GROUP = -2, 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A coloured convex volume of a picture, or a mesh; `kind`, `size` and `vertices` as in a robot's Shape.
+    """A coloured convex volume or mesh of a picture.
 
-    `position` (3,) m, `rotation` (3, 3): root frame.  `opacity`: below 1 the volume is transparent.  `veiled`: the share of its colour that
-    shows through opaque volumes in front of it, 0 to 1.  `group`: there is no outline between solids of one group.
-    `aside`: True if it may lie outside of the picture.
+    Attributes:
+        kind: "sphere", "box", "cylinder", "capsule", "convex" or "mesh".
+        size: m, lengths of the kind, as of a robot's Shape.
+        position: (3,) m, root frame.
+        rotation: (3, 3), root frame.
+        color: red, green, blue, 0 to 1.
+        opacity: below 1 the volume is transparent.
+        veiled: share of its colour that shows through opaque volumes in front of it, 0 to 1.
+        group: there is no outline between solids of the same group.
+        vertices: (V, 3) m, for "convex", in its own axes.
+        aside: whether it may lie outside of the picture's frame.
+        mesh: the triangles, for "mesh".
     """
 
     kind: SolidKind
@@ -52,7 +61,7 @@ class Solid:
     mesh: Mesh | None = None
 
     def extent(self, along: Array) -> float:
-        """Return the distance [m] that the solid extends from its position in the direction `along`, a unit vector (3,)."""
+        """Return the distance [m] from the solid's position to its farthest point in the direction `along`, a unit vector (3,)."""
         x, y, z = along @ self.rotation
         if self.kind == "sphere":
             return self.size[0]
@@ -69,12 +78,20 @@ class Solid:
 
 
 def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, group: int = 0) -> Solid:
-    """Return a sphere at a position (3,) m."""
+    """Return a sphere at a position (3,) m, root frame, with a radius [m].
+
+    `color`: red, green, blue, 0 to 1. `veiled`: share of its colour that shows through volumes in front of it. `group`: solids of the same
+    group have no outline between them.
+    """
     return Solid("sphere", (radius,), position, np.eye(3), color, veiled=veiled, group=group)
 
 
 def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 0.0, group: int = 0) -> list[Solid]:
-    """Return a tube along the line through points (P, 3) m, with a colour for each of the P - 1 pieces."""
+    """Return a tube of capsules along the line through points (P, 3) m, root frame, with a radius [m].
+
+    `colors`: of the P - 1 pieces. `veiled`: share of the colour that shows through volumes in front of it. `group`: solids of the same
+    group have no outline between them.
+    """
     pieces = []
     for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
         length = float(np.linalg.norm(end - start))
@@ -84,7 +101,7 @@ def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 
 
 
 def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
-    """Return world objects in the colours of their roles; ghosts are transparent."""
+    """Return world objects, given by name, as solids in their own colours or those of their roles; ghosts are transparent."""
     found = []
     for number, item in enumerate(objects.values()):
         red, green, blue, given = (channel / 255.0 for channel in palette.of_object(item.kind, item.role, item.color))
@@ -96,7 +113,7 @@ def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
 
 
 def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
-    """Return the path of a marker through points (P, 3) m: a line that is brighter towards its end, with a ball at the last point."""
+    """Return the path of a marker through points (P, 3) m as solids: a line that is brighter towards its end, and a ball at the end."""
     path = _thinned(points)
     shares = np.linspace(0.0, 1.0, max(len(path) - 1, 1))[:, None]
     colors = [(float(r), float(g), float(b)) for r, g, b in (1.0 - shares) * OLD + shares * NEW]
@@ -105,21 +122,22 @@ def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
 
 
 def focus(solids: Sequence[Solid]) -> list[Solid]:
-    """Return the solids that a picture's frame must hold: all but world objects that are no targets."""
+    """Return the solids that must lie inside a picture's frame: all except world objects that are not targets."""
     return [solid for solid in solids if not solid.aside]
 
 
 def lowest(solids: Sequence[Solid]) -> float:
-    """Return the height of the lowest point of the solids, m: where the floor is drawn."""
+    """Return the height [m] of the lowest point of the solids, at which the floor is drawn."""
     down = np.array([0.0, 0.0, -1.0])
     return min(float(solid.position[2]) - solid.extent(down) for solid in solids)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Packed:
-    """Solids as the core reads them: volumes (N,) CONVEX, then surfaces (M,) SURFACE; the number of each in the given order (N + M,).
+    """Solids in the form that the compiled core reads.
 
-    `kept`: arrays that must be kept alive as long as these.
+    `volumes`: (N,) table CONVEX of the volumes. `surfaces`: (M,) table SURFACE of the meshes. `numbers`: N + M indices of these in the
+    given list of solids, volumes first. `kept`: arrays to which the tables point; they must exist as long as the tables.
     """
 
     volumes: NDArray[np.void]
@@ -129,7 +147,7 @@ class Packed:
 
 
 def packed(solids: Sequence[Solid]) -> Packed:
-    """Return solids as the core reads them."""
+    """Convert solids to the form that the compiled core reads."""
     convex = [number for number, solid in enumerate(solids) if solid.mesh is None]
     others = [number for number, solid in enumerate(solids) if solid.mesh is not None]
     volumes, kept = _packed_volumes([solids[number] for number in convex])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole-body motions from cost functions: evolution strategies, and inverse kinematics by them (thesis chapter 3)."""
+"""Whole-body motions from cost functions: evolution strategies, inverse kinematics, and roadmaps (thesis chapter 3)."""

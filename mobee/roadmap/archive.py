@@ -27,8 +27,8 @@ _DIGITS, _DECIMALS = 16, 9
 def robot_digest(robot: Robot) -> str:
     """Return 16 hex digits of all properties that determine a robot's poses and contacts.
 
-    The names of motors and markers are included, since costs and tasks refer to them. The names of the robot, its links and its shapes
-    are not included, and neither are the motors' speeds.
+    The names of motors and markers are included, since costs and tasks refer to them. The names of the robot, its links and its shapes are
+    not included, and the motors' speeds are not included.
     """
     parts: list[bytes] = [b"robot"]
     for joint in robot.joints:
@@ -47,9 +47,9 @@ def robot_digest(robot: Robot) -> str:
 
 
 def world_digest(world: World, *, roles: Collection[str] = ("obstacle", "target")) -> str:
-    """Return 16 hex digits of the objects that can be touched: shapes, poses, roles, and the links that carry them.
+    """Return 16 hex digits of the objects of a world that the robot can touch: their shapes, poses, roles, and links that carry them.
 
-    Neither their names nor their order nor their colours count; an object counts if its role is one of `roles`.
+    Names, order and colours of the objects do not change the digest. Only objects whose role is in `roles` are included.
     """
     return _digest([b"world", *sorted(_object(one) for one in world.objects.values() if one.role in roles)])
 
@@ -82,7 +82,10 @@ def _digest(parts: Iterable[bytes]) -> str:
 
 
 def world_as_json(world: World) -> list[dict[str, Any]]:
-    """Return the objects of a world as plain JSON values, in the order in which they were added."""
+    """Return the objects of a world as plain JSON values, in the order in which they were added.
+
+    Each object is a dict with the keys name, kind, size, position, rotation, role, color and link.
+    """
     return [
         {
             "name": one.name,
@@ -99,7 +102,7 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
 
 
 def world_from_json(objects: Sequence[dict[str, Any]]) -> World:
-    """Return a new world with the objects of a roadmap file; raises KeyError or InvalidValue if they are not valid."""
+    """Return a new world with `objects`, dicts as `world_as_json` returns them; raises KeyError or InvalidValue if they are not valid."""
     world = World()
     for one in objects:
         place = {"position": one["position"], "rotation": one["rotation"]}
@@ -117,9 +120,9 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[str, Any]) -> None:
-    """Write arrays of numbers, and notes of plain JSON values; the file is complete or unchanged, also after a crash.
+    """Write named arrays of numbers and `notes`, plain JSON values, to a roadmap file.
 
-    Raises MobeeError if the file cannot be written.
+    After a crash the file is either complete or unchanged. Raises MobeeError if the file cannot be written.
     """
     place = Path(path)
     part = place.with_name(f".{place.name}.{os.getpid()}.part")
@@ -138,7 +141,10 @@ def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[s
 
 
 def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
-    """Return the arrays and the notes of a file that `write` wrote; raises MobeeError for a file of another kind."""
+    """Return the arrays, by name, and the notes of a file that `write` wrote.
+
+    Raises MobeeError if the file does not exist, cannot be read, is damaged, or is no roadmap file.
+    """
     place = Path(path)
     try:
         with place.open("rb") as raw:

@@ -26,7 +26,10 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Checked:
-    """The result of a check: `free` (E,): whether each edge is without contacts; `poses`: number of poses checked, ends included."""
+    """The result of a check of E edges.
+
+    `free`: (E,) whether each edge is without contacts. `poses`: number of poses checked, the ends of the edges included.
+    """
 
     free: Flags
     poses: int
@@ -35,19 +38,20 @@ class Checked:
 def check_edges(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Flags:
-    """Return whether each edge (E, 2) between poses q (V, n) rad is free of contacts, (E,).
+    """Return whether each of the edges (E, 2) between poses q (V, n) rad is free of contacts between solids, (E,).
 
-    Every vertex is checked once.  The check of an edge begins at its middle and ends at the first pose with contacts.  Give each edge
-    once: both directions have the same result.  The check is fastest if edges are sorted, as those of a Roadmap are.
+    An edge is the straight line between two poses. Every vertex is checked once. The check of an edge begins at its middle and ends at the
+    first pose with contacts. Give each edge only once: both directions have the same result. The check is fastest if the edges are sorted,
+    like those of a Roadmap.
 
     Args:
         model: its solid shapes are checked, in the present state of its world.
-        q: see `Roadmap`.
-        edges: see `Roadmap`.
+        q: (V, n) rad, poses of all motors.
+        edges: (E, 2) numbers of the two poses of each edge.
         step: largest straight distance that the marker moves between successive poses [m].
-        marker: None: the shape of the robot that moves farthest.
+        marker: name of the marker; None: the shape of the robot that moves farthest.
         threads: number of threads; the result does not depend on it.
-        reaching: markers whose hands may touch targets, see `Model.evaluate`.
+        reaching: a marker, or up to two, whose hands may touch targets: these contacts are ignored.
     """
     return checked(model, q, edges, step, marker, threads, reaching).free
 
@@ -55,7 +59,7 @@ def check_edges(
 def checked(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Checked:
-    """Return the result of `check_edges` and the number of poses checked."""
+    """Return whether each edge is free of contacts, and the number of poses checked; arguments as in `check_edges`."""
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
     checked_threads(threads)
@@ -73,7 +77,10 @@ def checked(
 
 
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
-    """Return the number of poses (E,) to check between the ends of each edge (E, 2), so that successive poses are at most a step apart."""
+    """Return the number of poses to check between the ends of each of the edges (E, 2) between poses q (V, n) rad, (E,).
+
+    With this number, the marker moves at most `step` [m] between successive poses; without a marker, the centre of every shape does.
+    """
     far = np.zeros(len(edges))
     places = points(model, q, marker)
     for place in places:
@@ -83,7 +90,10 @@ def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
 
 
 def points(model: Model, q: Array, marker: str | None = None) -> Array:
-    """Return the positions of a marker in poses q (V, n), (1, V, 3) m; without a marker, of the centres of all shapes that motors move."""
+    """Return the positions of points of the robot in poses q (V, n) rad, (P, V, 3) m, root frame.
+
+    With a marker, P is 1 and the point is the marker. Without a marker, the points are the centres of all P shapes of the robot.
+    """
     if marker is not None:
         model.robot.marker(marker)
     found = []
@@ -113,9 +123,17 @@ _MARGIN = 1e-6  # m
 
 
 class EdgeWatch:
-    """Keeps `free` (E,) up to date: whether each edge (E, 2) between poses q (V, n) rad was free of contacts at the last `update`.
+    """Keeps the check of edges up to date while the world changes.
 
-    `step`, `marker`, `threads`: see `check_edges`.
+    The attribute `free` (E,) says whether each edge was free of contacts at the last `update`.
+
+    Args:
+        model: its solid shapes are checked.
+        q: (V, n) rad, poses of all motors.
+        edges: (E, 2) numbers of the two poses of each edge.
+        step: largest straight distance that the marker moves between successive poses [m].
+        marker: name of the marker; None: the shape of the robot that moves farthest.
+        threads: number of threads; the result does not depend on it.
     """
 
     def __init__(self, model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1) -> None:
@@ -133,7 +151,7 @@ class EdgeWatch:
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
-        """Check again the edges that a change of the world may affect; return their indices."""
+        """Check again the edges that a change of the world since the last update may affect; return the numbers of these edges."""
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
         changed = _changed(old, new)
@@ -148,9 +166,10 @@ class EdgeWatch:
         return again
 
     def near(self, item: WorldObject) -> Flags:
-        """Return whether the robot could touch an object along each edge, (E,).
+        """Return whether the robot could touch the object `item` on each edge, (E,).
 
-        Each point of a shape's path is within half of the path's length of one of its two ends.
+        The test uses distances only and is conservative: each point on the path of a shape is within half of the path's length of one of
+        the two ends. `item` must not be attached to a link.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
         for middles, radius, half_path in zip(self._middles, self._bounds, self._half_paths, strict=True):
@@ -160,7 +179,7 @@ class EdgeWatch:
 
 
 def apart(places: Array, item: WorldObject) -> Array:
-    """Return the distances (N,) m of points (N, 3) m from a free object; 0 inside."""
+    """Return the distances (N,) m of points (N, 3) m, root frame, from an object that is not attached to a link; 0 inside the object."""
     local = np.abs((places - item.position) @ item.rotation)
     size = item.size
     if item.kind == "box":

@@ -18,9 +18,10 @@ from mobee.roadmap.edges import check_edges
 
 
 def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
-    """Return edges (E, 2) from each vertex to the `count` nearest others; distances are those of y (V, m) / spacing.
+    """Return edges (E, 2) from each of V vertices to the `count` vertices nearest to it.
 
-    Each edge occurs once, its lower vertex first, and the edges are sorted.
+    Distances are Euclidean in y (V, m) / spacing. Each edge occurs once, its lower vertex first, and the edges are sorted. Raises
+    InvalidValue if `count` is below 1.
     """
     if count < 1:
         raise InvalidValue(f"{count} neighbours: each vertex needs at least 1.")
@@ -39,9 +40,10 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
 
 def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
-    """Return edges (E, 2) from each vertex to the `count` nearest earlier ones, as in thesis Algorithm 4.
+    """Return edges (E, 2) from each of V vertices to the `count` nearest vertices with a lower number, as in thesis Algorithm 4.
 
-    The resulting map is connected. With as many neighbours as task coordinates it consists of simplices.
+    Distances are Euclidean in y (V, m) / spacing. The resulting graph is connected. With as many neighbours as task coordinates it consists
+    of simplices. Each edge occurs once, its lower vertex first, and the edges are sorted.
     """
     places = y / np.asarray(spacing)
     edges = [np.empty((0, 2), dtype=np.intp)]
@@ -56,7 +58,7 @@ def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
 
 def short(q: Array, edges: Ints, longest: float | None) -> Ints:
-    """Return the edges (E, 2) along which no motor turns by more than `longest` [rad]; None: all."""
+    """Return the edges, of `edges` (E, 2) between poses q (V, n) rad, on which no motor turns by more than `longest` [rad]; None: all."""
     if longest is None:
         return edges
     steps = np.abs(q[edges[:, 0]] - q[edges[:, 1]]).max(axis=1, initial=0.0)
@@ -65,14 +67,19 @@ def short(q: Array, edges: Ints, longest: float | None) -> Ints:
 
 
 def sorted_edges(pairs: ArrayLike) -> Ints:
-    """Return pairs of vertices (P, 2) as edges: the lower vertex first, without repetitions, sorted."""
+    """Return pairs of vertices (P, 2) as sorted edges (E, 2), the lower vertex first, without repetitions and without loops."""
     ordered = np.sort(np.asarray(pairs, dtype=np.intp).reshape(-1, 2), axis=1)
     return np.unique(ordered[ordered[:, 0] < ordered[:, 1]], axis=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Vertices at q (V, n), and for each vertex its neighbours and their distances."""
+    """An undirected graph over V vertices.
+
+    `q`: (V, n) rad, the pose of each vertex. `neighbours`: for each vertex the list of vertices that an edge joins to it. `lengths`: the
+    Euclidean lengths [rad] of these edges, in the same order. `components`: (V,) number of the connected part of each vertex, 0 for the
+    largest part.
+    """
 
     q: Array
     neighbours: list[list[int]]
@@ -82,7 +89,7 @@ class Graph:
     def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
         """Return the vertices of the shortest path from `start` to `goal`, both included; None if there is no path.
 
-        `without`: edges that the path must not use, the lower vertex first.
+        `without`: edges that the path must not use, as pairs (lower vertex, higher vertex).
         """
         if self.components[start] != self.components[goal]:
             return None
@@ -110,7 +117,7 @@ class Graph:
 
 
 def graph(q: Array, edges: Ints) -> Graph:
-    """Return the graph of undirected edges (E, 2) between vertices q (V, n), with Euclidean lengths."""
+    """Return the graph of undirected edges (E, 2) between poses q (V, n) rad, with Euclidean lengths [rad]."""
     count = len(q)
     ends = np.concatenate([edges, edges[:, ::-1]])
     order = np.lexsort((ends[:, 1], ends[:, 0]))
@@ -123,7 +130,10 @@ def graph(q: Array, edges: Ints) -> Graph:
 
 
 def components(count: int, edges: Ints) -> Ints:
-    """Return the number of the connected part of each vertex, (count,): 0: the largest, or of equal ones the first."""
+    """Return the number of the connected part of each of `count` vertices, (count,), for a graph with the edges (E, 2).
+
+    Parts are numbered by size: 0 is the largest; among equal parts, the part with the lowest vertex comes first.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -141,10 +151,20 @@ MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked
 
 
 def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
-    """Return the vertices of a path without contacts from a posture `start` (n,) rad, through the nearest vertex that can be entered.
+    """Return the vertices of a path without contacts from a posture to a goal.
 
-    `to_enter`, `to_leave`: (V,) distances of the vertices from the start and from the goal; infinite: the vertex is not used.
-    Raises MobeeError with the reason if every path has contacts.
+    The first vertex is the nearest one that a straight line without contacts joins to the start.
+
+    Args:
+        model: robot and world.
+        roads: the graph of the map.
+        edges: (E, 2) all edges of the graph, the lower vertex first.
+        start: (n,) rad.
+        to_enter: (V,) distances of the vertices from the start; infinite: the vertex is not used as the first one.
+        to_leave: (V,) distances of the vertices from the goal; infinite: the vertex is not used as the last one.
+
+    Raises:
+        MobeeError: every path has contacts; the message states the reason.
     """
     exits = _nearest(to_leave, EXITS)
     exits = exits[np.asarray(model.evaluate(roads.q[exits]).count) == 0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-Connect, PRM and PRM* of OMPL over a model (extra `planning`)."""
+"""The planners RRT-Connect, PRM and PRM* of OMPL for a robot in its world; they need the extra `planning` of the package."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ RANGE = 0.25  # of the ranges, the longest extension
 
 
 class OmplMissing(MobeeError):
-    """Raised if a planner of OMPL is used and OMPL is not installed."""
+    """Raised when a planner of OMPL is called and OMPL is not installed."""
 
 
 def require_ompl() -> tuple[Any, Any, Any]:
-    """Return OMPL's modules base, geometric and util; raises OmplMissing."""
+    """Return OMPL's modules base, geometric and util; raise OmplMissing if OMPL is not installed."""
     try:
         from ompl import base, geometric, util
     except ImportError:
@@ -33,36 +33,36 @@ def require_ompl() -> tuple[Any, Any, Any]:
 
 
 class ValidityChecker(Protocol):
-    """Decides which poses (d,) and straight motions of some joints are valid."""
+    """The interface of a checker that decides which poses (d,) and straight motions of d joints are valid."""
 
     @property
     def low(self) -> Array:
-        """Lower limits (d,) rad; OMPL gets poses as (q - low) / span."""
+        """Lower limits of the joints (d,) rad; OMPL gets poses as (q - low) / span."""
 
     @property
     def span(self) -> Array:
-        """Ranges (d,) rad."""
+        """Ranges of the joints (d,) rad, by which poses are divided for OMPL."""
 
     @property
     def box(self) -> Array:
-        """Limits (d, 2) rad of the samples."""
+        """Limits (d, 2) rad between which OMPL draws its samples."""
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """Return whether each pose (P, d) rad is valid, (P,)."""
+        """Return whether each of the poses q (P, d) rad is valid, (P,)."""
 
     def sound_motion(self, start: Array, end: Array) -> bool:
-        """Return whether the straight motion between two poses is valid."""
+        """Return whether the straight motion from pose `start` (d,) rad to pose `end` (d,) rad is valid."""
 
 
 class Free:
-    """A ValidityChecker that calls a function of whole poses.
+    """A `ValidityChecker` that asks a function whether poses of all motors are valid.
 
     Args:
-        free: returns whether each of the poses (P, n) rad is valid, (P,).
+        free: takes poses (P, n) rad and returns whether each is valid, (P,).
         rest: (n,) rad, positions of the motors that do not move.
         columns: (d,) indices of the motors that move.
-        limits: (d, 2) rad.
-        step: in ranges of the motors, between two poses of a motion that are checked.
+        limits: (d, 2) rad, of the motors that move.
+        step: largest distance between two checked poses of a motion, as a fraction of each motor's range.
     """
 
     def __init__(self, free: Callable[[Array], Any], rest: Array, columns: Ints, limits: Array, step: float) -> None:
@@ -71,17 +71,17 @@ class Free:
         self.low, self.span = limits[:, 0], np.ptp(limits, axis=1)
 
     def whole(self, q: Array) -> Array:
-        """Return all motors (P, n) from those that move (P, d)."""
+        """Return poses of all motors (P, n) rad from positions of the moving motors q (P, d) rad; the others are at `rest`."""
         found = np.repeat(self._rest[None], len(q), axis=0)
         found[:, self.columns] = q
         return found
 
     def sound(self, q: Array) -> NDArray[np.bool_]:
-        """See ValidityChecker."""
+        """Return whether each of the poses q (P, d) rad is valid, (P,)."""
         return np.asarray(self._free(self.whole(q)), dtype=bool)
 
     def sound_motion(self, start: Array, end: Array) -> bool:
-        """See ValidityChecker; the poses are checked as one batch."""
+        """Return whether the straight motion from `start` (d,) rad to `end` (d,) rad is valid; its poses are checked as one batch."""
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / self._step)))
         shares = np.arange(1, count + 1)[:, None] / count
         return bool(self.sound(start + shares * (end - start)).all())
@@ -89,16 +89,27 @@ class Free:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grown:
-    """A graph: `q` (V, d) rad, or (V, n), and `edges` (E, 2), the lower vertex first."""
+    """A roadmap that OMPL has grown.
+
+    `q`: (V, n) rad, poses of all motors from `prm` and `prm_star`; (V, d), poses of the checker's joints from `grown`. `edges`: (E, 2)
+    numbers of the poses that an edge joins, the lower number first.
+    """
 
     q: Array
     edges: Ints
 
 
 def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, extensions: int = EXTENSIONS) -> Array | None:
-    """Find a valid path from a valid pose (d,) to one of (G, d) by RRT-Connect; return its corners (k, d) rad, or None.
+    """Find a valid path from a valid pose to one of several poses by RRT-Connect.
 
-    `start` and `ends` may lie outside the box.  Raises OmplMissing.
+    Returns the corners of the path, (k, d) rad, or None if no path was found. Raises OmplMissing if OMPL is not installed.
+
+    Args:
+        checker: decides which poses and motions are valid.
+        start: (d,) rad; may lie outside the checker's box.
+        ends: (G, d) rad, the goal poses; may lie outside the box.
+        seed: of all random numbers.
+        extensions: number of extensions of the trees after which the search ends without a path.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_NONE)  # a warning that the seed is set again; objects made from here on use it
@@ -137,10 +148,19 @@ def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, ex
 def grown(
     kind: str, checker: ValidityChecker, milestones: int, neighbours: int | None, seed: int, resolution: float | None = None
 ) -> Grown:
-    """Grow a PRM or PRMstar over the box until it has `milestones` vertices.
+    """Grow a probabilistic roadmap over the checker's box until it has `milestones` vertices.
 
-    `neighbours`: number of nearest vertices to which the planner tries to join each one; None: its own rule.  `resolution`: of the ranges,
-    between poses of a motion that OMPL checks itself, one by one; None: the checker checks motions.  Raises OmplMissing.
+    Args:
+        kind: OMPL's planner, "PRM" or "PRMstar".
+        checker: decides which poses and motions are valid.
+        milestones: number of vertices.
+        neighbours: number of nearest vertices to which the planner tries to join each vertex; None: the planner's own rule.
+        seed: of the samples.
+        resolution: distance between the poses of a motion that OMPL checks one by one, in ranges of the joints; None: the checker checks
+            whole motions.
+
+    Raises:
+        OmplMissing: OMPL is not installed.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_ERROR)
@@ -226,7 +246,7 @@ def rrt_connect(
     extensions: int = EXTENSIONS,
     step: float = STEP,
 ) -> Array | None:
-    """Find a path without solid contacts from a pose to one of several (Kuffner and LaValle 2000).
+    """Find a path without solid contacts from a pose to one of several goal poses, by RRT-Connect (Kuffner and LaValle 2000).
 
     Args:
         model: robot and world.
@@ -234,7 +254,7 @@ def rrt_connect(
         goals: (n,) or (G, n) rad; motors that may not move keep their position at the start.
         motors: names of motors or parts that may move; None: all.
         seed: of all random numbers.
-        extensions: number of extensions of the trees after which the search is given up.
+        extensions: number of extensions of the trees after which the search ends without a path.
         step: fraction of each motor's range between the checked poses of a motion.
 
     Returns:
@@ -267,7 +287,7 @@ def prm(
         neighbours: number of nearest poses to which the planner tries to join each pose.
         rest: (n,) rad, positions of the other motors; None: the home posture.
         seed: of the samples.
-        step: as in `rrt_connect`.
+        step: fraction of each motor's range between the checked poses of a motion.
 
     Raises:
         OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
@@ -283,14 +303,22 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap as `prm` does, with the number of neighbours for asymptotically optimal paths (Karaman and Frazzoli 2011)."""
+    """Grow a roadmap with PRM*, whose number of neighbours makes paths asymptotically optimal (Karaman and Frazzoli 2011).
+
+    The arguments are those of `prm`: `milestones`: least number of poses; `rest`: (n,) rad, positions of the motors that do not move, None:
+    home; `step`: fraction of each motor's range between checked poses.
+    """
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 
 
 def query(
     model: Model, joints: Sequence[str], rest: ArrayLike, seed: int = 0, extensions: int = EXTENSIONS
 ) -> Callable[[Array, Array], Array | None]:
-    """Return `rrt_connect` over some joints in the form that `MapExplorer` needs, the other motors at `rest` (n,) rad."""
+    """Return a function that plans with `rrt_connect` for some joints of the robot, as `MapExplorer` needs it.
+
+    The function takes a pose of the joints (d,) rad and goal poses (G, d) rad; it returns poses (K, d) rad from the start to one of the
+    goals, or None. The other motors stay at `rest` (n,) rad. `extensions`: number of extensions of the trees after which the search ends.
+    """
     whole = _poses(model, rest)
     columns = np.array([model.robot.motor_index(joint) for joint in joints])
 

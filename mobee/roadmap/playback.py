@@ -27,7 +27,10 @@ _SAME = 1e-9  # rad
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """A planned motion: q, velocity, acceleration (T, n) rad, rad/s, rad/s^2 at times (T,) s; at rest at both ends."""
+    """A planned motion, at rest at both ends.
+
+    `times`: (T,) s. `q`, `velocity`, `acceleration`: (T, n) rad, rad/s and rad/s^2 at these times.
+    """
 
     times: Array
     q: Array
@@ -36,10 +39,18 @@ class Reference:
 
 
 def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """Return the motion along a path (K, n) rad within the motors' speeds (n,) rad/s and accelerations (n,) rad/s^2, one row per dt s.
+    """Return the planned motion along a path (K, n) rad, within the motors' largest speeds and accelerations.
 
-    `rounding`: distance before and after a corner [rad, over all motors] at which the motion leaves the path, at most half the distance
-    to the next corner; the motion passes the corner at half that distance or less.  0: it stops at every corner.
+    Args:
+        path: (K, n) rad, corners that straight lines join.
+        speeds: (n,) rad/s, largest speeds.
+        accelerations: (n,) rad/s^2, largest accelerations.
+        rounding: distance before and after a corner at which the motion leaves the path [rad, Euclidean over all motors], at most half the
+            distance to the next corner; the motion passes the corner at no more than half this distance.  0: it stops at every corner.
+        dt: time between two rows of the result [s].
+
+    Raises:
+        InvalidValue: an argument has a wrong shape or is out of its range.
     """
     corners, fastest, hardest = (
         real_array("path", path),
@@ -65,7 +76,10 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
 
 
 def rounded(corners: ArrayLike, rounding: float) -> Array:
-    """Return points along a path (K, n), about STEP apart, (S, n): straight lines with a parabola at each corner."""
+    """Return points (S, n) along a path with corners (K, n) rad: straight lines, with a parabola at each corner.
+
+    `rounding`: distance before and after a corner at which the parabola begins and ends [rad]. The points are about STEP (0.002 rad) apart.
+    """
     points = real_array("corners", corners)
     steps = np.diff(points, axis=0)
     far = np.linalg.norm(steps, axis=1)
@@ -159,10 +173,10 @@ _HARD = 0.8  # share of its largest force that a spring may use to follow the mo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
-    """The motion of a robot along a path, one row per tick.
+    """The motion of a robot along a path, one row for each of T ticks.
 
-    `wanted`, `q`: (T, n) rad, planned and real positions; `solid`, `field`: (T,) m, depths of the deepest contacts; `rested`: whether the
-    robot came to rest; `deepest`: the solid contacts of the pose in which `solid` was largest.
+    `times`: (T,) s. `wanted`, `q`: (T, n) rad, planned and real positions. `solid`, `field`: (T,) m, depth of the deepest contact of solids
+    and of fields. `rested`: whether the robot came to rest. `deepest`: the solid contacts of the pose in which `solid` was largest.
     """
 
     times: Array
@@ -175,17 +189,17 @@ class Played:
 
     @property
     def lag(self) -> float:
-        """Largest distance of a motor from its planned position at the same time [rad]."""
+        """Largest distance of a moved motor from its planned position at the same time [rad]."""
         return float(np.abs(self._q - self._wanted).max())
 
     @property
     def missing(self) -> float:
-        """Largest distance of a motor from its goal at the end [rad]."""
+        """Largest distance of a moved motor from its goal at the end of the motion [rad]."""
         return float(np.abs(self._q[-1] - self._wanted[-1]).max())
 
     @property
     def off(self) -> float:
-        """Largest distance of a motor from the path, at any time [rad]."""
+        """Largest distance of a moved motor from the nearest planned pose, over all ticks [rad]."""
         from scipy.spatial import KDTree
 
         return float(KDTree(self._wanted).query(self._q, p=np.inf)[0].max())
@@ -207,13 +221,13 @@ class Played:
 def play(
     model: Model, path: ArrayLike, speed: float = SPEED, rounding: float = ROUNDING, gains: Gains | None = None, seed: int = 0
 ) -> Played:
-    """Move the offline plant along a path (K, n) rad from its first pose, until it comes to rest.
+    """Move the offline robot along a path (K, n) rad from its first pose, until it is at rest or 5 s after the end of the path.
 
     Args:
         model: the robot in its world.
         path: as `Roadmap.path` returns it.
         speed: share of the largest speed that the springs of the attractor can give.
-        rounding: see `reference`.
+        rounding: distance before and after a corner at which the motion leaves the path [rad]; 0: it stops at every corner.
         gains: of the control law; None: the default ones.
         seed: of the encoders' noise.
 
@@ -244,7 +258,10 @@ def play(
 
 
 def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: bool) -> Played:
-    """Return the result of a motion that was observed as poses q (T, n) rad at times (T,) s."""
+    """Return the result of a motion that was observed as poses q (T, n) rad at times (T,) s; contacts are computed from the poses.
+
+    `wanted`: the planned motion. `rested`: whether the robot came to rest.
+    """
     depths = np.zeros((2, len(q)))  # solids, fields
     table = model.track().evaluate(q).table
     np.maximum.at(depths, (table.kind, table.pose), table.depth)
@@ -252,7 +269,10 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
-    """Return the solid contacts of the pose in q (T, n) with the deepest contact; `solid`: depth of each pose's deepest contact, (T,) m."""
+    """Return the solid contacts of that pose in q (T, n) rad whose contact is deepest; an empty tuple if there are no contacts.
+
+    `solid`: (T,) m, depth of the deepest solid contact of each pose.
+    """
     worst = int(solid.argmax())
     if not solid[worst] > 0.0:
         return ()
@@ -260,7 +280,11 @@ def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
 
 
 def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
-    """Return the motion along a path (K, n) rad that the attractor's springs can follow; `speed`: share of their largest speed."""
+    """Return the planned motion along a path (K, n) rad that the control law's springs can follow, one row per `dt` [s].
+
+    `speed`: share of the largest speed that the springs can give. `rounding`: distance before and after a corner at which the motion leaves
+    the path [rad]; 0: it stops at every corner. Raises InvalidValue if `speed` is not above 0 and at most 1.
+    """
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
     strength, damping = (gains.of_robot(name, robot) for name in ("max_spring", "damping"))
@@ -270,10 +294,16 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
 
 
 def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[Array], Array] | None = None) -> Iterator[Array]:
-    """Yield the attractor (n,) rad every PERIOD, ahead of the motion such that the law's spring produces the motion (eq. 5.7).
+    """Yield the attractor (n,) rad for each period of PERIOD (0.05 s), such that the law's spring produces the motion (eq. 5.7).
 
-    The last attractor is the end of the reference, moved against the forces there.  A motor that does not move in the reference keeps its
-    position.  `forces`: the law's other forces (n,) rad/s^2 at a posture (n,) rad, which the spring balances too; None: none.
+    The attractor is ahead of the motion. Motors that do not move in the reference keep their position, and the last attractor is near the
+    end of the reference.
+
+    Args:
+        robot: the robot.
+        wanted: the planned motion.
+        gains: of the control law.
+        forces: the law's other forces (n,) rad/s^2 at a posture (n,) rad, which the spring also balances; None: there are no other forces.
     """
     damping = gains.of_robot("damping", robot)
     held = np.arange(0.0, wanted.times[-1] + PERIOD, PERIOD) + 0.5 * PERIOD  # each is in force for a period: meant for its middle
@@ -284,7 +314,10 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[
 
 
 def attractor_for(robot: Robot, gains: Gains, q: Array, force: Array) -> Array:
-    """Return the attractor (n,) rad whose spring pulls with a force (n,) rad/s^2 at q (n,) rad (eq. 5.7), as far as it can."""
+    """Return the attractor (n,) rad whose spring pulls with `force` (n,) rad/s^2 at the posture q (n,) rad (eq. 5.7).
+
+    The force is clipped to 0.8 of the spring's largest force, and the attractor to the motors' limits.
+    """
     strength, stiffness = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness"))
     force = np.clip(force, -_HARD * strength, _HARD * strength)
     ahead = force * strength / (stiffness * (strength - np.abs(force)))
@@ -293,18 +326,21 @@ def attractor_for(robot: Robot, gains: Gains, q: Array, force: Array) -> Array:
 
 
 def at(wanted: Reference, times: Array) -> Array:
-    """Return the planned positions at times (T,) s, (T, n) rad; after the end, those at the end."""
+    """Return the planned positions (T, n) rad at times (T,) s, interpolated; after the end of the motion, its last position."""
     return np.stack([np.interp(times, wanted.times, column) for column in wanted.q.T], axis=1)
 
 
 def moving(robot: Robot, path: Array) -> tuple[str, ...]:
-    """Return the parts that a path (K, n) moves."""
+    """Return the names of the parts that a path (K, n) rad moves."""
     moves = np.ptp(path, axis=0) > 0.0
     return tuple(name for name, part in robot.parts.items() if moves[part.slice].any())
 
 
 def carrying(robot: Robot, motors: Sequence[str]) -> tuple[str, ...]:
-    """Return the parts of these motors, and the parts that carry them: for the iCub's arm, the arm and the torso."""
+    """Return the names of the parts that the given motors belong to, and of the parts that carry these.
+
+    For the motors of the iCub's arm, these are the arm and the torso. `motors`: names.
+    """
     moves = np.isin(robot.motors, motors) @ np.abs(tables(robot).coupling) > 0.0  # (J,)
     above = np.zeros(len(robot.joints), dtype=bool)
     for joint in np.flatnonzero(moves):
@@ -314,7 +350,7 @@ def carrying(robot: Robot, motors: Sequence[str]) -> tuple[str, ...]:
 
 
 def standing(robot: Robot, q: Array) -> Robot:
-    """Return the robot with its home at q (n,) rad, so that an offline plant starts there."""
+    """Return a copy of the robot whose home pose is q (n,) rad, so that an offline plant starts in this pose."""
     return replace(robot, motor_table=tuple(replace(motor, home=float(x)) for motor, x in zip(robot.motor_table, q, strict=True)))
 
 

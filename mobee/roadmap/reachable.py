@@ -26,7 +26,10 @@ STARTS = 23  # random start postures
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """A posture (n,) rad that brings the marker nearest to a target, the marker's position (3,) m, and its distance [m]."""
+    """The posture that brings a marker nearest to a target.
+
+    `q`: (n,) rad. `position`: (3,) m, root frame, of the marker in this posture. `distance`: of the marker from the target [m].
+    """
 
     q: Array
     position: Array
@@ -34,11 +37,11 @@ class Nearest:
 
 
 def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Array, seed: int = 0) -> Nearest:
-    """Return the posture that brings the marker nearest to `position` (3,) m, with the motors of one part, the others as in q (n,) rad.
+    """Return the posture that brings the marker nearest to `position` (3,) m, root frame, with the motors of one part.
 
-    Least squares within the motors' limits, from q and from random postures, see `mobee.roadmap.ik.least_squares`. Contacts are ignored.
-    The posture is the nearest one with high probability, not with certainty.  Raises InvalidValue if the part does not move the marker,
-    or if position or q is not valid.
+    The other motors stay as in q (n,) rad. The posture is found by least squares within the motors' limits, from q and from random
+    postures; so it is the nearest posture with high probability, not with certainty. Contacts are ignored. Raises InvalidValue if the part
+    does not move the marker, or if `position` or q is not valid.
     """
     motors = [model.robot.motors[motor] for motor in _movers(model, part, marker)]
     problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)
@@ -50,7 +53,10 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
 
 
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
-    """Return the link, not moved by the part, in whose solid shapes `position` (3,) m lies in posture q (n,) rad; None without one."""
+    """Return the name of the link in whose solid shapes `position` (3,) m, root frame, lies in posture q (n,) rad; else None.
+
+    Links that the part moves are ignored.
+    """
     robot, world = model.robot, World()
     world.add("place", sphere(POINT), position=position)
     table = Model(robot, world).evaluate(q).table
@@ -60,9 +66,10 @@ def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
 
 
 def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Array) -> Array | None:
-    """Return approximately the nearest point to `position` (3,) m outside the body, see `body_at`, that the marker can reach.
+    """Return approximately the point (3,) m nearest to `position` that the marker can reach and that is outside the robot's body.
 
-    Within FAR, on shells that are SHELL apart; None if there is none.
+    The body is all links that the part does not move. The motors other than those of the part stay as in q (n,) rad. Points at distances up
+    to 0.5 m from `position`, in steps of 2 cm, are tried; None if none of them is suitable. All points are in the root frame.
     """
     where = np.asarray(position, dtype=np.float64)
     directions = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])

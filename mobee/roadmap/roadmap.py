@@ -24,11 +24,17 @@ MAX_GOAL_DISTANCE = 1.5  # spacings: a goal further from all vertices is outside
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Roadmap:
-    """A graph of poses.
+    """A graph of poses that satisfy a task.
 
-    `q`: (V, n) rad, all motors.  `y`: (V, m) task coordinates in their units.  `edges`: (E, 2) vertices, sorted, the lower one first.
-    `spacing`: (m,).  `settings`: the settings of the builder as plain JSON values; "motors" are the names of the motors that may move,
-    "names" those of the task coordinates, if they are known.
+    Attributes:
+        model: robot and world of the roadmap.
+        q: (V, n) rad, the poses of all motors.
+        y: (V, m) task coordinates of the poses, in their units.
+        edges: (E, 2) numbers of the poses that an edge joins, sorted, the lower number first.
+        spacing: (m,) distance between vertices in each task coordinate.
+        settings: the settings of the builder as plain JSON values; "motors" are the names of the motors that may move, "names" those of the
+            task coordinates, if they are known.
+        graph: the same edges with their lengths, for the search of paths.
     """
 
     model: Model  # robot and world it belongs to
@@ -40,7 +46,7 @@ class Roadmap:
     graph: Graph = field(init=False)
 
     def __post_init__(self) -> None:
-        """Check that the arrays fit together; raises InvalidValue."""
+        """Check that the arrays fit together, and make `graph`; raise InvalidValue if they do not fit."""
         n, m = len(self.model.robot.motors), len(self.spacing)
         if self.q.shape != (len(self.q), n) or self.y.shape != (len(self.q), m) or self.edges.shape != (len(self.edges), 2):
             shapes = f"q {self.q.shape}, y {self.y.shape}, edges {self.edges.shape}"
@@ -63,15 +69,21 @@ class Roadmap:
         return self.model.robot.motors if known is None else tuple(known)
 
     def entry(self, q_from: ArrayLike) -> int:
-        """Return the vertex nearest to a posture (n,) rad, in fractions of the ranges of `motors`."""
+        """Return the vertex nearest to a posture (n,) rad; the distance is over `motors`, each divided by its range."""
         return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
-        """Return the vertex nearest to task coordinates (m,), in spacings; raises InvalidValue if none is nearer than MAX_GOAL_DISTANCE."""
+        """Return the vertex nearest to the task coordinates `y_goal` (m,), measured in spacings.
+
+        Raises InvalidValue if no vertex is within MAX_GOAL_DISTANCE (1.5 spacings).
+        """
         return int(self._to(y_goal).argmin())
 
     def vertex_path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
-        """Return the vertices of the path that `path` returns as poses; arguments and errors are the same."""
+        """Return the numbers of the vertices on the shortest path from a posture (n,) rad to the vertex nearest to `y_goal` (m,).
+
+        `free`: return only a path without contacts in the present world. The errors are those of `path`.
+        """
         if free:
             return free_path(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
         start, goal = self.entry(q_from), self.exit(y_goal)
@@ -83,13 +95,13 @@ class Roadmap:
     def path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> Array:
         """Return the shortest path through the map from a posture to the vertex nearest to a goal, as poses (K, n) rad.
 
-        Poses are joined by straight lines; the first line, from q_from to the nearest vertex, is not an edge of the map.
+        Straight lines join the poses; the first line, from q_from to the nearest vertex, is not an edge of the map.
 
         Args:
-            q_from: (n,) rad.
-            y_goal: (m,), in the units of the coordinates.
-            free: return only a path without contacts in the present world.  Edges are checked when a path needs them.  If the first line
-                or the last pose has contacts, other near vertices are tried: at the goal those within MAX_GOAL_DISTANCE.
+            q_from: (n,) rad, the start.
+            y_goal: (m,), the goal in the units of the task coordinates.
+            free: return only a path without contacts in the present world.  Edges are checked when a path needs them.  If the first line or
+                the last pose has contacts, other near vertices are tried: at the goal those within 1.5 spacings.
 
         Raises:
             InvalidValue: the map is empty, or has no vertex near the goal.
@@ -100,11 +112,11 @@ class Roadmap:
         return poses if np.array_equal(start, poses[0]) else np.concatenate([start[None], poses])
 
     def __repr__(self) -> str:
-        """Return a description in one line."""
+        """Return a description in one line: numbers of poses and edges, the robot, and the task coordinates."""
         return f"Roadmap({len(self.q)} poses, {len(self.edges)} edges, {self.model.robot.name!r}: {', '.join(self.names)})"
 
     def save(self, path: str | Path) -> None:
-        """Write the roadmap to a .npz file, completely or not at all; raises MobeeError."""
+        """Write the roadmap to a .npz file, completely or not at all; raise MobeeError if the file cannot be written."""
         model = self.model
         write(
             path,
@@ -113,7 +125,7 @@ class Roadmap:
         )
 
     def format_coordinates(self, y: Array) -> str:
-        """Return task coordinates (m,) with their names as text."""
+        """Return task coordinates y (m,) as text, each with its name."""
         return ", ".join(f"{name} {_short(value)}" for name, value in zip(self.names, y, strict=True))
 
     def _posture(self, given: ArrayLike) -> Array:
@@ -165,8 +177,8 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
 
     Args:
         path: of the .npz file.
-        model: robot and world, which must be those of the roadmap; None: load them too.
-        robot: without a model, the robot of the roadmap; None: the shipped robot of the recorded name.
+        model: robot and world, which must be those of the roadmap; None: the world is read from the file, and the robot is `robot`.
+        robot: the robot of the roadmap, if `model` is None; None: the shipped robot with the name in the file.
 
     Raises:
         MobeeError: the file is not a complete roadmap, or belongs to another robot or world; the message has the digests of both.
@@ -188,7 +200,7 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
 
 
 def digests(model: Model) -> dict[str, str]:
-    """Return the settings that identify the robot and the world of a roadmap."""
+    """Return the settings that identify a roadmap's robot and world: name of the robot, "robot_digest" and "world_digest"."""
     return {
         "robot": model.robot.name,
         "robot_digest": robot_digest(model.robot),

@@ -15,7 +15,10 @@ ROUNDING = 1e-6  # tolerance, relative to the largest moment of inertia
 
 
 def one_a_link(bodies: Iterable[Body]) -> tuple[Body, ...]:
-    """Return the masses merged into one body for each link, in the order of the links."""
+    """Merge the bodies of each link into one, and return one body for each link that has a mass, in the order of the links.
+
+    The inertia of a merged body is None if that of any of its parts is unknown.
+    """
     of: dict[int, list[Body]] = {}
     for body in bodies:
         of.setdefault(body.link, []).append(body)
@@ -38,19 +41,19 @@ def _spread(arm: Array) -> Array:
 
 
 def ball_of_water(mass: float) -> Array:
-    """Return the inertia (3, 3) [kg m^2] of a ball of water of this mass [kg], for a body of which only the mass is known."""
+    """Return the inertia (3, 3) [kg m^2] of a ball of water of this mass [kg]: an estimate for a body with a known mass only."""
     radius = (3.0 * mass / (4.0 * np.pi * WATER_DENSITY)) ** (1.0 / 3.0)
     return np.diag(np.full(3, 0.4 * mass * radius**2))
 
 
 def from_six(values: Iterable[float]) -> Array:
-    """Return the inertia (3, 3) from ixx, ixy, ixz, iyy, iyz, izz."""
+    """Return the inertia tensor (3, 3) of which the six values are ixx, ixy, ixz, iyy, iyz, izz, in this order."""
     xx, xy, xz, yy, yz, zz = values
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def to_six(inertia: Array) -> list[float]:
-    """Return ixx, ixy, ixz, iyy, iyz, izz of an inertia (3, 3)."""
+    """Return the six values ixx, ixy, ixz, iyy, iyz, izz of an inertia tensor (3, 3)."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))]
 
 

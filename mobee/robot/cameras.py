@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cameras of a robot: those of its file, the eyes that markers make, and those that a user adds to a link."""
+"""The cameras of a robot: cameras of its file, eyes at its markers left_eye and right_eye, and cameras that a user adds to a link."""
 
 from __future__ import annotations
 
@@ -22,12 +22,11 @@ GRAMMAR = "NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place 
 
 
 def cameras_of(robot: Robot, asked: Sequence[str] = ()) -> dict[str, Camera]:
-    """Return the cameras that make pictures, by name, as in keys of the bus: of a-z, 0-9 and _.
+    """Return the cameras that make pictures, by name; the names are as in keys of the bus, of a-z, 0-9 and _ only.
 
-    They are the first two cameras of the robot's file.  A file without cameras has the eyes "left" and "right" at its markers left_eye and
-    right_eye.  `asked` adds others: cameras of the file by their names, or new ones on links and markers, see GRAMMAR.
-
-    Raises InvalidValue or UnknownName for one that cannot be made.
+    The result has the first two cameras of the robot's file.  A robot without cameras, but with the markers left_eye and right_eye, has
+    the cameras "left" and "right" there.  `asked` adds others: each text is the name of a camera of the file, or describes a new camera
+    as in `mobee.robot.cameras.camera_on`.  Raises InvalidValue or UnknownName for a text that describes no camera.
     """
     own = _named(robot.cameras.values()) or _eyes(robot)
     first = dict(list(own.items())[:OWN])
@@ -59,10 +58,11 @@ def _eyes(robot: Robot) -> dict[str, Camera]:
 
 
 def camera_on(robot: Robot, text: str) -> Camera:
-    """Return the camera that a text describes, see GRAMMAR; raises InvalidValue or UnknownName.
+    """Return the camera that a text describes: NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz; raises InvalidValue or UnknownName.
 
-    In the frame of a marker z is the direction of view unless the text gives one; a link that is no marker has the axes of the root frame
-    at zero pose, and its origin is on its joint's axis.  A camera at the origin itself does not see the link that carries it.
+    NAME is a marker or a link; x, y, z: position [m], and dx, dy, dz: direction of view, both in the frame of the marker or link.  The
+    default is the origin, with the view along a marker's normal or a link's x axis.  The frame of a link has the axes of the root frame
+    at zero pose and its origin on the axis of the joint that moves the link.  A camera at the origin does not see the link that carries it.
     """
     name, equals, given = text.partition("=")
     numbers = _numbers(text, given) if equals else []
@@ -95,14 +95,18 @@ def _numbers(text: str, given: str) -> list[float]:
 
 
 def key_of(name: str, otherwise: str) -> str:
-    """Return a name in the letters of keys of the bus and of files, a-z, 0-9 and _; `otherwise` if none is left."""
+    """Return a name with only the characters that keys of the bus and file names may have: a-z, 0-9 and _.
+
+    Capitals become small letters, other characters become "_". `otherwise`: returned if no character remains.
+    """
     return re.sub(r"[^a-z0-9_]+", "_", name.lower()).strip("_") or otherwise
 
 
 def upright(ahead: Array) -> Array:
-    """Return the rotation (3, 3) of a camera that looks along a unit vector (3,), its picture upright; columns right, down, ahead.
+    """Return the rotation (3, 3) of a camera that looks along the unit vector `ahead` (3,) of the root frame, with an upright picture.
 
-    For a vertical view, the picture's right is the -y axis of the root frame, as for a camera that looks along x.
+    The columns are the directions right and down of the picture, and `ahead`. For a vertical view, right is the -y axis of the root
+    frame, as for a camera that looks along x.
     """
     right = np.cross(ahead, UP)
     length = float(np.linalg.norm(right))
@@ -111,6 +115,9 @@ def upright(ahead: Array) -> Array:
 
 
 def camera_frame(camera: Camera, transforms: Array) -> tuple[Array, Array]:
-    """Return optical centre (3,) m and rotation (3, 3) of a camera in the root frame; `transforms`: (L, 4, 4), from link_transforms."""
+    """Return the optical centre (3,) m and the rotation (3, 3) of a camera in the root frame.
+
+    `transforms`: (L, 4, 4), pose of each link relative to its pose at zero, as from `mobee.model.kinematics.link_transforms`.
+    """
     link = transforms[camera.link]
     return link[:3, :3] @ camera.position + link[:3, 3], link[:3, :3] @ camera.rotation

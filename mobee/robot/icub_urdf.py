@@ -25,7 +25,10 @@ NEGLIGIBLE = {
 
 
 def models_folder() -> Path:
-    """Return the folder `iCub` of the installed icub-models, with `robots` and `meshes`; raises MobeeError if it is missing."""
+    """Return the folder `iCub` of the installed package icub-models, which contains the folders `robots` and `meshes`.
+
+    Raises MobeeError if the package or the robot's file is missing.
+    """
     try:
         package = importlib.import_module("icub_models")
     except ModuleNotFoundError as error:
@@ -39,8 +42,9 @@ def models_folder() -> Path:
 def write_upper_body_urdf(path: Path) -> Path:
     """Write the upper body of iCub v2.5 (without fingers and eyes) to `path` and return it.
 
-    Legs, sensor frames and simulator tags are removed, axes have length 1, mesh paths are absolute, link names are those of
-    `load_robot("icub")`; the frames l_hand_dh_frame and r_hand_dh_frame stay. Raises MobeeError when icub-models is not installed.
+    Legs, sensor frames and simulator tags are removed; axes are scaled to length 1; mesh paths become absolute. The frames of the palms,
+    l_hand_dh_frame and r_hand_dh_frame, stay. Link names are those of `load_robot("icub")`. Raises MobeeError when icub-models is not
+    installed.
     """
     folder = models_folder()
     root: ET.Element = defusedxml.ElementTree.parse(folder / "robots" / MODEL / "model.urdf").getroot()

@@ -22,7 +22,10 @@ SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A robot, the prefix of its names ("" for none), and the pose of its root frame in the common root frame."""
+    """A robot to be joined with others.
+
+    `prefix`: prefix of its names in the joined robot; "": none. `position`, `rotation`: pose of its root frame in the common root frame.
+    """
 
     prefix: str
     robot: Robot
@@ -30,20 +33,25 @@ class Placed:
     rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3)
 
     def name(self, own: str) -> str:
-        """Return the name of a part, motor, joint, link, marker, shape or camera of this robot in the joined one."""
+        """Return the name that a part, motor, joint, link, marker, shape or camera of this robot has in the joined robot.
+
+        `own`: its name in this robot.
+        """
         return f"{self.prefix}{SEPARATOR}{own}" if self.prefix else own
 
 
 def join_robots(
     robots: Mapping[str, Robot], places: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None, name: str | None = None
 ) -> Robot:
-    """Join several robots into one, each at `places[key]`: position (3,) m and rotation (3, 3) in the common root frame.
+    """Join several robots into one.
 
+    `robots`: the robots, by key. `places`: by the same keys, position (3,) m and rotation (3, 3) of a robot's root frame in the common
+    root frame; default: the common root frame itself. `name`: of the joined robot; None: the keys with "_" between them.
     Names of parts, motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged.
-    Parts and motors are in the order given. The bases become one link, with the name of the first. Every solid is tested against all solids
-    of the other robots, every field against all fields; within a robot its own pairs are kept. The joined robot has one least lever, the
-    largest of all: give all robots the same one if contacts must push them as before. Raises InvalidValue for equal names, for no robots
-    and for a place that is not a pose; UnknownName for a place without a robot.
+    Parts and motors are in the order given. The bases become one link, with the name of the first base. Every solid is tested against all
+    solids of the other robots, every field against all their fields; within a robot its own pairs are kept. The joined robot's
+    `least_lever` is the largest of all robots: give all robots the same value if contacts must push each robot as before.
+    Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place without a robot.
     """
     for key in places or {}:
         if key not in robots:
@@ -54,7 +62,10 @@ def join_robots(
 
 
 def join_placed(placed: Sequence[Placed], name: str) -> Robot:
-    """Join several robots into one; see `join_robots`."""
+    """Join several placed robots into one robot with the given name, by the rules of `mobee.robot.join.join_robots`.
+
+    Raises InvalidValue for equal names and for no robots.
+    """
     if not placed:
         raise InvalidValue("there is no robot to join. Give at least one.")
     joints = np.cumsum([0, *(len(one.robot.joints) for one in placed)]).tolist()

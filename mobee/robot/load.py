@@ -30,21 +30,22 @@ def load_robot(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Robot:
-    """Load a shipped robot by name (see `shipped_robots`), or the robot of a zero-position .xml, a .urdf or an MJCF file.
+    """Load a shipped robot by name (`mobee.robot.load.shipped_robots`), or the robot of a zero-position .xml, a .urdf or an MJCF file.
 
     Args:
         name_or_path: a shipped name, the path of a file, or with the package mujoco-menagerie a name of MuJoCo Menagerie.
         field: URDF and MJCF: distance [m] by which fields extend beyond the solids, one field for every solid; None: no fields.
-        meshes: URDF and MJCF: "hull" (the default) or "bounding", see `UrdfOptions`.
+        meshes: URDF and MJCF: "hull" (the default): a mesh becomes its convex hull; "bounding": the smallest primitive around it.
         corners: URDF and MJCF: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
-        srdf: URDF only: the SRDF file; None: one beside the URDF or in ../srdf, if there is any, see docs/robots.md.
-        home: the name of a <group_state> of the SRDF or of a keyframe of the MJCF, or "zero"; None: see docs/robots.md.
+        srdf: URDF only: the SRDF file; None: an SRDF beside the URDF or in ../srdf, if there is one (docs/robots.md).
+        home: URDF and MJCF: the home pose: the name of a <group_state> of the SRDF or of a keyframe of the MJCF, or "zero"; None: the
+            pose that docs/robots.md describes.
 
     Raises:
-        UnknownName: with the nearest shipped name.
-        InvalidValue: for an option that is not valid for the file.
-        RobotFileError: with file, line, field and remedy.
-        NotInstalled: an MJCF file without the package mujoco.
+        UnknownName: no shipped robot has the name; the message gives the nearest name.
+        InvalidValue: an option is not valid for the file.
+        RobotFileError: the file cannot be read; the message gives file, line, field and remedy.
+        NotInstalled: the file is an MJCF file, and the package mujoco is not installed.
     """
     path = find_file(name_or_path, ROBOTS, "robot")
     is_urdf = path.suffix.lower() == ".urdf"
@@ -70,7 +71,11 @@ def shipped_robots() -> tuple[str, ...]:
 
 
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
-    """Return the file of a shipped name or a path; raises InvalidValue, UnknownName or RobotFileError if there is none."""
+    """Return the path of a robot or world file, which is given as a path or as a shipped name.
+
+    `folder`: of the shipped files. `kind`: "robot" or another word for the messages; for a robot, names of MuJoCo Menagerie are valid
+    too. Raises InvalidValue, UnknownName or RobotFileError if there is no such file.
+    """
     if not isinstance(name_or_path, str | Path):
         raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")
     path, given = Path(name_or_path), str(name_or_path)
@@ -92,5 +97,5 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
 
 
 def shipped(folder: Path) -> tuple[str, ...]:
-    """Return the names of the .xml files of a folder, sorted."""
+    """Return the names of the .xml files of a folder, sorted and without the ending."""
     return tuple(sorted(path.stem for path in folder.glob("*.xml")))

@@ -27,14 +27,21 @@ def slides(robot: Robot, motor: Motor) -> bool:
 
 
 def angle_unit(limits: Array, sliding: bool) -> float:
-    """Return the motion that counts as 1 rad in the law: 1 rad for a motor that turns, a length [m] for a slide with limits (2,)."""
+    """Return the motion of a motor that counts as 1 rad in the control law, in the motor's own unit.
+
+    `limits`: (2,) rad or m. `sliding`: whether the motor is a slide. It is 1 for a motor that turns, and range / SLIDE_RANGE [m] for a
+    slide, where SLIDE_RANGE is 200 deg, so that the whole range of a slide counts as 200 deg.
+    """
     span = float(limits[1] - limits[0])
     return span / SLIDE_RANGE if sliding and 0.0 < span < np.inf else 1.0
 
 
 @per_robot
 def motor_units(robot: Robot) -> Array:
-    """Return the motion of each motor that counts as 1 rad in the law, (n,): 1 rad for motors that turn, see `angle_unit`."""
+    """Return the motion of each motor that counts as 1 rad in the control law, (n,), read-only.
+
+    It is 1 rad for a motor that turns, and a length [m] for a slide, as in `mobee.robot.motor_units.angle_unit`.
+    """
     units = np.array([angle_unit(motor.limits, slides(robot, motor)) for motor in robot.motor_table])
     units.flags.writeable = False
     return units
@@ -42,7 +49,10 @@ def motor_units(robot: Robot) -> Array:
 
 @per_robot
 def fine_units(robot: Robot) -> Array:
-    """Return the motion of each motor that counts as 1 rad in thresholds of rest, play and noise, (n,): 1 rad for motors that turn."""
+    """Return the motion of each motor that counts as 1 rad in thresholds of rest, play and noise, (n,), read-only.
+
+    It is 1 rad for a motor that turns, and for a slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
+    """
     units = np.array(
         [unit * (FINE if slides(robot, motor) else 1.0) for unit, motor in zip(motor_units(robot), robot.motor_table, strict=True)]
     )
@@ -53,8 +63,8 @@ def fine_units(robot: Robot) -> Array:
 def limit_zones(robot: Robot, width: Array) -> Array:
     """Return the widths of the zones at the lower and the upper limit of each motor, (n, 2), in the unit of the motor.
 
-    In a zone the law pushes inward. `width` (n,): the width in the gains. A zone is at most the fraction WIDEST of the motor's range. If
-    the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
+    In a zone the law pushes inward. `width` (n,): the width of the zones in the gains, in the unit of the motor. A zone is at most WIDEST
+    (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
     """
     low, high = robot.limits.T
     widest = np.minimum(width, WIDEST * (high - low))
@@ -66,6 +76,9 @@ def limit_zones(robot: Robot, width: Array) -> Array:
 
 
 def outside_zones(wanted: float, limits: Array, unit: float) -> float:
-    """Return the position nearest to the wanted one outside the limit zones of the shipped gains, in the unit of the motor."""
+    """Return the position nearest to `wanted` that is outside the limit zones of the shipped gains.
+
+    `wanted`, `limits` (2,) and the result are in the motor's own unit, rad or m. `unit`: the motion of the motor that counts as 1 rad.
+    """
     zone = min(LIMIT_WIDTH * unit, WIDEST * float(limits[1] - limits[0]))
     return float(np.clip(wanted, limits[0] + zone, limits[1] - zone))

@@ -7,7 +7,7 @@ Solids and fields follow one rule; a pair is excluded if
 - the file excludes it: <ignore first="link" second="link"/>;
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
-Joined: a cluster is a group of joints, each within 5 cm of the one that carries it or of one beside it (shoulder, elbow and
+Joined links: a cluster is a group of joints, each within 5 cm of its parent joint or of a joint on the same link (shoulder, elbow and
 pro-supination, wrist, neck, torso), since a shape there fills the whole cluster. The link that carries a cluster and all links that
 its joints move are joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with
 wrist and hand.
@@ -30,7 +30,10 @@ MAX_NAMED = 4  # joints of a cluster that a reason lists
 
 
 def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
-    """Return the pairs of links that meet in one cluster of joints, with the reason for each pair."""
+    """Return the excluded pairs of links that meet in one cluster of joints, each with the reason as text.
+
+    A cluster is a group of joints of which each is within CLUSTER (5 cm) of its parent joint or of a joint on the same link.
+    """
     clusters = _clusters(joints)
     joined: dict[LinkPair, str] = {}
     for cluster in clusters:
@@ -62,7 +65,10 @@ def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
 
 
 def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPair, str]:
-    """Return the pairs of links inside one noSelfCollision subtree; `subtree`: of each link, -1 if none; `names`: of the subtrees."""
+    """Return the excluded pairs of links inside one noSelfCollision subtree (a hand), each with the reason as text.
+
+    `subtree`: for each link the number of its subtree, -1 if none; `names`: the name of each subtree for the reason.
+    """
     members: dict[int, list[int]] = {}
     for link, start in enumerate(subtree):
         if start != -1:
@@ -75,9 +81,9 @@ def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPai
 
 
 def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair], own: bool = False) -> Ints:
-    """Return the tested pairs of shapes of one role, (p, 2), indices into `shapes`.
+    """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts, (p, 2), indices into `shapes`.
 
-    `untested`: excluded pairs of links; `own`: fields of one part are tested against each other too.
+    `untested`: pairs of links that are excluded; `own`: whether fields of one part are tested against each other too.
     """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
@@ -95,20 +101,21 @@ def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPa
 
 
 def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
-    """Return the pairs of links of these pairs of shapes."""
+    """Return the pairs of links to which pairs of shapes belong; `pairs`: arrays (p, 2) of indices into `shapes`."""
     link = np.array([shape.link for shape in shapes], dtype=np.intp)
     return {frozenset(pair) for some in pairs for pair in set(map(tuple, link[some].reshape(-1, 2).tolist()))}
 
 
 def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
-    """Return all excluded pairs, each with the reason of the first rule that excludes it."""
+    """Merge several tables of excluded pairs of links: return all their pairs, each with the reason of the first table that has it."""
     return {pair: reason for rule in reversed(rules) for pair, reason in rule.items()}
 
 
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
-    """Return tested pairs of one role, (p, 2), sorted: each robot's own, and all between two robots unless both shapes are on the base.
+    """Return the tested pairs of shapes of one role ("solid" or "field") of several joined robots, (p, 2), sorted.
 
-    `starts`: the index of each robot's first shape.
+    They are each robot's own pairs, and all pairs of shapes of two robots, unless both shapes are on the common base. `bodies`: the
+    robots, with the links of the joined robot. `starts`: for each robot, the index of its first shape in the joined robot.
     """
     pairs = [
         (body.solid_pairs if role == "solid" else body.field_pairs).reshape(-1, 2) + start
@@ -128,6 +135,10 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 
 
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
-    """Return the excluded pairs of links of all robots, with reasons, without pairs with the common base that are now tested."""
+    """Return the excluded pairs of links of several joined robots, each with the reason, without pairs that are tested after all.
+
+    `bodies`: the robots, with the links of the joined robot. `shapes`: of the joined robot. `pairs`: its tested pairs of solids and of
+    fields, each (p, 2). A pair with the common base can be excluded in one robot and tested in another.
+    """
     tested = link_pairs(shapes, *pairs)
     return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tested pairs by the rule of the program published in 2014, and by an earlier interpretation of that rule.
 
-Both rules work on the elements <link> and <joint> of a file, and find neighbours by descents of the tree: below every element, and
-below those beside it. Fields of neighbours are not tested against each other; their solids are not if both are of one part, or one
-carries the other, or both hang on the same element.
+Both rules work on the elements <link> and <joint> of a file. They find the neighbours of an element by descents of the tree, which begin
+at the element and at each of its siblings. Fields of neighbours are not tested against each other. Solids of neighbours are not tested
+against each other if both elements are of one part, or one carries the other, or both have the same parent.
 
-adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs): a descent ends when a link
-under a joint and a joint under a link that bear a solid have been passed, but continues past elements of the tag with which it began.
+adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs): a descent ends when it has
+passed a link under a joint and a joint under a link, both with a solid; it continues past elements with the tag of the first element.
 
 adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014: a descent ends when
-one link and one joint that bear a shape of the role in question have been passed. With it no field of icub_2014 touches another at
-home; by the rule of the program the forearm's field is 3 mm deep in that of the thumb.
+it has passed one link and one joint with a shape of the role in question. By this rule no field of icub_2014 touches another field at
+home; by the rule of the program the forearm's field is 3 mm deep in the field of the thumb.
 """
 
 from __future__ import annotations
@@ -30,7 +30,11 @@ Rule = Literal["published_2014", "recorded_2014"]
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A <link> or <joint>: what carries it (-1: none), its tag, part, noSelfCollision subtree (-1: none) and link of the robot."""
+    """A <link> or <joint> element of a file.
+
+    `parent`: index of the element that carries it, -1: none. `tag`: "link" or "joint". `part`: name of its part. `subtree`: index of the
+    element whose noSelfCollision includes it, -1: none. `link`: index of its link in the robot.
+    """
 
     parent: int
     tag: str
@@ -40,7 +44,10 @@ class Element:
 
 
 def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, rule: Rule) -> Ints:
-    """Return the tested pairs of shapes of one role, (p, 2), indices in `shapes`; `hosts`: the element of each shape."""
+    """Return the pairs of shapes of one role ("solid" or "field") that a rule of 2014 tests for contacts, (p, 2), indices in `shapes`.
+
+    `hosts`: for each shape the index of its element. `rule`: "published_2014" (the program's) or "recorded_2014" (an earlier reading).
+    """
     chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
     near = _near(elements, hosts, shapes, role, rule)
     pairs = [(i, j) for i, j in combinations(chosen, 2) if not _reason(elements, hosts[i], hosts[j], role, near)]
@@ -48,9 +55,10 @@ def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: S
 
 
 def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], rule: Rule) -> dict[LinkPair, str]:
-    """Return the pairs of links that are never tested, with reasons: those for which the rule for solids excludes all pairs of elements.
+    """Return the pairs of links that a rule of 2014 never tests for contacts, each with the reason.
 
-    The elements of a link are those that bear a solid or, if there is none, all of them.
+    A pair of links is never tested if the rule for solids excludes all pairs of their elements. Of a link, the elements that have a solid
+    count; if no element has a solid, all elements count. `hosts`: for each shape the index of its element.
     """
     solid = _bearing(hosts, shapes, "solid")
     near = _near(elements, hosts, shapes, "solid", rule)
@@ -92,7 +100,12 @@ def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collec
 
 
 def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Return the pairs of elements that meet on a descent; `bearing`: the elements with a solid. Element 0 is the root of the file."""
+    """Return the pairs of neighbours in the tree by the rule "published_2014", as indices of elements; element 0 is the root of the file.
+
+    `bearing`: the elements that have a solid. From each element and each of its siblings a search descends the tree, and each element that
+    it reaches is a neighbour of the first one. A branch of the search ends when it has passed a link under a joint and a joint under a
+    link, both with a solid; it continues past elements with the tag of the first element.
+    """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
         children.setdefault(element.parent, []).append(index)
@@ -127,10 +140,11 @@ def _passed(
 
 
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Return the pairs of neighbours in the tree, between which the rule "recorded_2014" tests no contacts.
+    """Return the pairs of neighbours in the tree by the rule "recorded_2014", as indices of elements.
 
-    From each element and from each of its siblings it goes down the tree, and ends a branch behind the first link and the first joint
-    that have a shape.  `bearing`: the elements that have a shape of the role.
+    `bearing`: the elements that have a shape of the role in question. From each element and each of its siblings a search descends the
+    tree, and each element that it reaches is a neighbour of the first one. A branch of the search ends when it has passed a link and a
+    joint with such a shape.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -157,11 +171,11 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
 
 
 def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
-    """Return whether an element counts as the base in the program of 2014 (KinTreeNode::isNearRoot); the base ignores the world.
+    """Return whether an element counts as the base in the program of 2014 (KinTreeNode::isNearRoot), so that the world does not touch it.
 
-    The search climbs from the element over one change from link to joint and one from joint to link, and then over elements with the
-    element's own tag; an element is near the root if this search arrives there. `parents`: -1 for the first elements of the tree;
-    `tags`: "link" or "joint".
+    A search climbs from the element over one change from link to joint and one change from joint to link, and then over elements with the
+    same tag as the first element. An element is near the root if this search arrives at the root. `parents`: for each element the index
+    of its parent, -1 if that is the root. `tags`: for each element "link" or "joint". `index`: of the element.
     """
     here, link, joint = index, False, False
     while parents[here] >= 0:

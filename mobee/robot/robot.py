@@ -23,9 +23,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """An axis of the tree, given in the root frame with every joint at zero (thesis 2.3.1).
+    """A joint of the tree: its axis in the root frame while every joint is at zero (thesis 2.3.1).
 
-    `parent`: index of the link on which the joint is mounted. Joint j moves link j + 1.
+    `parent`: index of the link on which the joint is mounted. Joint j moves link j + 1. `axis`: (3,) unit vector. `point`: (3,) m, a point
+    on the axis. `limits`: (2,) rad (revolute) or m (prismatic).
     """
 
     name: str
@@ -38,11 +39,13 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motor:
-    """A motor, the unit of command: it drives one or more joints affinely, joint = scale * motor + offset.
+    """A motor, which receives commands: it drives one or more joints affinely, joint = scale * motor + offset.
 
     Positions are in rad. For a motor that drives a prismatic joint with scale 1, as in a URDF, they are in m, and torques are forces in N.
-    `zone_ends_at_home`: where the limit zone of the control law would include home, the zone ends at home instead, so that the robot
-    rests there. It is set for motors of a URDF; a motor of a zero-position file is pushed away from such a home.
+    `part`: name of its part. `limits`: (2,) rad. `home`: position at home, rad. `joints`: (index, scale, offset) of each driven joint.
+    `max_velocity` (rad/s; the safety gate enforces it), `max_acceleration` (rad/s^2), `max_torque` (N m).
+    `zone_ends_at_home`: if the limit zone of the control law would include home, the zone ends at home instead, so that the robot rests
+    there. It is set for motors of a URDF or MJCF file. If it is not set, the law pushes the motor away from such a home.
     """
 
     name: str
@@ -58,7 +61,10 @@ class Motor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A body part: motors that are commanded together, a contiguous slice of the robot's motor vector."""
+    """A body part: motors that are commanded together, a contiguous slice of the robot's motor vector.
+
+    `motors`: their names. `start`: index of the first of them in the motor vector.
+    """
 
     name: str
     motors: tuple[str, ...]
@@ -77,8 +83,10 @@ class Part:
 class Shape:
     """A volume on a link: a solid, or a field, a larger volume that is not solid but causes a repulsive force.
 
+    `link`: index of its link. `part`: name of its part. `role`: "solid" or "field".
     `size` in m: sphere (r,); capsule and cylinder (r, height along local z; a capsule's caps are beyond it); box (x, y, z), full
-    edges; convex (): the hull of `vertices`. `position`, `rotation`: in the root frame, at zero pose.
+    edges; convex (): the shape is the hull of `vertices`, (v, 3) m relative to `position`, along the shape's own axes.
+    `position` (3,) m, `rotation` (3, 3): in the root frame, at zero pose.
     """
 
     name: str
@@ -94,7 +102,10 @@ class Shape:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marker:
-    """A named point with an orientation and a normal on a link (root frame, zero pose)."""
+    """A named point on a link, with an orientation and a normal.
+
+    `link`: index of the link. `position` (3,) m, `rotation` (3, 3), `normal` (3,) unit vector: in the root frame, at zero pose.
+    """
 
     name: str
     link: int
@@ -105,7 +116,11 @@ class Marker:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The mass of a link (root frame, zero pose)."""
+    """The mass of a link.
+
+    `link`: index of the link. `mass`: kg. `centre`: (3,) m, centre of mass, root frame, zero pose. `inertia`: (3, 3) kg m^2 about the
+    centre, along the axes of the root frame at zero pose; None if unknown.
+    """
 
     link: int
     mass: float  # kg
@@ -115,9 +130,10 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clause:
-    """A condition on motor positions: a.q + b > 0 must hold for at least one of its rows (thesis eqs. 5.14 to 5.17).
+    """A condition on motor positions q [rad]: a.q + b > 0 must hold for at least one of its rows (thesis eqs. 5.14 to 5.17).
 
-    All clauses of a robot should hold. b is converted from the file's degrees to rad; a is as in the file.
+    All clauses of a robot should hold. `part`: name of the part whose motors it limits. `a`: (rows, n) factors, as in the file. `b`:
+    (rows,) rad; the file has degrees.
     """
 
     part: str
@@ -130,23 +146,24 @@ class Robot:
     """A kinematic tree with everything that the model, the controller and the agents need.
 
     Attributes:
-        name: of the robot.
-        links: their names; link 0 is the fixed base.
-        joints: joint j moves link j + 1.
+        name: the name of the robot.
+        links: the names of the links; link 0 is the fixed base.
+        joints: the joints; joint j moves link j + 1.
         motor_table: the motors, in the order of q.
-        parts: by name. `part(name)` does the same and raises UnknownName with the nearest name.
-        markers: by name; see `marker(name)`.
+        parts: the parts by name. `part(name)` returns one, or raises UnknownName with the nearest name.
+        markers: the markers by name. `marker(name)` returns one, or raises UnknownName with the nearest name.
         shapes: solids and fields of all links.
         clauses: conditions on motor positions, all of which should hold.
-        field_pairs, solid_pairs: (p, 2) indices into `shapes`: the pairs that are tested for contacts.
-        base_shapes: indices of shapes that are never tested against world objects, since the robot stands on these.
-        untested: for every pair of links that is never tested, the reason.
+        field_pairs, solid_pairs: (p, 2) indices into `shapes`: the pairs of fields, and of solids, that are tested for contacts.
+        base_shapes: indices of shapes that are never tested against world objects, since the robot stands on world objects.
+        untested: the pairs of links that are never tested for contacts, as sets of two link indices, each with the reason.
         where: file and line of every element, as {("joint", name): "file:line"}.
-        bodies: masses, at most one for each link, in the order of the links; () if the file has none.
-        visuals: the drawn surfaces of the links, where these are not their solids.
-        cameras: those that the file names, by name; see `mobee.robot.cameras`.
-        least_lever: m; 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so one with a short lever hardly pushes. Above 0:
-            by LEVER^2 J^T / (|J|^2 + least_lever^2), where |J| is the lever of the contact, see `mobee.model.levers`.
+        bodies: the masses, at most one for each link, in the order of the links; () if the file has none.
+        visuals: the drawn surfaces of the links, if these are not their solids.
+        cameras: the cameras in the robot's file, by name; `mobee.robot.cameras.cameras_of` chooses those that make pictures.
+        least_lever: m. 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so a contact with a short lever hardly pushes.
+            Above 0: it pushes by LEVER^2 J^T / (|J|^2 + least_lever^2), with LEVER = 0.5 m and |J| the lever of the contact
+            (`mobee.model.levers`).
     """
 
     name: str
@@ -169,22 +186,25 @@ class Robot:
 
     @cached_property
     def motors(self) -> tuple[str, ...]:
-        """Names of the motors, in the order of every q in this library."""
+        """The names of the motors, in the order of every vector q in this library."""
         return tuple(m.name for m in self.motor_table)
 
     @cached_property
     def limits(self) -> Array:
-        """Motor limits, (n, 2) rad, or m for a prismatic joint; read-only."""
+        """The lower and upper limit of each motor, (n, 2) rad, or m for a motor of a prismatic joint; read-only."""
         return _fixed(np.array([m.limits for m in self.motor_table]))
 
     @cached_property
     def home(self) -> Array:
-        """Motor positions at home, (n,) rad, or m for a prismatic joint; read-only."""
+        """The motor positions at home, (n,) rad, or m for a motor of a prismatic joint; read-only."""
         return _fixed(np.array([m.home for m in self.motor_table]))
 
     @cached_property
     def coupling(self) -> tuple[Array, Array]:
-        """Matrix (joints, n) and offset (joints,) with joint positions [rad or m] = matrix @ q + offset; read-only."""
+        """The matrix (joints, n) and the offset (joints,) of the map from motors to joints; both read-only.
+
+        Joint positions [rad or m] = matrix @ q + offset.
+        """
         matrix = np.zeros((len(self.joints), len(self.motor_table)))
         offset = np.zeros(len(self.joints))
         for column, motor in enumerate(self.motor_table):
@@ -219,7 +239,7 @@ def _fixed(array: Array) -> Array:
 
 
 def per_robot(build: Callable[[Robot], T]) -> Callable[[Robot], T]:
-    """Decorate a function of a robot to cache its result for each robot object; callers must not change the result."""
+    """Return a function that calls `build` once for each robot object and caches the result; callers must not change the result."""
     kept: WeakKeyDictionary[Robot, T] = WeakKeyDictionary()
 
     @wraps(build)

@@ -17,8 +17,9 @@ Channels = tuple[float, float, float, float]  # red, green, blue, opacity in 0..
 class MeshSource:
     """The file of a mesh, as a robot's file names it.
 
-    `file`: a path relative to the robot's file, file:// or package://. An MJCF file holds several meshes, then `name` is one of them.
-    `robot_file`, `line`: where it is named. `scale`: by which the lengths in the file are multiplied.
+    `file`: the name of the mesh's file, a path relative to the robot's file or an address file:// or package://. `name`: of one mesh in a
+    file with several meshes (MJCF). `robot_file`, `line`: where the robot's file names the mesh. `scale`: factors (x, y, z) by which the
+    lengths in the mesh's file are multiplied.
     """
 
     file: str
@@ -30,10 +31,11 @@ class MeshSource:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visual:
-    """A volume or a mesh that is drawn on a link and touches nothing.
+    """A volume or a mesh that is drawn on a link and has no contacts.
 
-    `size` in m: as of a Shape; ellipsoid (x, y, z), half axes; mesh (). `position`, `rotation`: in the root frame, at zero pose.
-    `color`: None where the file gives none; a mesh is then drawn in the colours of its own file, as is one that has several.
+    `link`: index of the link. `size` in m: as of a `mobee.robot.robot.Shape`; ellipsoid (x, y, z), half axes; mesh (). `position` (3,) m,
+    `rotation` (3, 3): in the root frame, at zero pose. `color`: red, green, blue and opacity, each 0 to 1; None: the robot's file gives no
+    colour, and a mesh is drawn in the colours of its own file. `mesh`: the file of a visual of kind "mesh", else None.
     """
 
     link: int
@@ -47,10 +49,11 @@ class Visual:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A camera on a link (root frame, zero pose).
+    """A camera on a link.
 
-    The columns of `rotation` are the picture's right, its down, and the direction of view. `view_deg`: vertical field of view, degrees.
-    `hidden`: links that are not drawn in its pictures, because they enclose it.
+    `link`: index of the link. `position` (3,) m, `rotation` (3, 3): in the root frame, at zero pose. The columns of `rotation` are the
+    directions right and down of the picture and the direction of view. `view_deg`: vertical field of view, degrees. `hidden`: indices of
+    links that are not drawn in the camera's pictures, because they enclose the camera.
     """
 
     name: str

@@ -16,7 +16,7 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The drive of a joint by one motor: joint = scale * motor + offset."""
+    """The drive of a joint by one motor: joint = scale * motor + offset; `motor`: index of the motor, `offset`: rad or m."""
 
     motor: int
     scale: float
@@ -24,7 +24,7 @@ class Drive:
 
 
 def drives_of(robot: Robot) -> tuple[Drive, ...]:
-    """Return the drive of every joint; raises InvalidValue for a joint that no motor drives, or more than one."""
+    """Return the drive of every joint, in the order of the joints; raises InvalidValue for a joint that no motor or several drive."""
     drives: dict[int, Drive] = {}
     for column, motor in enumerate(robot.motor_table):
         for index, scale, offset in motor.joints:
@@ -40,7 +40,10 @@ def drives_of(robot: Robot) -> tuple[Drive, ...]:
 
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file completely or not at all, and return its path: a temporary file beside it takes its place.  Raises OSError."""
+    """Write a file completely or not at all, and return its path.
+
+    The content is written into a temporary file in the same folder, which then replaces the file. Raises OSError.
+    """
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         beside.write_bytes(content)
@@ -51,17 +54,17 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def number(value: float) -> str:
-    """Return the shortest text that reads back as this number."""
+    """Return the shortest decimal text of a number from which float() gives exactly the same number."""
     return repr(float(value)) if value % 1 or abs(value) > 1e15 else str(int(value))
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return the shortest texts of numbers, with blanks between them."""
+    """Return the shortest exact decimal texts of numbers, joined by blanks."""
     return " ".join(map(number, values))
 
 
 def degrees(radians: float) -> str:
-    """Return an angle [rad] as text in degrees, rounded if the rounded text is read as exactly the same angle."""
+    """Return an angle [rad] as text in degrees, rounded to 9 decimals if this gives exactly the same angle [rad] when it is read."""
     exact = float(np.rad2deg(radians))
     rounded = round(exact, 9)
     return number(rounded if np.deg2rad(rounded) == radians else exact)

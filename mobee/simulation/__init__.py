@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated robot: the motors, and the offline plant that runs them with model and controller in one process."""
+"""The simulated robot: its motors, and the offline plant, which runs motors, model and controller in one process."""
 
 from mobee.simulation.batch import advance_together as advance_together
 from mobee.simulation.batch import run_batch as run_batch

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actions and reaches in progress on an offline plant, and how they ended."""
+"""Actions and reaches in progress on an offline plant, and their outcomes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ _SETTLED = VERDICTS.index("settled")
 
 
 class Actions:
-    """The state of each part's action; `parts`: a row for each part, see `mobee._core.plant.PART`, which the plant's ticks change."""
+    """The state of the action of each part.
+
+    `parts`: a table with a row for each part (`mobee._core.plant.PART`), which the plant's ticks change.
+    """
 
     __slots__ = ("_alive", "_limits", "_next_check", "_parts", "_row", "_start", "_under_way", "_verdict", "parts")
 
@@ -42,11 +45,14 @@ class Actions:
 
     @property
     def under_way(self) -> tuple[str, ...]:
-        """The parts that are acting, in their order."""
+        """The names of the parts whose action has not ended yet, in the robot's order."""
         return tuple(compress(self._parts, self._under_way.tolist()))
 
     def require_possible(self, part: str, target: Array) -> None:
-        """Raise InvalidValue if no motor of a part is active, or if a target with a number for each motor is outside their limits."""
+        """Check a target (n_part,) rad for a part: raise InvalidValue if no motor of the part is active, or if it is beyond the limits.
+
+        A target of another shape is not checked here.
+        """
         if not self._alive[part]:
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
         values = target if type(target) is np.ndarray and target.dtype is _FLOAT else real_array(f"target for {part}", target)
@@ -58,7 +64,7 @@ class Actions:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
     def begin(self, part: str, start: float, first_check: float) -> None:
-        """Start a part's settle test at a time [s]; the first check is `first_check` s later."""
+        """Start a part's settle test at time `start` [s]; whether the part has settled is checked first `first_check` [s] later."""
         row = self._row[part]
         self._start[row], self._next_check[row], self._under_way[row] = start, start + first_check, 1
 
@@ -67,7 +73,10 @@ class Actions:
         self._under_way[:] = 0
 
     def outcome(self, part: str, q: Array, sampled: float, touched: tuple[str, ...]) -> Outcome:
-        """Return the outcome of a part's last action: encoders q (n,) rad, read at time `sampled` [s], and the objects in contact."""
+        """Return the outcome of a part's last action.
+
+        `q`: (n,) rad, encoders that were read at time `sampled` [s]. `touched`: names of the objects in contact with the part.
+        """
         row = self._row[part]
         settled = bool(self._verdict[row] == _SETTLED)
         return Outcome(q[self._parts[part].slice].copy(), settled, sampled - float(self._start[row]), touched)
@@ -81,7 +90,12 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False)
 class Reach:
-    """One reach.  `end` and `marker`: outcome and position of the marker, (3,) m, at the end of the force; None while the force acts."""
+    """The state of one reach.
+
+    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended. `end`, `marker`: outcome and position
+    of the marker (3,) m, root frame, at the end of the force; None while the force acts. `missing`: distance of the marker from the target
+    at the end of the force [m].
+    """
 
     name: str
     stay: bool
@@ -91,7 +105,7 @@ class Reach:
 
 
 class ReachesUnderWay:
-    """The reaches of all parts for the presented target."""
+    """The reaches of all parts of an offline plant to the presented target."""
 
     def __init__(self, model: Model, controller: Controller) -> None:
         self._model, self._controller = model, controller
@@ -100,21 +114,24 @@ class ReachesUnderWay:
         self._ended: dict[str, ReachOutcome] = {}
         self._settled: dict[str, Outcome] = {}  # outcomes of ended reaches, until they are read
         self.exempt: str | None = None
-        """A marker whose hand ignores the targets although it is not drawn to one."""
+        """Name of a marker whose hand the targets do not repel, although no force pulls it to a target; None: no such marker."""
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The markers whose hands the targets do not repel now."""
+        """The names of the markers whose hands the targets do not repel at present."""
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
 
     @property
     def running(self) -> tuple[str, ...]:
-        """The parts that are reaching or returning to their attractors."""
+        """The names of the parts that are reaching, or are returning to their attractors."""
         return tuple(self._under_way)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world, or move it there; None removes it."""
+        """Add the target to the world, or move it there; None removes the target.
+
+        Raises InvalidValue if the target is to be removed while a part is reaching for it.
+        """
         pulled = [part for part, reach in self._under_way.items() if reach.end is None]
         if target is None and pulled:
             raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not removed")
@@ -132,7 +149,10 @@ class ReachesUnderWay:
                 self._controller.reach_toward(part, self._under_way[part].name, target)
 
     def begin(self, part: str, marker: str, stay: bool) -> None:
-        """Start the force on the marker; raises InvalidValue if no target is presented."""
+        """Start the force that pulls the marker of a part to the target; raise InvalidValue if no target is presented.
+
+        `stay`: whether the part stays in the pose in which the force ends.
+        """
         if self._target is None:
             raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
         target = self._target
@@ -141,7 +161,11 @@ class ReachesUnderWay:
         self._under_way[part] = Reach(marker, stay)
 
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
-        """Record that a part has settled or timed out in a pose; returns whether the part must now return to its attractor."""
+        """Record that a part has settled or timed out; return whether the part must now return to its attractor.
+
+        `end`: the outcome. `pose`: the pose at that time. At the end of the force the result is True unless the part stays; at the end of
+        the return it is False.
+        """
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:
             reach.end, reach.marker = end, pose.position(reach.name)
@@ -156,17 +180,17 @@ class ReachesUnderWay:
         return False
 
     def outcome(self, part: str) -> ReachOutcome:
-        """Return the outcome of the part's last reach."""
+        """Return the outcome of the part's last reach; raise InvalidValue if no reach of the part has ended."""
         if part not in self._ended:
             raise InvalidValue(f"{part} has not ended a reach on this plant")
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """Return the outcome of a part's last reach once; None if it was read already."""
+        """Return the outcome with which the part's last reach ended; None if it was already returned or there was no reach."""
         return self._settled.pop(part, None)
 
     def drop(self, part: str) -> None:
-        """End a part's reach and its force, if there is one."""
+        """Cancel the reach of a part, if there is one: end its force, and discard an outcome that `after` has not returned yet."""
         self._settled.pop(part, None)
         if part in self._under_way:
             del self._under_way[part]

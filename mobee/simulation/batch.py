@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many offline plants at once: through one call of the core, or in one process for each processor core."""
+"""Runs many offline plants at once: in one call of the compiled core, or in one process for each processor core."""
 
 from __future__ import annotations
 
@@ -24,11 +24,15 @@ T = TypeVar("T")
 
 
 def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[list[tuple[str, Outcome]]]:
-    """Call each plant's `advance()`; returns the results in their order, bit-equal to separate calls, for any number of threads.
+    """Call `advance()` of each plant; return the results (parts and outcomes) in the order of the plants.
 
-    Raises InvalidValue before any plant moves: for an object that is no OfflinePlant, a plant listed twice, a plant without an action
-    under way, and plants in one world while one of them reaches or calls a function (`every`).  Raises BatchInterrupted if a plant's
-    state is not finite or a function that it calls raises: the other plants finish, and its `results` hold their results.
+    The results are bit-equal to separate calls, for any number of threads.
+
+    Raises:
+        InvalidValue: before any plant moves, for an object that is no OfflinePlant, a plant listed twice, a plant without an action in
+            progress, and plants that share a world while one of them reaches or has a callback (`every`).
+        BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
+            `results` of the exception holds their results.
     """
     listed = _apart(plants)
     for number, plant in enumerate(listed):
@@ -43,7 +47,11 @@ def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[l
 
 
 def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -> list[Trace]:
-    """Call each plant's `run(ticks)`; otherwise as `advance_together`, but no action needs to be under way."""
+    """Call `run(ticks)` of each plant; return the traces in the order of the plants.
+
+    The results are bit-equal to separate calls, for any number of threads. The errors are those of `advance_together`, but the plants need
+    no action in progress.
+    """
     listed = _apart(plants)
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:
         raise InvalidValue(f"ticks={ticks!r}: give a whole number, 0 or more.")
@@ -102,10 +110,10 @@ def _run_all(waiting: dict[int, Work[T]], results: dict[int, T], lost: dict[int,
 
 
 def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
-    """Call `work(seed)` for every seed in several processes; returns the results in the order of the seeds.
+    """Call `work(seed)` for every seed in several processes; return the results in the order of the seeds.
 
-    `work`: a function of a module, which makes a plant of that seed, uses it, and returns an object that can be pickled.  `processes`:
-    how many run at once; None: one for each core; 1: in this process.  Exceptions of `work` are raised here.
+    `work`: a function of a module; it makes a plant with the seed, uses it, and returns an object that can be pickled. `processes`: number
+    of processes; None: one for each processor core; 1: in this process. Exceptions of `work` are raised here.
     """
     if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
         raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motors of a simulated robot: lag, delay, backlash, friction, encoder noise, hard stops, and their parameters."""
+"""The motors of a simulated robot: lag, delay, backlash, friction, encoder noise, hard stops, and the parameters of these."""
 
 from __future__ import annotations
 
@@ -26,12 +26,20 @@ PerMotor = float | Sequence[float]  # one number for all, or one for each motor 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorParameters:
-    """Parameters of the motors; with the defaults the published findings appear.
+    """Parameters of the simulated motors; the defaults reproduce the published findings.
 
-    `lag`, `delay`, `backlash` and `friction`: one number, or one for each motor in the order of `robot.motors`.  `friction` is
-    Coulomb friction, given as a velocity: a motor sticks at smaller commanded velocities, and turns slower by it at larger ones.
-    One number for all is for rotary motors, and is scaled by the range of sliding ones (`mobee.robot.motor_units`); numbers for
-    each motor are in its own unit, rad or m.
+    lag, delay, backlash and friction are one number, or one for each motor in the order of `robot.motors`. One number for all applies to
+    rotary motors; backlash and friction are then scaled by the range of sliding motors (`mobee.robot.motor_units`). Numbers for each motor
+    are in its own unit, rad or m.
+
+    Attributes:
+        lag: s, time constant of the first-order response to a velocity command.
+        delay: s, before a command begins to act.
+        backlash: rad, play between motor and joint side.
+        friction: rad/s, Coulomb friction, given as a velocity: at smaller commanded velocities a motor does not move; at larger ones its
+            velocity is reduced by this number.
+        encoder_noise: rad, standard deviation of the white noise at a tick of 20 ms.
+        substep: s, longest time between two steps of the motors.
     """
 
     lag: PerMotor = 0.05  # s, time constant of the first-order response to a velocity
@@ -52,40 +60,57 @@ class MotorParameters:
 
     @classmethod
     def ideal(cls) -> MotorParameters:
-        """Return motors that follow commands at once and exactly, read without noise."""
+        """Return parameters of motors that follow commands at once and exactly, with encoders without noise."""
         return cls(lag=0.0, delay=0.0, backlash=0.0, encoder_noise=0.0)
 
     @classmethod
     def identified(cls, robot_name: str) -> MotorParameters:
-        """Return parameters fitted to the responses of the simulated robot of that name (docs/plant.md); raises UnknownName."""
+        """Return parameters that were fitted to the responses of the simulated robot `robot_name` (docs/plant.md).
+
+        Raises UnknownName for a robot that has not been identified.
+        """
         return cls(**load_identified(robot_name))
 
     def substeps(self, dt: float) -> int:
-        """Return the number of substeps in a tick of dt [s]."""
+        """Return the number of substeps into which a tick of dt [s] is divided."""
         return max(1, int(np.ceil(dt / self.substep - 1e-9)))
 
     def of_motors(self, name: str, count: int) -> Array:
-        """Return a parameter for each of `count` motors, (n,); raises InvalidValue if it is given for another number of motors."""
+        """Return the parameter `name` for each of `count` motors, (count,).
+
+        Raises InvalidValue if the parameter is given for another number of motors.
+        """
         value: Array = np.asarray(getattr(self, name), dtype=np.float64)
         if value.ndim == 1 and len(value) != count:
             raise InvalidValue(f"motor {name} of {len(value)} motors: the robot has {count}; give one number, or one for each motor.")
         return np.array(np.broadcast_to(value, (count,)))
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return a parameter for each motor of a robot, in the unit of the motor, (n,); raises InvalidValue as `of_motors` does."""
+        """Return the parameter `name` for each motor of a robot, in the unit of the motor, (n,).
+
+        Raises InvalidValue if the parameter is given for another number of motors.
+        """
         values = self.of_motors(name, len(robot.motors))
         common = name in ("backlash", "friction") and np.ndim(getattr(self, name)) == 0
         return values * fine_units(robot) if common else values
 
 
 class Braking:
-    """Limits commands of motors to velocities from which they can brake, tick by tick; all arrays (n,).
+    """Limits the commands of n motors tick by tick, so that the motors can always brake before their position limits.
 
-    `velocity` rad/s and `position` rad are the current commands; both are changed in place.
+    `velocity` (n,) rad/s and `position` (n,) rad are the current commands; the methods change them in place.
     """
 
     def __init__(self, lower: Array, upper: Array, fastest: Array, change: Array, dt: float) -> None:
-        """`lower` and `upper` rad, `fastest` rad/s, `change` rad/s in a tick of dt [s]."""
+        """Start with all commands 0.
+
+        Args:
+            lower: (n,) rad, position limits.
+            upper: (n,) rad, position limits.
+            fastest: (n,) rad/s, largest velocities.
+            change: (n,) rad/s, largest change of the velocity in a tick.
+            dt: duration of a tick [s].
+        """
         self._bounds = [np.array(one, dtype=np.float64) for one in (lower, upper, fastest, change)]
         self._count = len(self._bounds[0])
         self.velocity, self.position = np.zeros(self._count), np.zeros(self._count)
@@ -94,17 +119,17 @@ class Braking:
         self._core = core.calls()
 
     def to_velocity(self, wanted: Array, q: Array) -> None:
-        """Change the velocities towards the wanted ones, no faster than the motors at q can brake before their position limits."""
+        """Change `velocity` by one tick towards `wanted` (n,) rad/s, no faster than motors at q (n,) rad can brake before their limits."""
         self._core.to_velocity(self._here, numbers(wanted, self._count), numbers(q, self._count))
 
     def to_position(self, wanted: Array) -> None:
-        """Advance the positions towards the wanted ones, to arrive there at zero velocity."""
+        """Advance `position` by one tick towards `wanted` (n,) rad, such that it arrives there with velocity zero."""
         self._core.to_position(self._here, numbers(wanted, self._count), self._at)
 
     def runs_out(self, q: Array, moving: Array) -> bool:
-        """Return whether a motor at q, rad, with a velocity `moving`, rad/s, can no longer stop before its position limit.
+        """Return whether any motor at q (n,) rad with the velocity `moving` (n,) rad/s can no longer stop before its position limit.
 
-        A velocity that is too high by less than the change of one tick does not count.
+        A velocity that is too high by less than the largest change in one tick is tolerated.
         """
         return bool(self._core.runs_out(self._here, numbers(q, self._count), numbers(moving, self._count)))
 
@@ -119,11 +144,16 @@ _HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 class Motors:
     """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
 
-    Call either `move`, or in each substep `drive` and then `adopt`, between which a physics engine computes the joint side.
+    Either call `move`; or, in each substep, call `drive` and then `adopt`, between which a physics engine computes the positions of the
+    joints.
     """
 
     def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
-        """Start at rest at q (n,) rad, every motor in hold; motors that are not `alive` (n,) never move, and are read without noise."""
+        """Start at rest at q (n,) rad, with every motor in hold (it keeps its position).
+
+        `seed`: of the encoder noise. `alive`: (n,) whether each motor is active; the others never move, and their encoders have no noise.
+        None: all motors are active.
+        """
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
@@ -133,10 +163,10 @@ class Motors:
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
         """Indices of the active motors, ascending."""
         self.state: Table = np.zeros(n, dtype=core.STATE)
-        """A row for each motor, see `mobee._core.plant.STATE`: always the same array, changed by the ticks of a plant."""
+        """The state of the motors, a row for each (`mobee._core.plant.STATE`); the ticks of a plant change this array in place."""
         self._rest(q)
         self.constants = _constants(robot, parameters)
-        """Constants of each motor for the current substep, see `mobee._core.plant.CONSTANTS`."""
+        """The constants of each motor for the current length of substeps, a row for each (`mobee._core.plant.CONSTANTS`)."""
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
         self._noise_samples = np.empty((len(self.living), 4))
@@ -151,7 +181,7 @@ class Motors:
             address(self._noise_samples),
             -1,
         )
-        """The motors as the core reads them."""
+        """The motors as the compiled core reads them."""
         self.address = ctypes.addressof(self.struct)
         self._core = core.calls()
         self._noise = 0.0, np.zeros(n)
@@ -159,7 +189,10 @@ class Motors:
         self.begin_substeps(parameters.substep)
 
     def restart(self, seed: int, q: Array) -> None:
-        """Start again as new motors of that seed would: at rest at q (n,) rad, in hold, which reads no command from the delay line."""
+        """Start again like new motors with this seed: at rest at q (n,) rad, in hold.
+
+        Commands that are still delayed have no effect.
+        """
         self.seed = _checked_seed(seed)
         self._rest(q)
         self.struct.seed, self.struct.noise_tick = self.seed, -1
@@ -172,17 +205,17 @@ class Motors:
 
     @property
     def q(self) -> Array:
-        """Positions of the joint sides [rad]."""
+        """Positions of the joints, behind the backlash, (n,) rad."""
         return self.state["q"].copy()
 
     @property
     def velocities(self) -> Array:
-        """Velocities of the joint sides [rad/s]."""
+        """Velocities of the joints, behind the backlash, (n,) rad/s."""
         return self.state["velocity"].copy()
 
     @property
     def efforts(self) -> Array:
-        """Torques that the motors exert [N m]."""
+        """Torques that the motors exert, (n,) N m."""
         return self.state["effort"].copy()
 
     @efforts.setter
@@ -191,23 +224,23 @@ class Motors:
 
     @property
     def motor_velocities(self) -> Array:
-        """Velocities on the motor side of the play [rad/s]."""
+        """Velocities of the motors before the backlash, (n,) rad/s."""
         return self.state["motor_velocity"].copy()
 
     @property
     def torques(self) -> Array:
-        """Torque commands that left the delay line in the last substep [N m]; 0 for a motor that is not in torque mode."""
+        """Torque commands that took effect in the last substep, after their delay, (n,) N m; 0 for motors that are not in torque mode."""
         return self.state["applied_torque"].copy()
 
     @property
     def in_torque(self) -> NDArray[np.bool_]:
-        """Whether each motor is in torque mode, (n,)."""
+        """Whether each motor is in torque mode, (n,) bool."""
         found: NDArray[np.bool_] = self.state["mode"] == _TORQUE
         return found
 
     @property
     def load(self) -> Array:
-        """Torques from outside on the motors in torque mode, such as gravity [N m], which the motors must overcome."""
+        """Torques from outside, such as gravity, that motors in torque mode must overcome, (n,) N m."""
         return self.state["load"].copy()
 
     @load.setter
@@ -215,10 +248,10 @@ class Motors:
         self.state["load"] = torque
 
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
-        """Set mode and reference of the motors `where`: rad, rad/s or N m by mode; a hold has no reference.
+        """Set the mode and the reference of the motors `where`, a range of indices.
 
-        A hold decelerates at once, without the delay of other commands, and then keeps the position reached.  Motors that enter torque
-        mode compensate gravity until the first torque arrives.
+        `reference`: (m,), rad, rad/s or N m by the mode; None for a hold. A hold decelerates at once, without the delay of other commands,
+        and then keeps the position reached. Motors that enter torque mode compensate gravity until the first torque command takes effect.
         """
         if reference is not None:
             self.state["reference"][where] = reference
@@ -230,9 +263,9 @@ class Motors:
                 self._core.enter(self.address, motor, code)
 
     def drive(self, dt: float) -> Array:
-        """Advance the motor side by one substep of dt [s]; returns the joint-side velocity [rad/s] that it commands, (n,).
+        """Advance the motors by one substep of dt [s], before the backlash; return the velocities that they give the joints, (n,) rad/s.
 
-        It is zero while the motor moves within the backlash.
+        The velocity is zero while a motor moves within the backlash.
         """
         self.begin_substeps(dt)
         self._core.drive(self.address, dt)
@@ -240,34 +273,35 @@ class Motors:
         return velocity
 
     def move(self, substeps: int, dt: float) -> None:
-        """Advance by `substeps` substeps of dt [s] with constant load; only the hard stops block the joint sides."""
+        """Advance motors and joints by `substeps` substeps of dt [s] with constant load; only the hard stops block the joints."""
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)
 
     def adopt(self, q: Array) -> None:
-        """Set the joint side (n,) rad at the end of the substep, computed by a physics engine.
+        """Set the positions of the joints, q (n,) rad, at the end of a substep, as a physics engine has computed them.
 
-        The motor side stays within the backlash, so it does not run ahead of a blocked joint.  In torque mode it follows the joint.
+        The motor stays within the backlash of its joint, so it does not move ahead of a blocked joint. In torque mode it follows the joint.
         """
         self._core.adopt(self.address, numbers(q, len(self.state)), self._dt)
 
     def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
-        """Return the joint positions [rad] at tick k with white noise whose density does not depend on the tick's length dt [s].
+        """Return the encoder values at tick k: the positions of the joints plus white noise, rad, of the motors `where`.
 
-        The noise depends only on the seed, the tick and the motor.
+        `dt`: duration of a tick [s]; the density of the noise does not depend on it. The noise depends only on the seed, the tick and the
+        motor.
         """
         noisy = self.q
         self._core.read(self.address, k, self.noise(dt).tobytes(), address(noisy))
         return noisy[where]
 
     def noise(self, dt: float) -> Array:
-        """Return the standard deviations of the encoders' noise for ticks of length dt [s], (n,) [rad], or [m] for motors that slide."""
+        """Return the standard deviations of the encoders' noise for ticks of dt [s], (n,) rad, or m for motors that slide."""
         if self._noise[0] != dt:
             self._noise = dt, float(self.parameters.encoder_noise * np.sqrt(NOISE_PERIOD / dt)) * fine_units(self._robot)
         return self._noise[1]
 
     def begin_substeps(self, dt: float) -> None:
-        """Set the length of substeps to dt [s]; delayed commands keep their order, the newest last."""
+        """Set the length of substeps to dt [s]; commands that are still delayed keep their order."""
         if dt == self._dt:
             return
         self._dt = dt

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: model, controller and motors in one process, tick by tick as the live system runs them."""
+"""The offline plant: model, controller and motors in one process, which runs the same ticks as the live system."""
 
 from __future__ import annotations
 
@@ -42,16 +42,19 @@ class PlantSettings(Settings):
 
     Args:
         gains: of the control law; None: `Gains.default()`.
-        motors: parameters of the motors; None: `MotorParameters()`, with which the published findings appear.
+        motors: parameters of the motors; None: `MotorParameters()`, whose defaults reproduce the published findings.
         dt: s, the control tick.
-        propagate: which motors a contact force acts on: those of the whole chain, "tree", or of the touching part alone, "part".
+        propagate: which motors a contact force acts on: "tree": those of the whole chain from the touching link to the base; "part": those
+            of the touching part only.
         modality: of the commands: "velocity", "position" or "torque".
         speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
-        contact_forces: False: f_coll is zero.
-        active: names or patterns of parts and motors that move; the others are rigid at home, without noise, and take no time; None: all.
-        command_age: ticks between reading the encoders and moving by the command computed from them; 1 as live.
+        contact_forces: whether contacts of fields cause forces; False: f_coll is zero.
+        active: names or patterns of parts and motors that move; None: all.  The others are rigid at home, without noise, and need no
+            computing time.
+        command_age: number of ticks between the reading of the encoders and the start of the motion by the command computed from them; 1 as
+            live.
         hashed: whether `OfflinePlant.hash` is computed.
-        terms: further forces of the law, Python functions called in every tick.
+        terms: further forces of the law, Python functions that are called in every tick.
     """
 
     gains: Gains | None = None
@@ -75,19 +78,19 @@ class PlantSettings(Settings):
 
 
 class OfflinePlant:
-    """A Plant (see `mobee.plant`) in one process, without bus and real time; the seed determines all noise.
+    """A simulated robot under the control law in one process, without bus and real time; the seed determines all noise.
 
-    A command computed from the encoders of tick k moves the motors from tick k + 1 on, as live.  Several parts may act at once:
-    `begin` starts an action, `advance` runs until one or more have ended, `act` does both for one part.
-    Parts that are not acting are controlled too, and stay at their attractors.
+    It is a Plant (`mobee.plant.Plant`) on which agents can act. A command computed from the encoders of tick k moves the motors from tick k
+    + 1 on, as in the live system. Several parts may act at once: `begin` starts an action, `advance` runs until at least one action has
+    ended, `act` does both for one part. Parts that are not acting are controlled too, and stay at their attractors.
 
     Args:
         model: the robot in its world.
-        seed: of the encoders' noise, a whole number, 0 or more.
-        gains: see `PlantSettings`; None: as in `settings`.
-        motors: see `PlantSettings`; None: as in `settings`.
+        seed: of the encoders' noise, a whole number, at least 0.
+        gains: gains of the control law; None: as in `settings`.
+        motors: parameters of the motors; None: as in `settings`.
         dt: s, the control tick; None: as in `settings`.
-        settings: None: the defaults.
+        settings: all settings of the plant; None: the defaults of `PlantSettings`.
         **changes: fields of `PlantSettings` by keyword, in place of those in `settings`.
 
     Raises:
@@ -132,16 +135,16 @@ class OfflinePlant:
         self._callback: Callable[[float], None] | None = None
 
     def restart(self, seed: int, q: ArrayLike | None = None) -> None:
-        """Start again as a new plant of that seed would, to the last bit and in a fraction of the time: at rest, at time 0.
+        """Start again at rest and at time 0; afterwards the plant behaves exactly like a new plant with this seed, but this call is faster.
 
-        Actions and reaches end without an outcome, forces that were set are cleared; the world and a presented target stay.
+        Actions and reaches end without an outcome, and forces that were set are removed. The world and a presented target stay.
 
         Args:
-            seed: of the encoders' noise.
-            q: where the robot starts, (n,) rad within the motors' limits; motors that are not active must be at home.  None: at home.
+            seed: of the encoders' noise, a whole number, at least 0.
+            q: (n,) rad, start posture within the motors' limits; motors that are not active must be at home.  None: home.
 
         Raises:
-            InvalidValue: a seed that is no whole number, or a start that is not possible.
+            InvalidValue: the seed or the start posture is not valid.
         """
         start = self._checked_start(q)
         self.motors.restart(seed, start)
@@ -172,63 +175,63 @@ class OfflinePlant:
 
     @property
     def controller(self) -> Controller:
-        """The controller; attractors and forces may be set between two ticks."""
+        """The controller of the robot; attractors and forces may be set between two ticks."""
         return self._controller
 
     @property
     def time(self) -> float:
-        """The plant's clock: simulated time since its creation, s."""
+        """The plant's clock: simulated time since its creation or its last restart, s."""
         return self._runner.ticks * self.dt
 
     @property
     def pose(self) -> Pose | None:
-        """The model's pose at the last tick, in the current world; None before the first tick."""
+        """The pose of the model at the last tick, in the current world; None before the first tick."""
         if self._pose is None and self._runner.ticks:
             self._pose = self.model.evaluate(self.q, reaching=self.reaching)
         return self._pose
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The markers that reach for the target now: the target does not push their hands."""
+        """The names of the markers whose hands the targets do not repel at present, because they are reaching."""
         return self._reaches.reaching
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """The parts that are acting, in their order."""
+        """The names of the parts whose action has not ended yet, in the robot's order."""
         return self._actions.under_way
 
     @property
     def may_edit(self) -> bool:
-        """Whether ticks may edit the world or the reaching markers: a reach is under way, or a callback of `every` is set."""
+        """Whether a tick may change the world or the reaching markers, because a reach is in progress or a callback of `every` is set."""
         return bool(self._reaches.running) or self._callback is not None
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The record of robot, current world and settings, without the seed, as plain JSON values."""
+        """A record of the robot, its current world and the settings without the seed, as plain JSON values."""
         active = [name for name, alive in zip(self.robot.motors, self._alive, strict=True) if alive]
         return described(self.robot, self.model.world, active=active, **self._options)
 
     @property
     def hash(self) -> str:
-        """The SHA-256 of the encoders (n,) of every tick so far, little-endian float64; raises InvalidValue without `hashed`."""
+        """The SHA-256 of the encoders (n,) of every tick so far, as little-endian float64; raises InvalidValue unless `hashed` is set."""
         if self._digest is None:
             raise InvalidValue("this plant keeps no hash: make it with hashed=True")
         return self._digest.hexdigest()
 
     @property
     def q(self) -> Array:
-        """The encoder values of all motors at the last tick, shape (n,), in [rad]; tick 0, in which nothing moves, has no noise."""
+        """The encoder values of all motors at the last tick, (n,) rad; before the first tick, the start posture without noise."""
         return self._runner.q.copy()
 
     def measure(self, part: str) -> Array:
-        """Return the encoder values of the part's motors at the last tick, shape (n_part,), in [rad]."""
+        """Return the encoder values of the part's motors at the last tick, (n_part,) rad."""
         return self._runner.q[self.robot.part(part).slice].copy()
 
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
-        """Set the part's attractor to `target` (n_part,) rad, and run until this part has settled or timed out.
+        """Set the part's attractor to `target` (n_part,) rad, run until the part has settled or timed out, and return the outcome.
 
-        `reaching`: a marker whose hand the targets do not push during the action, as in a reach.
-        Raises InvalidValue while another part is acting (then use `begin` and `advance`).
+        `reaching`: name of a marker whose hand the targets do not repel during the action, as in a reach. Raises InvalidValue while another
+        part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
         self.begin(part, target)
@@ -239,7 +242,10 @@ class OfflinePlant:
             self._reaches.exempt = None
 
     def begin(self, part: str, target: Array) -> None:
-        """Set the part's attractor, (n_part,) rad within the motors' limits, and start its settle test; ends a reach of the part."""
+        """Start an action: set the part's attractor to `target` (n_part,) rad and start its settle test; a reach of the part ends.
+
+        Raises InvalidValue for a target beyond the motors' limits.
+        """
         self.robot.part(part)
         self._actions.require_possible(part, target)
         self._controller.set_attractor(part, target)
@@ -247,13 +253,17 @@ class OfflinePlant:
         self._test(part)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world as `TARGET`, role "target", or move it there, also during a reach; None removes it."""
+        """Add the target of reaches to the world as the object `TARGET` with role "target", or move it there; None removes it.
+
+        The target may also be moved during a reach, but not removed (InvalidValue).
+        """
         self._reaches.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull the marker to the presented target until the part has settled or timed out, then end the force: see `ReachPlant`.
+        """Pull the marker to the presented target until the part has settled or timed out, then end the force; return the outcome.
 
-        Raises InvalidValue also while another part is acting.
+        `stay`: True: the part stays in the pose in which the force ended; False: it returns to its attractor. Raises InvalidValue if no
+        target is presented, or while another part is acting.
         """
         self._require_alone(part, "reach")
         self.begin_reach(part, marker, stay)
@@ -261,33 +271,47 @@ class OfflinePlant:
         return self.reached(part)
 
     def begin_reach(self, part: str, marker: str, stay: bool = False) -> None:
-        """Start to pull the marker to the presented target; `advance` runs until the part has returned to its attractor and settled."""
+        """Start to pull the marker of a part to the presented target; `advance` then runs until the whole reach has ended.
+
+        The reach ends when the part has returned to its attractor and settled. `stay`: True: the part stays in the pose in which the force
+        ended, and the reach ends there.
+        """
         self._reaches.begin(part, marker, stay)
         self._test(part)
 
     def reached(self, part: str) -> ReachOutcome:
-        """Return the outcome of the part's last reach; raises InvalidValue if none has ended."""
+        """Return the outcome of the part's last reach; raise InvalidValue if no reach of the part has ended."""
         return self._reaches.outcome(part)
 
     def follow(self) -> None:
-        """Pass the pose of the last tick to the world, which needs it to attach and detach objects; called at the end of every action."""
+        """Pass the pose of the last tick to the world, which needs it to attach and detach objects.
+
+        It is called at the end of every action.
+        """
         self.model.world.follow(self.model.evaluate(self.q))
 
     def every(self, ticks: int, callback: Callable[[float], None] | None) -> None:
-        """Call `callback` with the plant's time [s] every `ticks` ticks; it may edit the world.  None: stop calling."""
+        """Call `callback` with the plant's time [s] every `ticks` ticks; None: stop the calls.
+
+        The callback may change the world. A new callback replaces the present one.
+        """
         if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
             raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
         self._period, self._callback = ticks, callback
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until one or more of the acting parts have ended; returns their names and outcomes, in the order of the parts.
+        """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.
 
-        For a reach, the outcome is that of the return to the attractor; `reached` returns the outcome of both phases.
+        For a reach, the outcome is that of the return to the attractor; `reached` returns the outcome of the whole reach. Raises
+        InvalidValue if no part is acting.
         """
         return finished(self.advancing())
 
     def advancing(self) -> Work[list[tuple[str, Outcome]]]:
-        """Return the computation of `advance` as a generator of its steps, for a caller that runs several plants at once."""
+        """Return the computation of `advance` as a generator of its steps, for a caller that runs several plants at once.
+
+        Each step yields the address of the structure that the core must run next; the return value is that of `advance`.
+        """
         acting = self._actions.under_way
         if not acting:
             raise InvalidValue("no part is acting: call begin first")
@@ -299,18 +323,21 @@ class OfflinePlant:
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
 
     def tick(self) -> None:
-        """Run one control tick: encoders, model, controller; then the motors move by the command of the right age.
+        """Run one control tick: read the encoders, compute model and controller, move the motors by the command of the age `command_age`.
 
         Actions that end in this tick are not returned by a later `advance`.
         """
         finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
-        """Run `ticks` ticks, also if actions end before; return the trace."""
+        """Run `ticks` ticks, also if actions end earlier; return the trace, with one row per tick."""
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:
-        """Return the computation of `run` as a generator of its steps, for a caller that runs several plants at once."""
+        """Return the computation of `run` as a generator of its steps, for a caller that runs several plants at once.
+
+        Each step yields the address of the structure that the core must run next; the return value is that of `run`.
+        """
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
             rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))
@@ -319,14 +346,14 @@ class OfflinePlant:
 
     @property
     def address(self) -> int:
-        """The address of the plant in the core, which `PlantBatch` passes to it."""
+        """The memory address of the plant's structure in the core, which `PlantBatch` passes to the core."""
         return self._runner.address
 
     def prepare_batch(self, deepest: Array) -> bool:
-        """Prepare a run of the core as a plant of a batch; returns False if Python must take part in the ticks.
+        """Prepare the plant for a run of a batch in the core; return False if Python must take part in its ticks.
 
-        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m]; the caller keeps it alive.  After each
-        run call `conclude`.
+        `deepest`: (2,) m, deepest contacts of solids and of fields; the core raises these numbers, and the caller must keep the array.
+        After each run call `conclude`.
         """
         if self._digest is not None or self._callback is not None or self._reaches.exempt or self._runner.needs_python:
             return False
@@ -345,9 +372,10 @@ class OfflinePlant:
         return rows
 
     def conclude(self) -> Array:
-        """Update the plant after ticks of the core; returns their record (ticks, 3 n + 2), empty if none was made.
+        """Update the plant after the core has run ticks; return their record (ticks, 3 n + 2), empty if none was made.
 
-        Raises ActionInterrupted if the motors' state is no longer finite.
+        A row has the encoders, joint positions and velocities (n each), and the deepest contacts of solids and of fields. Raises
+        ActionInterrupted if the motors' state is no longer finite.
         """
         rows, done, lost = self._runner.results()
         if done:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plants of one model as rows of arrays, which one call of the core reads, aims or runs."""
+"""Several offline plants of one model, whose states are rows of arrays; one call of the core reads or runs all of them."""
 
 from __future__ import annotations
 
@@ -18,38 +18,39 @@ from mobee.simulation.runner import Trace
 
 
 class PlantBatch:
-    """Several plants of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
+    """Several offline plants of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
 
-    `which`, in all calls: the numbers of the plants concerned, each once.
+    In all methods, `which` (k,) are the numbers of the plants concerned, each once.
 
     Args:
         model: the robot in its world.
         count: number of plants.
         settings: of the plants; None: the defaults.
-        threads: of the simulation.
+        threads: number of threads of the simulation.
     """
 
     def __init__(self, model: Model, count: int, settings: PlantSettings | None = None, threads: int = 1) -> None:
         self.plants = [OfflinePlant(model, settings=settings) for _ in range(count)]
-        """The plants; each may be used by itself between two calls."""
+        """The plants; each may be used separately between two calls."""
         self._model, self._threads, self._core = model, checked_threads(threads), core.calls()
         self._addresses: Ints = np.array([plant.address for plant in self.plants], dtype=np.int64)
         self._deepest = np.zeros((count, core.RECORD_DEPTHS))
 
     def state(self) -> Array:
-        """Return encoders and attractors [rad], and the controllers' velocities [rad/s] of all plants, (count, 3, n)."""
+        """Return encoders [rad], attractors [rad] and controller velocities [rad/s] of all plants, in this order, (count, 3, n)."""
         state = np.empty((len(self.plants), 3, len(self._model.robot.motors)))
         self._core.read_many(self._addresses.tobytes(), len(self.plants), address(state))
         return state
 
     def aim(self, which: Ints, attractors: Array) -> None:
-        """Set the attractors of plants to `attractors` (k, n) rad; no action begins."""
+        """Set the attractors of the plants `which` (k,) to `attractors` (k, n) rad; no action begins."""
         self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:
-        """Run `ticks` ticks of plants, also if actions end before; returns their deepest contacts (k, 2) of solids and of fields, m.
+        """Run `ticks` ticks of the plants `which` (k,), also if actions end earlier; return their deepest contacts of solids and fields.
 
-        Raises BatchInterrupted as `run_together` does; its results are then the rows of this array.
+        The result is (k, 2) m. Raises BatchInterrupted if a plant's state is not finite; the attribute `results` of the exception then
+        holds the rows of the other plants.
         """
         chosen = [self.plants[number] for number in which.tolist()]
         if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The record of an offline plant as plain JSON values, stored with the transitions that were learned on it."""
+"""The settings of an offline plant as plain JSON values, which are stored with the transitions learned on it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ DIGITS = 9  # decimals of lengths and angles: the same file read on another mach
 
 
 def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
-    """Return the robot's name and digest, the world's objects as they are now, and `more`: options, and dataclasses of numbers."""
+    """Return a description of a simulated robot as plain JSON values.
+
+    Keys: "robot" (name), "digest" (16 hex digits of all its properties that have an effect), "world" (the present objects by name), and the
+    keys of `more`: plain values, or dataclasses of numbers, which become dicts.
+    """
     held = {entry.name: getattr(robot, entry.name) for entry in fields(robot) if entry.name not in _WITHOUT_EFFECT}
     content = {name: _plain(value) for name, value in held.items() if name not in _ADDED_LATER or value}
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The active motors of a plant, and a robot reduced to the joints, links and shapes that the forces on them depend on."""
+"""The active motors of a plant, and a robot reduced to the joints, links and shapes that affect the forces on these motors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ from mobee.robot.robot import Joint, Motor, Robot, per_robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the motors that match `active`: names or patterns of parts and motors; None: all."""
+    """Return whether each motor is active, (n,); `active`: names or patterns of parts and motors; None: all motors.
+
+    Raises UnknownName for a pattern that matches nothing, and InvalidValue if no motor is active.
+    """
     if active is None:
         return np.ones(len(robot.motors), dtype=bool)
     alive = np.zeros(len(robot.motors), dtype=bool)
@@ -33,13 +36,18 @@ def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
 
 
 def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True, apart: Sequence[int] = ()) -> Robot:
-    """Return the robot with the motors that are not `alive` (n,) rigid at home: the same motors, fewer joints, links and shapes.
+    """Return a reduced robot in which the motors that are not active are rigid at home; it has the same motors, but fewer links.
 
-    Links whose joints no active motor drives are merged into their parents.  Contacts that no active motor can change are left out; the
-    forces on active motors stay equal up to rounding, and exactly equal if all are active.  `keep_parts`: links of different parts
-    are not merged, so that forces can be cut between them.  `apart`: links that are not merged either.  `solids` False: fields only,
-    since solids exert no forces.  Markers, masses and attached objects are left out.  The result is cached while it is in use, so that
-    plants share the core's data of it.
+    Links whose joints no active motor drives are merged into their parents. Contacts that no active motor can change are left out. The
+    forces on active motors stay equal up to rounding, and exactly equal if all motors are active. Markers, masses and attached objects are
+    left out. The result is cached while it is in use, so that plants share the core's data of it.
+
+    Args:
+        robot: the robot.
+        alive: (n,) whether each motor is active.
+        keep_parts: whether links of different parts are not merged, so that forces can be cut between parts.
+        solids: False: only fields are kept, since solids exert no forces.
+        apart: numbers of further links that are not merged.
     """
     known, key = _known(robot), (alive.tobytes(), keep_parts, solids, tuple(apart))
     found = known.get(key)
@@ -50,7 +58,7 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
 
 @per_robot
 def without_pairs(robot: Robot) -> Robot:
-    """Return the robot without contacts of its shapes with each other."""
+    """Return the robot without tests for contacts between its own shapes."""
     return replace(robot, solid_pairs=robot.solid_pairs[:0], field_pairs=robot.field_pairs[:0])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the ticks of one plant in the core and records their trace."""
+"""Runs the ticks of one plant in the compiled core, and records their trace."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ SKIN = 0.06  # m, distance within which pairs of shapes are candidates for conta
 
 T = TypeVar("T")
 Work = Generator[int, None, T]
-"""The work of a plant in steps: yields the address of the structure that the core runs next, and continues after it has run."""
+"""A generator of the steps of a plant's work: it yields the address of the structure that the core must run next, then continues."""
 
 
 def finished(work: Work[T]) -> T:
-    """Run the work of one plant to its end, and return its result."""
+    """Run all steps of the work of one plant in the core, and return its result."""
     run = core.calls().run
     try:
         while True:
@@ -46,7 +46,15 @@ def finished(work: Work[T]) -> T:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """The record of a run, one row per tick: encoders, positions of the joints, velocities, and depths of contacts."""
+    """The record of a run, one row per tick.
+
+    Attributes:
+        encoders: (ticks, n) rad.
+        q: (ticks, n) rad, positions of the joints.
+        velocity: (ticks, n) rad/s, the velocities that the controller integrates.
+        solid: (ticks,) m, depth of the deepest contact of solids at the pose of the encoders; 0 without contacts.
+        field: (ticks,) m, depth of the deepest contact of fields.
+    """
 
     encoders: Array  # (ticks, n) rad
     q: Array  # (ticks, n) rad, joint sides
@@ -56,7 +64,7 @@ class Trace:
 
     @classmethod
     def of(cls, record: Array) -> Trace:
-        """Make a trace of the record of the core, (ticks, 3 n + 2)."""
+        """Make a trace from the record of the core, (ticks, 3 n + 2), whose columns are the attributes of a trace in their order."""
         n = (record.shape[1] - 2) // 3
         return cls(record[:, :n], record[:, n : 2 * n], record[:, 2 * n : 3 * n], record[:, 3 * n], record[:, 3 * n + 1])
 
@@ -65,10 +73,19 @@ class Trace:
 
 
 class Runner:
-    """Runs the ticks of one plant; holds its delayed commands, and the encoders and forces of the last tick."""
+    """Runs the ticks of one plant; it holds the delayed commands, and the encoders and forces of the last tick."""
 
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
-        """`parts`: the actions, see `mobee._core.plant.PART`."""
+        """Prepare the structure that the core runs.
+
+        Args:
+            controller: of the robot.
+            motors: of the robot.
+            alive: (n,) whether each motor is active.
+            dt: duration of a tick [s].
+            command_age: number of ticks between the reading of the encoders and the motion by the command computed from them.
+            parts: the state of each part's action, a row for each (`mobee._core.plant.PART`).
+        """
         n = len(alive)
         self._controller, self._motors, self._alive, self._dt = controller, motors, alive, dt
         self._cut = controller.propagate == "part"
@@ -80,7 +97,7 @@ class Runner:
         self._client, self._torque, self._total = np.zeros(n), np.zeros(n), np.zeros(n)
         self._forces = np.zeros((len(controller.force_names), n))
         self.q: Array = controller.robot.home.copy()
-        """The encoders of the last tick, (n,) rad."""
+        """The encoder values at the last tick, (n,) rad."""
         self._struct = core.Plant(
             law=controller.law.address, law_state=address(controller.state), attractor=address(controller.goal),
             client=address(self._client), forces=address(self._forces), rows=len(self._forces), motors=motors.address,
@@ -90,15 +107,15 @@ class Runner:
             torque=address(self._torque), total=address(self._total),
         )  # fmt: skip
         self.batch_world: Snapshot | None = None
-        """The world for which `prepare_batch` has prepared the ticks, None if `prepare` was called since."""
+        """The world for which `prepare_batch` has prepared the ticks; None if `prepare` was called after it."""
         self._parts, self._record, self._listed = parts, np.zeros((0, 3 * n + core.RECORD_DEPTHS)), (0, 0)
         self._clients_act = False
         self.address = ctypes.addressof(self._struct)
-        """The address of the structure that the core runs."""
+        """The memory address of the structure that the core runs."""
         self.restart(self.q)
 
     def restart(self, q: Array) -> None:
-        """Start again from rest at q (n,) rad, without commands and forces under way."""
+        """Start again at tick 0 and at rest at q (n,) rad; delayed commands and forces are removed."""
         self.q[:] = q
         self._struct.ticks = 0
         self._commands[:] = self._controller.state["reference"] if self._controller.modality == "position" else 0.0
@@ -107,15 +124,15 @@ class Runner:
 
     @property
     def ticks(self) -> int:
-        """Number of ticks since the start."""
+        """Number of ticks since the start or the last restart."""
         ticks: int = self._struct.ticks
         return ticks
 
     def prepare(self, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
-        """Prepare up to `most` ticks; returns the address of the structure that the core runs.
+        """Prepare the next run of up to `most` ticks; return the address of the structure that the core must run.
 
-        `kept`: the ticks are recorded; `solids`: contacts of solids are computed too, for the record;
-        `reaching`: the markers whose hands ignore the targets.
+        `kept`: whether the ticks are recorded. `solids`: whether contacts of solids are computed too, for the record. `reaching`: names of
+        the markers whose hands the targets do not repel.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         if self.batch_world is not None:
@@ -141,14 +158,17 @@ class Runner:
 
     @property
     def needs_python(self) -> bool:
-        """Whether Python computes forces for each pose, or clients or reaches exert some: then `prepare` must precede each run."""
+        """Whether Python must compute forces between ticks, so that `prepare` must be called before each run.
+
+        This is so in torque mode, and if clients, reaches or Python terms exert forces.
+        """
         controller = self._controller
         return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
 
     def prepare_batch(self, deepest: Array) -> None:
-        """Prepare the runs of a batch in the present world, one after another, without Python between them.
+        """Prepare successive runs of a batch in the present world, without Python between the ticks.
 
-        The core raises `deepest` (2,) to the depths of the contacts of solids and of fields [m]; the caller keeps it alive.
+        `deepest`: (2,) m, deepest contacts of solids and of fields; the core raises these numbers, and the caller must keep the array.
         """
         world = self._controller.model.world.snapshot
         if self.batch_world is not world:
@@ -156,7 +176,10 @@ class Runner:
             self._struct.deepest, self.batch_world = address(deepest), world
 
     def results(self) -> tuple[Array, int, bool]:
-        """Return the record (ticks, 3 n + 2), the number of ticks run, and whether the motors' state is no longer finite."""
+        """Return the record (ticks, 3 n + 2) of the last run, the number of ticks run, and whether the motors' state is no longer finite.
+
+        The record is empty if the ticks were not recorded.
+        """
         done, end = self._struct.ticks_run, self._struct.end
         if done:
             self._controller.note_forces(self._forces)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An upright cylinder, as a cup, that slides on a table out of the robot's solids: the quasi-static model of pushing."""
+"""An upright cylinder, such as a cup, that the robot pushes over a table: the quasi-static model of pushing."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ UPRIGHT = 1e-6
 class SlidingObject:
     """An upright cylinder that the robot pushes over a horizontal surface.
 
-    Quasi-static: friction with the surface stops it at once when nothing pushes, and its contacts with the robot have no friction.
-    Such a disc moves along the normal of a contact, by the depth, and does not turn.  It topples if it is pushed above the height
-    radius / friction, pressed from above, or wedged between solids, and falls if its centre leaves the area.  A fallen object is out of
-    the world for a second, and is then put back to its first place as soon as the robot is 3 cm away from there.  It exerts no
-    force on the robot, and other objects do not stop it.
+    The motion is quasi-static: friction with the surface stops the object at once when nothing pushes it, and its contacts with the robot
+    have no friction. Such a disc moves along the normal of a contact, by the contact's depth, and does not rotate. It topples if it is
+    pushed above the height radius / friction, pressed from above, or wedged between solids; it falls if its centre leaves the area. A
+    fallen object is removed from the world for one second, and is then put back to its first place as soon as no part of the robot is
+    within 3 cm of this place. It exerts no force on the robot, and other objects do not stop it.
 
     Args:
-        plant: whose motion pushes it; its `every` is used for this.
-        name: of an upright cylinder in the plant's world, of role "ghost": the controller keeps no distance to what the robot may push.
+        plant: the plant whose motion pushes the object; its callback (`every`) is used for this.
+        name: of an upright cylinder in the plant's world with the role "ghost", so that the controller keeps no distance from it.
         support: name of the box on which it stands.
-        friction: coefficient between it and the support.
-        area: ((x low, x high), (y low, y high)) in m, within which its centre stays; None: the top of the support.
+        friction: coefficient of friction between object and support.
+        area: ((x low, x high), (y low, y high)) in m, root frame, within which its centre stays; None: the top of the support.
 
     Raises:
         UnknownName: the world has no such object.
-        InvalidValue: it is not an upright cylinder of role "ghost" on the top of an upright box and within the area.
+        InvalidValue: the object is not an upright cylinder with the role "ghost" on the top of an upright box and within the area.
     """
 
     def __init__(
@@ -74,22 +74,28 @@ class SlidingObject:
         self._place: Array | None = thing.position.copy()
         self._fell_at = 0.0
         self.path = 0.0
-        """Length of the path over which the robot has pushed it, m."""
+        """Length of the path over which the robot has pushed the object, m."""
         self.falls = 0
-        """How often it has toppled or left the area."""
+        """Number of times that the object has toppled or left the area."""
         plant.every(max(1, round(PERIOD / plant.dt)), self.check)
 
     @property
     def place(self) -> Array | None:
-        """The position of its centre, (3,) m; None between a fall and the moment when it is put back."""
+        """The position of the object's centre, (3,) m, root frame; None after a fall, until the object is put back."""
         return None if self._place is None else self._place.copy()
 
     def perceive(self) -> dict[str, Array]:
-        """Return its place by its name, exactly, and nothing while it has fallen: for a `PerceivingPlant`."""
+        """Return the exact position of the object (3,) m, root frame, by its name; an empty dict after a fall, until it is put back.
+
+        Use it as the perception of a `PerceivingPlant`.
+        """
         return {} if self._place is None else {self.name: self._place.copy()}
 
     def put_back(self) -> bool:
-        """Put it to its first place, also if it has not fallen; returns False, and changes nothing, if the robot is within 3 cm of it."""
+        """Put the object to its first place, also if it has not fallen; return whether this was possible.
+
+        If the robot is within 3 cm of the place, nothing changes and False is returned.
+        """
         if self._deepest(self._plant.motors.q.tobytes(), self._room) is not None:
             return False
         first, world = self._first, self._plant.model.world
@@ -103,7 +109,7 @@ class SlidingObject:
         return True
 
     def check(self, time: float) -> None:
-        """Push it out of the robot's solids, or put it back if it has fallen; the plant calls this, with its time [s]."""
+        """Push the object out of the robot's solids, or put it back if it has fallen; the plant calls this method with its time [s]."""
         q = self._plant.motors.q.tobytes()
         if self._place is None:
             if time - self._fell_at >= ABSENCE:

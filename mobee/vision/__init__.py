@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vision: lenses, cameras with imperfections, the places of what two of them see, and their calibration by looking at the own hand."""
+"""Vision: lenses, imperfect cameras, positions of objects from two cameras, and calibration of the cameras on the robot's own hand."""

@@ -18,16 +18,17 @@ PER_CELL = 6  # samples of a pattern along one side of a cell
 
 
 def aligned(gray: NDArray[np.float32], lens: Lens, pattern: Array, margin: int, corners: Array) -> Array | None:
-    """Return the exact corners (4, 2) px of a pattern in a grey picture (height, width), from corners that are wrong by a pixel or two.
+    """Return the exact corners (4, 2) px of a flat pattern in a grey picture, from corners that are wrong by a pixel or two.
 
-    The pattern is a plane seen in perspective; brightness is fitted too.  None if it does not fit.
+    The pattern is a plane seen in perspective; its brightness and contrast are fitted too. None if the pattern does not fit the picture, or
+    if a corner would move by more than 2.5 px.
 
     Args:
-        gray: the picture.
+        gray: (height, width), the picture.
         lens: of the camera.
         pattern: (c, c), the brightness of square cells.
-        margin: number of cells around the square whose corners are meant.
-        corners: (4, 2) px, clockwise from the upper left.
+        margin: number of cells of `pattern` around the square whose corners are searched.
+        corners: (4, 2) px, first values of the corners, column and row, clockwise from the upper left.
     """
     from scipy.ndimage import gaussian_filter, map_coordinates  # 0.3 s, and only the alignment needs it
 

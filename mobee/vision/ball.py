@@ -28,24 +28,28 @@ BORDER_INSET = 0.5  # px: the centres of border pixels lie half a pixel inside t
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """A ball in one picture, in the camera's frame: x right, y down, z forward."""
+    """A ball in one picture, in the camera's frame: x right, y down, z forward.
+
+    `direction`: (3,) unit vector to the centre of the ball. `half_angle`: half angle [rad] of the cone of rays that touch the ball. `arc`:
+    share of the outline that is visible, 0 to 1.
+    """
 
     direction: Array  # (3,) unit vector to the ball's centre
     half_angle: float  # rad, of the cone that touches the ball
     arc: float  # share of the outline that is visible, 0..1
 
     def distance(self, radius: float) -> float:
-        """Return the distance [m] of a ball of this radius [m], from its size in the picture."""
+        """Return the distance [m] of the ball's centre from the camera, if the ball has this `radius` [m]."""
         return radius / math.sin(self.half_angle)
 
 
 def find_balls(picture: Picture, intrinsics: Array, distortion: Sequence[float] = ()) -> list[Sighting]:
-    """Find every round red object in a picture (height, width, 3) of bytes red, green, blue; the largest first.
+    """Find every round red object in a picture (height, width, 3) of bytes red, green, blue; return them with the largest first.
 
-    `intrinsics`: the camera's matrix (3, 3), px; `distortion`: k1 k2 p1 p2 of its lens, see `Lens`, or none.
+    `intrinsics`: (3, 3) px, the camera's matrix. `distortion`: the coefficients k1 k2 p1 p2 of the lens (Brown and Conrady), or empty.
 
-    A sphere's outline is an ellipse that is not centred on its centre, but its rays form a circular cone about the
-    ray to its centre. The cone is fitted, so perspective causes no bias.  Points where another object hides the ball are left out.
+    The outline of a sphere is an ellipse whose centre is not the image of the sphere's centre, but its rays form a circular cone about the
+    ray to the centre. The cone is fitted, so perspective causes no bias. Points where another object hides the ball are ignored.
     """
     height, width = picture.shape[:2]
     found = []

@@ -18,7 +18,10 @@ WINDOW = 0.035  # s: readings within this time of the stamp are used
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """The encoders at one time, by a line through the readings around it: q (n,) rad, dq (n,) rad/s, and the variances (n,) of q."""
+    """The encoders at one time, by a straight line through the readings around it.
+
+    `q`: (n,) rad. `dq`: (n,) rad/s. `variance`: (n,) rad^2, of q.
+    """
 
     q: Array
     dq: Array
@@ -26,22 +29,25 @@ class Moment:
 
 
 class Readings:
-    """The newest readings of the encoders, part by part, since each part has its own times."""
+    """The newest readings of the encoders of each part; the readings of different parts have different times.
+
+    `parts`: range of motor indices of each part, by name. `motors`: number n of all motors.
+    """
 
     def __init__(self, parts: Mapping[str, slice], motors: int) -> None:
         self._parts, self._motors = dict(parts), motors
         self._rows: dict[str, deque[tuple[float, Array]]] = {part: deque(maxlen=KEPT) for part in parts}
 
     def note(self, part: str, t: float, q: Array) -> None:
-        """Add a reading (n_part,) rad of a part at time t [s]; one that is not newer than the last is ignored."""
+        """Add a reading q (n_part,) rad of a part at time t [s]; a reading that is not newer than the last one is ignored."""
         rows = self._rows[part]
         if not rows or t > rows[-1][0]:
             rows.append((t, q))
 
     def at(self, t: float) -> tuple[Array, Array, int]:
-        """Return the encoders (n,) rad and their velocities (n,) rad/s at time t [s], and the fewest readings of a part in them.
+        """Return the encoders (n,) rad and velocities (n,) rad/s of all motors at time t [s], and the number of readings used.
 
-        Raises InvalidValue if a part has fewer than two readings near that time.
+        This number is the smallest one of all parts. Raises InvalidValue if a part has fewer than two readings within 0.035 s of t.
         """
         q, dq, fewest = np.zeros(self._motors), np.zeros(self._motors), KEPT
         for part, where in self._parts.items():
@@ -53,15 +59,15 @@ class Readings:
         return q, dq, fewest
 
     def forget(self) -> None:
-        """Drop all readings, at the start of a new run."""
+        """Remove all readings; called at the start of a new run."""
         for rows in self._rows.values():
             rows.clear()
 
 
 def moment_at(times: Array, readings: Array, t: float, noise: Array) -> Moment:
-    """Return the encoders at time t [s] from readings (m, n) rad at times (m,) s, by least squares within WINDOW of t.
+    """Return the encoders at time t [s] from readings (m, n) rad at times (m,) s, by a line fitted to the readings within 0.035 s.
 
-    `noise`: standard deviations (n,) of one reading, rad.  Raises InvalidValue if fewer than two readings are near.
+    `noise`: (n,) rad, standard deviation of one reading. Raises InvalidValue if fewer than two readings are within 0.035 s of t.
     """
     near = np.abs(times - t) <= WINDOW
     if near.sum() < 2:

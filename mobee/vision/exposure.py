@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of imperfect cameras: distortion, motion blur, noise, and cameras that are not where the model has them."""
+"""Pictures of imperfect cameras: distortion, motion blur, noise, and cameras whose positions differ from the model."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ UPWARDS = np.array([[1.0], [-1.0], [1.0]])  # a camera's right, down and ahead a
 
 
 class Sensor:
-    """Develops brightness in the plane ahead of a camera into pictures as its lens and chip make them.
+    """Turns the brightness in the plane ahead of a camera into a picture, with the distortion of its lens and the noise of its chip.
 
-    A pixel is the mean of `samples` samples, at different places within it and at different moments of the exposure.
+    A pixel is the mean of `settings.samples` samples, at different places within the pixel and at different times of the exposure.
     """
 
     def __init__(self, settings: CameraSettings) -> None:
@@ -49,21 +49,27 @@ class Sensor:
             self._pixels.append(Pixels.some(self._height, self._width, at[:, 1] * self._width + at[:, 0]))
 
     def moments(self) -> Array:
-        """Return the times (samples,) s of the samples, from the middle of the exposure."""
+        """Return the times (samples,) s of the samples, relative to the middle of the exposure."""
         count = self._settings.samples
         return self._settings.exposure * ((np.arange(count) + 0.5) / count - 0.5)
 
     def view(self, sample: int, position: Array, rotation: Array) -> View:
-        """Return the view of a sample of a camera at a position (3,) m with a rotation (3, 3), columns right, down, ahead."""
+        """Return the view in which sample number `sample` is drawn, for a camera at `position` (3,) m with `rotation` (3, 3), root frame.
+
+        The columns of the rotation are the directions right, down and ahead of the camera.
+        """
         left, top = self._corners[sample]
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return the pixels (height * width,) of a sample's view that the pixels of the picture show."""
+        """Return the pixels of the view of sample number `sample` that belong to the height * width pixels of the picture, row by row."""
         return self._pixels[sample]
 
     def develop(self, light: Floats, rng: np.random.Generator) -> Picture:
-        """Return the picture (height, width, 3), with noise, of the sum of the brightness of all samples (height * width, 3)."""
+        """Return the picture (height, width, 3) with noise, bytes red, green, blue.
+
+        `light`: (height * width, 3), the sum of the brightness (0 to 255) of all samples. `rng`: draws the noise.
+        """
         settings = self._settings
         electrons = light * np.float32(settings.full_well / settings.gain / 255.0 / settings.samples)
         deviation = np.sqrt(electrons + np.float32(settings.read_noise**2))  # of shot and read noise, both nearly normal
@@ -81,10 +87,10 @@ def _noise_table(size: int) -> Floats:
 
 
 class Cameras:
-    """The imperfect cameras of one robot in a scene."""
+    """The imperfect cameras of one robot in a scene, which take pictures."""
 
     def __init__(self, scene: Scene, settings: CameraSettings, errors: CameraErrors, seed: int) -> None:
-        """`seed`: of the noise in the pictures."""
+        """Make the cameras of a scene; `seed`: of the noise in the pictures. `errors`: how the cameras differ from the model."""
         self.settings, self.errors = settings, errors
         self._scene = scene
         self._sensor = Sensor(settings)
@@ -92,14 +98,14 @@ class Cameras:
 
     @property
     def moments(self) -> Array:
-        """The times (samples,) s, from the middle of the exposure, for which `expose` takes the robot's postures."""
+        """The times (samples,) s, relative to the middle of the exposure, at which `expose` needs the robot's posture."""
         return self._sensor.moments()
 
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
-        """Return the picture of a camera (height, width, 3), red, green, blue.
+        """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: of the camera.
 
-        `postures`: the true positions of all motors, (n,) rad, at each of the `moments`; those of the head differ from the encoders
-        by `errors.encoders`, which this method adds.
+        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The method adds the offsets
+        `errors.encoders` to them, so that the encoders of the head are wrong by these offsets.
         """
         camera, scene = self._scene.cameras[name], self._scene
         light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)
@@ -110,7 +116,10 @@ class Cameras:
         return self._sensor.develop(light, self._rng)
 
     def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
-        """Return how much of each pixel shows each of the first `objects` of the world (height, width, objects), as `expose` draws them."""
+        """Return the share of each pixel that shows each of the first `objects` objects of the world, (height, width, objects), 0 to 1.
+
+        `name` and `postures` are those of `expose`: the camera, and the positions of all motors (n,) rad at each of the `moments`.
+        """
         camera, scene = self._scene.cameras[name], self._scene
         found = np.zeros((self.settings.height * self.settings.width, objects), np.float32)
         for sample, q in enumerate(postures):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is imperfect about real cameras: their settings, and the errors of one robot, drawn by a seed."""
+"""Imperfections of real cameras: their settings, and the errors of one robot's cameras, drawn with a seed."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from mobee.settings import Range, Settings
 from mobee.vision.lens import DRAGONFLY, Lens
 
 HEAD = "head"
-"""The part whose encoders have offsets."""
+"""Name of the part whose encoders have offsets."""
 _STREAM = 0x65796573  # of random numbers, beside those of motors and encoders of the same seed
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):
-    """Settings of imperfect cameras, all alike; the defaults are those of an iCub with Dragonfly cameras, as far as they are known.
+    """Settings of imperfect cameras, which are all alike; the defaults are those of an iCub's Dragonfly cameras, as far as known.
 
-    The lens is published (see `DRAGONFLY`).  Exposure, noise, latency and jitter are assumed: typical values of such CCD cameras on
-    FireWire.  The tolerances (`mount_*`, `encoder_offset`, `tag_*`) bound what the kinematic model does not know; `camera_errors` draws
-    the errors of one robot within them.
+    The lens is a published one (DRAGONFLY).  Exposure, noise, latency and jitter are assumed: typical values of such CCD cameras on
+    FireWire.  The tolerances (`mount_*`, `encoder_offset`, `tag_*`) bound the errors of the kinematic model; `camera_errors` draws the
+    errors of one robot within them.
 
     Args:
         width: columns of a picture.
         height: rows of a picture.
         lens: of every camera.
-        exposure: s, for which a picture collects light: motion within it is blurred.
-        samples: moments within the exposure at which the scene is drawn, each at another place within the pixels.
-        gain: factor on the signal; the pictures are exposed so that brightness stays, so a gain of 2 collects half of the light.
+        exposure: s, time during which a picture collects light: motion within it is blurred.
+        samples: number of times within the exposure at which the scene is drawn, each at another place within the pixels.
+        gain: factor on the signal; the exposure is adapted such that the brightness is the same, so a gain of 2 collects half of the light.
         full_well: electrons of a white pixel at gain 1; their number has shot noise.
         read_noise: standard deviation of the readout, electrons.
         latency: s from the middle of the exposure to the arrival of the picture, as the driver assumes it when it computes the stamp.
         latency_error: s, bound of the difference of the true latency from the assumed one.
         jitter: standard deviation of the latency from picture to picture, s.
-        mount_position: m, bound of a camera's distance from where the model has it.
-        mount_rotation: degrees, bound of a camera's angle to the orientation that the model has.
+        mount_position: m, bound of the distance of a camera from its position in the model.
+        mount_rotation: degrees, bound of the angle of a camera to its orientation in the model.
         encoder_offset: degrees, bound of the offset of each of the head's encoders.
-        tag_position: m, bound of the distance of the palm's tag from where the model has it.
-        tag_rotation: degrees, bound of its angle.
+        tag_position: m, bound of the distance of the palm's tag from its position in the model.
+        tag_rotation: degrees, bound of the angle of the tag to its orientation in the model.
     """
 
     width: Annotated[int, Range(ge=16, le=1280)] = 320
@@ -65,7 +65,10 @@ class CameraSettings(Settings):
 
     @property
     def deviations(self) -> Mapping[str, float]:
-        """The standard deviations of drawn errors along each axis, by kind: what a calibration knows before it sees anything."""
+        """The standard deviations of the drawn errors along each axis, by kind; a calibration uses them as its prior.
+
+        The kinds are "position" and "rotation" of a mount, "encoder", "latency", "tag_position" and "tag_rotation", in m, rad and s.
+        """
         ball = 1.0 / np.sqrt(5.0)  # of a coordinate of a point that is uniform in a ball, over the ball's radius
         return {
             "position": self.mount_position * ball,
@@ -81,9 +84,12 @@ class CameraSettings(Settings):
 class CameraErrors:
     """By how much one robot's cameras differ from its kinematic model.
 
-    `mounts`: by camera, (6,): displacement [m], then rotation vector [rad], both in the camera's own axes: the true camera is that of the
-    model, displaced and then turned.  `encoders`: (n,) rad, true position minus what the encoder says, 0 but for the head.  `latency`: s,
-    true minus assumed: the true exposure is this much before the stamp.  `tag`: (6,) as a mount, in the tag's axes.
+    Attributes:
+        mounts: by camera, (6,): displacement [m], then rotation vector [rad], both in the camera's own axes.  The true camera is that of
+            the model, displaced and then rotated.
+        encoders: (n,) rad, true position minus encoder value; 0 for all motors except those of the head.
+        latency: s, true minus assumed latency: the true exposure was earlier than the stamp by this time.
+        tag: (6,), displacement and rotation vector of the tag, in the tag's axes.
     """
 
     mounts: Mapping[str, Array]
@@ -93,12 +99,15 @@ class CameraErrors:
 
     @classmethod
     def none(cls, robot: Robot, cameras: Sequence[str]) -> CameraErrors:
-        """Return errors that are all zero."""
+        """Return errors that are all zero; `cameras`: names of the cameras."""
         return cls({name: np.zeros(6) for name in cameras}, np.zeros(len(robot.motors)), 0.0, np.zeros(6))
 
 
 def camera_errors(settings: CameraSettings, robot: Robot, cameras: Sequence[str], seed: int) -> CameraErrors:
-    """Draw the errors of one robot: displacements and rotations uniform in balls, encoder offsets and latency uniform in intervals."""
+    """Draw the errors of one robot's cameras; `cameras`: their names.
+
+    Displacements and rotations are uniform in balls, encoder offsets and latency are uniform in intervals, with the bounds of `settings`.
+    """
     rng = np.random.default_rng([seed, _STREAM])
 
     def drawn(position: float, rotation_deg: float) -> Array:

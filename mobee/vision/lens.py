@@ -15,7 +15,7 @@ ROUNDS, ENOUGH = 30, 1e-12  # of Newton's method that inverts the distortion; it
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """The intrinsic parameters of a camera; the middles of pixels are at integers, and the origin is top left.
+    """The intrinsic parameters of a camera; the centres of pixels are at integers, and the origin is top left.
 
     `fx`, `fy`: focal lengths, px.  `cx`, `cy`: principal point, px.  `k1`, `k2`: radial, `p1`, `p2`: tangential distortion of Brown and
     Conrady, in OpenCV's order and sign.  A camera's frame has x to the right, y down and z along the direction of view.
@@ -36,25 +36,28 @@ class Lens:
 
     @classmethod
     def ideal(cls, view_deg: float, width: int, height: int) -> Lens:
-        """Return the lens without distortion of a picture with a vertical field of view [degrees]."""
+        """Return a lens without distortion for pictures of width x height pixels; `view_deg`: vertical field of view [degrees]."""
         focal = 0.5 * height / float(np.tan(0.5 * np.deg2rad(view_deg)))
         return cls(focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5)
 
     @classmethod
     def of_matrix(cls, matrix: Array, distortion: Array) -> Lens:
-        """Return the lens of a matrix (3, 3) in pixels and the coefficients k1 k2 p1 p2 (4,), or (0,) for none; raises InvalidValue."""
+        """Return the lens with a camera matrix (3, 3) px and the coefficients k1 k2 p1 p2 (4,), or (0,) without distortion.
+
+        Raises InvalidValue for other shapes or for values that are not valid.
+        """
         if np.shape(matrix) != (3, 3) or len(distortion) not in (0, 4):
             raise InvalidValue(f"a lens of {np.size(matrix)} and {len(distortion)} numbers: expected 9, and 4 or none")
         return cls(*(float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2))), *(float(one) for one in distortion))
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The eight parameters in their order."""
+        """The eight parameters fx, fy, cx, cy, k1, k2, p1, p2."""
         return self.fx, self.fy, self.cx, self.cy, self.k1, self.k2, self.p1, self.p2
 
     @property
     def matrix(self) -> Array:
-        """The matrix (3, 3), px, without the distortion."""
+        """The camera matrix (3, 3), px; it does not contain the distortion."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @property
@@ -64,7 +67,7 @@ class Lens:
         return given if any(given) else ()
 
     def distort(self, flat: Array) -> Array:
-        """Return the distorted coordinates (..., 2) of points (..., 2) in the plane at distance 1."""
+        """Return the distorted coordinates (..., 2) of points `flat` (..., 2), given as (x / z, y / z) in the camera's frame."""
         x, y = flat[..., 0], flat[..., 1]
         square = x * x + y * y
         radial = 1.0 + square * (self.k1 + square * self.k2)
@@ -77,7 +80,7 @@ class Lens:
         )
 
     def distortion_slope(self, flat: Array) -> Array:
-        """Return the derivative (..., 2, 2) of `distort` at points (..., 2)."""
+        """Return the derivative (..., 2, 2) of `distort` at points `flat` (..., 2), given as (x / z, y / z) in the camera's frame."""
         x, y = flat[..., 0], flat[..., 1]
         square = x * x + y * y
         radial = 1.0 + square * (self.k1 + square * self.k2)
@@ -90,7 +93,10 @@ class Lens:
         return out
 
     def undistort(self, flat: Array) -> Array:
-        """Return the points (..., 2) whose distorted coordinates are given (..., 2), by Newton's method; NaN where there is none."""
+        """Return the points (..., 2), (x / z, y / z), that `distort` maps to the coordinates `flat` (..., 2).
+
+        They are found by Newton's method; NaN where there is no such point.
+        """
         given = np.asarray(flat, dtype=np.float64)
         found, step = given.copy(), np.full(given.shape, np.inf)
         with np.errstate(all="ignore"):
@@ -109,7 +115,7 @@ class Lens:
         return found
 
     def project(self, points: Array) -> Array:
-        """Return the pixels (..., 2), column and row, of points (..., 3) m in the camera's frame; NaN for those behind the camera."""
+        """Return the pixels (..., 2), column and row, of points (..., 3) m in the camera's frame; NaN for points behind the camera."""
         ahead = np.where(points[..., 2:] > 0.0, points[..., 2:], np.nan)
         found: Array = self.distort(points[..., :2] / ahead) * (self.fx, self.fy) + (self.cx, self.cy)
         return found
@@ -122,7 +128,7 @@ class Lens:
         return np.concatenate([by_flat, -(by_flat @ flat[..., None])], axis=-1)
 
     def unproject(self, pixels: Array) -> Array:
-        """Return the unit vectors (..., 3) in the camera's frame of pixels (..., 2); NaN where the lens shows no direction."""
+        """Return the unit vectors (..., 3) in the camera's frame along the rays of pixels (..., 2); NaN where a pixel has no ray."""
         flat = self.undistort((pixels - np.array([self.cx, self.cy])) / np.array([self.fx, self.fy]))
         rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
         found: Array = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -130,4 +136,4 @@ class Lens:
 
 
 DRAGONFLY = Lens(215.6, 215.1, 163.4, 111.2, -0.3675, 0.1323, -0.0004, -0.0002)
-"""Of an iCub's eye at 320x240: the published example of the left camera in the documentation of the iCub's stereo calibration."""
+"""The lens of an iCub's eye at 320x240: the published example of the left camera in the documentation of the iCub's stereo calibration."""

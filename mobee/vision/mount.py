@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of cameras that are displaced and turned on their links."""
+"""Frames of cameras that are displaced and rotated on their links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SMALL = 1e-4  # rad: below it series are more exact than the formulas
 
 
 def rotation_of(vector: Array) -> Array:
-    """Return the rotation (3, 3) by a rotation vector (3,) rad (Rodrigues' formula)."""
+    """Return the rotation (3, 3) that belongs to a rotation vector (3,) rad (Rodrigues' formula)."""
     angle = float(np.linalg.norm(vector))
     skew = skew_of(vector)
     first = np.sinc(angle / np.pi)
@@ -22,7 +22,10 @@ def rotation_of(vector: Array) -> Array:
 
 
 def right_slope(vector: Array) -> Array:
-    """Return J (3, 3) with rotation_of(v + d) = rotation_of(v) rotation_of(J d) for small d: the right Jacobian of rotations."""
+    """Return the right Jacobian J (3, 3) of rotations at a rotation vector v = `vector` (3,) rad.
+
+    For small d, rotation_of(v + d) = rotation_of(v) rotation_of(J d).
+    """
     angle = float(np.linalg.norm(vector))
     skew = skew_of(vector)
     second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
@@ -32,7 +35,7 @@ def right_slope(vector: Array) -> Array:
 
 
 def skew_of(vector: Array) -> Array:
-    """Return the matrix (..., 3, 3) of the cross product with vectors (..., 3)."""
+    """Return the skew-symmetric matrix (..., 3, 3) of vectors v (..., 3): its product with w is the cross product v x w."""
     v = np.asarray(vector)
     found = np.zeros((*v.shape, 3))
     found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
@@ -41,7 +44,7 @@ def skew_of(vector: Array) -> Array:
 
 
 def mounted(position: Array, rotation: Array, mount: Array) -> tuple[Array, Array]:
-    """Return position (..., 3) m and rotation (..., 3, 3) of a frame that is displaced and then turned by a mount (6,).
+    """Return position (..., 3) m and rotation (..., 3, 3) of a frame after it is displaced and then rotated by `mount` (6,).
 
     `mount`: displacement [m] and rotation vector [rad], both in the axes of the given frame.
     """
@@ -49,9 +52,10 @@ def mounted(position: Array, rotation: Array, mount: Array) -> tuple[Array, Arra
 
 
 def camera_frames(camera: Camera, transforms: Array, mount: Array) -> tuple[Array, Array]:
-    """Return optical centre (..., 3) m and rotation (..., 3, 3), columns right, down, ahead, of a camera in the root frame.
+    """Return the optical centre (..., 3) m and rotation (..., 3, 3) of a camera in the root frame.
 
-    `transforms`: (..., L, 4, 4), from link_transforms; `mount`: (6,), see `mounted`.
+    The columns of the rotation are the directions right, down and ahead. `transforms`: (..., L, 4, 4) of all links, from `link_transforms`.
+    `mount`: (6,), displacement [m] and rotation vector [rad] of the true camera from that of the model, in the camera's axes.
     """
     position, rotation = mounted(camera.position, camera.rotation, mount)
     link = transforms[..., camera.link, :3, :]
@@ -59,6 +63,6 @@ def camera_frames(camera: Camera, transforms: Array, mount: Array) -> tuple[Arra
 
 
 def into(position: Array, rotation: Array, points: Array) -> Array:
-    """Return points (..., 3) m of the root frame in frames at position (..., 3) m with rotation (..., 3, 3)."""
+    """Transform points (..., 3) m from the root frame into a frame at `position` (..., 3) m with `rotation` (..., 3, 3)."""
     found: Array = np.einsum("...ji,...j->...i", rotation, points - position)
     return found

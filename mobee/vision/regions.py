@@ -11,9 +11,9 @@ Labels = NDArray[np.intp]
 
 
 def label(mask: Mask, diagonal: bool) -> Labels:
-    """Return the number of each pixel's region, shape (height, width): from 1, in the order of the regions' first pixels; 0 outside.
+    """Return the number of the connected region of each pixel, (height, width); 0 outside of the mask.
 
-    `diagonal`: pixels that share a corner only are connected too.
+    Regions are numbered from 1, in the order of their first pixels. `diagonal`: whether pixels that share only a corner are connected too.
     """
     height, width = mask.shape
     line = np.zeros((height, width + 1), dtype=np.int8)  # one pixel more, so that no run of pixels continues in the next row
@@ -47,7 +47,10 @@ def _connected(starts: Labels, ends: Labels, below: int, gap: int) -> Labels:
 
 
 def boxes(labels: Labels) -> list[tuple[slice, slice]]:
-    """Return the rows and columns that each region occupies, region by region."""
+    """Return the smallest box of each region, as (slice of rows, slice of columns), in the order of the regions' numbers.
+
+    `labels`: (height, width), the numbers of the regions, as `label` returns them.
+    """
     rows, columns = np.nonzero(labels)
     of = labels[rows, columns] - 1
     count = int(of.max(initial=-1)) + 1
@@ -59,13 +62,13 @@ def boxes(labels: Labels) -> list[tuple[slice, slice]]:
 
 
 def without_holes(mask: Mask) -> Mask:
-    """Return the mask with its holes filled: pixels that no path, from side to side, connects with the picture's border."""
+    """Return the mask with its holes filled; a hole is outside of the mask and not connected with the picture's border by pixel sides."""
     outside = label(~np.pad(mask, 1), diagonal=False)
     filled: Mask = (outside != 1)[1:-1, 1:-1]
     return filled
 
 
 def border(mask: Mask) -> Mask:
-    """Return the mask of the pixels that share a side with a pixel outside of the mask."""
+    """Return a mask of the mask's pixels that share a side with a pixel outside of the mask."""
     wide = np.pad(mask, 1)
     return mask & ~(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predicts the pixels of points that a robot's cameras see, with derivatives by the calibration's parameters and by the posture."""
+"""Predicts the pixels of points that a robot's cameras see, with derivatives by the calibration's parameters and the posture."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A robot with cameras: what a calibration knows beforehand, and the order of its parameters.
+    """A robot with cameras, before a calibration; it defines the order of the calibration's parameters.
 
-    `cameras`: by name, where the model has them; `lens`: of all; `tag`: on the palm, or None.
+    `cameras`: by name, at their positions in the model. `lens`: of all cameras. `tag`: on the palm, or None.
     """
 
     robot: Robot
@@ -34,18 +34,18 @@ class Rig:
 
     @property
     def head(self) -> tuple[int, ...]:
-        """The motors whose encoders may have offsets."""
+        """Indices of the head's motors, whose encoders may have offsets; empty for a robot without a head."""
         part = self.robot.parts.get(HEAD)
         return () if part is None else tuple(range(part.slice.start, part.slice.stop))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the parameters: mounts of the cameras, offsets of encoders, latency, the tag's mount."""
+        """The names of the P parameters: mounts of the cameras (6 each), offsets of encoders, latency, and the tag's mount (6)."""
         mounts = [f"{camera}.{axis}" for camera in self.cameras for axis in AXES]
         return (*mounts, *(f"encoder.{self.robot.motors[motor]}" for motor in self.head), "latency", *(f"tag.{axis}" for axis in AXES))
 
     def where(self, group: str) -> slice:
-        """Return the parameters of a camera, of "encoder", "latency" or "tag"."""
+        """Return the indices of the parameters of a group: the name of a camera, "encoder", "latency" or "tag"."""
         cameras, head = list(self.cameras), len(self.head)
         after = 6 * len(cameras)
         if group in self.cameras:
@@ -56,14 +56,14 @@ class Rig:
         )
 
     def errors(self, x: Array) -> CameraErrors:
-        """Return parameters (P,) as errors of cameras."""
+        """Convert parameters x (P,) to CameraErrors."""
         encoders = np.zeros(len(self.robot.motors))
         encoders[list(self.head)] = x[self.where("encoder")]
         mounts = {camera: x[self.where(camera)] for camera in self.cameras}
         return CameraErrors(mounts, encoders, float(x[self.where("latency")][0]), x[self.where("tag")])
 
     def parameters(self, errors: CameraErrors) -> Array:
-        """Return errors of cameras as parameters (P,)."""
+        """Convert CameraErrors to parameters (P,)."""
         x = np.zeros(len(self.names))
         for camera in self.cameras:
             x[self.where(camera)] = errors.mounts[camera]
@@ -72,23 +72,31 @@ class Rig:
         return x
 
     def deviations(self, kinds: Mapping[str, float]) -> Array:
-        """Return the standard deviations (P,) of the parameters before the calibration, from those by kind (`CameraSettings`)."""
+        """Return the standard deviations (P,) of the parameters before the calibration; `kinds`: as `CameraSettings.deviations`."""
         mount = [kinds["position"]] * 3 + [kinds["rotation"]] * 3
         tag = [kinds["tag_position"]] * 3 + [kinds["tag_rotation"]] * 3
         return np.array([*mount * len(self.cameras), *[kinds["encoder"]] * len(self.head), kinds["latency"], *tag])
 
     def posture(self, x: Array, q: Array, dq: Array) -> Array:
-        """Return the posture (..., n) rad at the true exposure, from encoders q (..., n) rad and velocities (..., n) rad/s at the stamp."""
+        """Return the true posture (..., n) rad at the exposure of a picture, according to parameters x (P,).
+
+        `q` (..., n) rad and `dq` (..., n) rad/s: encoders and velocities at the stamp. The parameters correct the latency and the encoder
+        offsets.
+        """
         errors = self.errors(x)
         return q - errors.latency * dq + errors.encoders
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """The predicted pixels (K, C, 2) of C points in each of K pictures of one camera, and their derivatives.
+    """The predicted pixels of C points in each of K pictures of one camera, and their derivatives.
 
-    `by_parameters` (K, C, 2, P); `by_posture` (K, C, 2, n) [px/rad]; `by_time` (K, C, 2) [px/s], at the velocities given;
-    `by_point` (K, C, 2, 3) [px/m], of points in the root frame.
+    Attributes:
+        pixels: (K, C, 2), column and row.
+        by_parameters: (K, C, 2, P), derivative by the calibration's parameters.
+        by_posture: (K, C, 2, n) [px/rad].
+        by_time: (K, C, 2) [px/s], for the given velocities of the motors.
+        by_point: (K, C, 2, 3) [px/m], derivative by the position of the point in the root frame.
     """
 
     pixels: Array
@@ -99,14 +107,20 @@ class Seen:
 
 
 def see_points(rig: Rig, camera: str, x: Array, q: Array, dq: Array, points: Array) -> Seen:
-    """Predict the pixels of points (K, C, 3) m of the root frame; q (K, n) rad and dq (K, n) rad/s: encoders at the stamps."""
+    """Predict the pixels of points (K, C, 3) m, root frame, in K pictures of a camera.
+
+    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the stamps.
+    """
     transforms = link_transforms(rig.robot, rig.posture(x, q, dq))
     motion = np.zeros((*points.shape, len(rig.robot.motors)))
     return _seen(rig, camera, x, dq, transforms, points, motion)
 
 
 def see_tag(rig: Rig, camera: str, x: Array, q: Array, dq: Array) -> Seen:
-    """Predict the pixels of the tag's corners on the hand; q (K, n) rad and dq (K, n) rad/s: encoders at the stamps."""
+    """Predict the pixels of the four corners of the tag on the hand, in K pictures of a camera.
+
+    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the stamps.
+    """
     assert rig.tag is not None
     transforms = link_transforms(rig.robot, rig.posture(x, q, dq))
     link, position, rotation = rig.tag.frame(rig.robot)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The place of a point that two or more cameras see, with a covariance that holds the noise of pixels, encoders, stamp and calibration."""
+"""The position of a point that two or more cameras see, with a covariance from the noise of pixels, encoders, stamp and calibration."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ PARALLEL = 1e6  # condition above which rays count as parallel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighted:
-    """A point in one picture: pixel (2,), column and row, and the standard deviation of each, px."""
+    """A point in one picture.
+
+    `pixel`: (2,) px, column and row. `noise`: standard deviation of each of the two, px.
+    """
 
     pixel: Array
     noise: float
@@ -28,7 +31,10 @@ class Sighted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """A point in the root frame: position (3,) m, covariance (3, 3) m^2, and the misfit of its pixels, in squared deviations."""
+    """A located point in the root frame.
+
+    `position`: (3,) m. `covariance`: (3, 3) m^2. `misfit`: sum of the squared residuals of its pixels, in standard deviations.
+    """
 
     position: Array
     covariance: Array
@@ -36,9 +42,9 @@ class Place:
 
 
 def nearest_to_rays(origins: Array, rays: Array) -> Array:
-    """Return the points (..., 3) m that are nearest to E rays each, from origins (..., E, 3) m along unit vectors (..., E, 3).
+    """Return the points (..., 3) m that are nearest to E rays each, by least squares.
 
-    NaN where the rays are parallel, or do not exist.
+    `origins`: (..., E, 3) m. `rays`: (..., E, 3) unit vectors. NaN where all rays are parallel, or where a ray is NaN.
     """
     across = np.eye(3) - rays[..., :, None] * rays[..., None, :]
     normal, against = across.sum(axis=-3), np.einsum("...eij,...ej->...i", across, origins)
@@ -50,7 +56,11 @@ def nearest_to_rays(origins: Array, rays: Array) -> Array:
 
 
 def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
-    """Return the place (3,) m that is nearest to the rays through the pixels; None if they are parallel, or do not exist."""
+    """Return the position (3,) m, root frame, that is nearest to the rays through given pixels of several cameras.
+
+    None if the rays are parallel, or if a pixel has no ray. `x`: (P,) the calibration's parameters. `moment`: encoders at the stamp.
+    `sighted`: the point in the pictures, by name of the camera.
+    """
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
     frames = {name: camera_frames(rig.cameras[name], transforms, x[rig.where(name)]) for name in sighted}
     rays = [rotation @ rig.lens.unproject(sighted[name].pixel) for name, (_, rotation) in frames.items()]
@@ -66,13 +76,15 @@ def locate(
     uncertainty: Array | None = None,
     jitter: float = 0.0,
 ) -> Place | None:
-    """Return the place of a point from its pixels in two or more pictures of one stamp, by least squares; None if rays do not meet.
+    """Return the position of a point from its pixels in two or more pictures with the same stamp, by least squares.
+
+    None if the rays through the pixels are parallel or a pixel has no ray.
 
     Args:
         rig: the robot and its cameras.
         x: the calibration's parameters (P,).
         moment: encoders at the stamp.
-        sighted: the point in the pictures, by camera.
+        sighted: the point in the pictures, by name of the camera.
         uncertainty: covariance (P, P) of the parameters; None: they are exact.
         jitter: standard deviation of the stamp, s.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tag on a palm: an AprilTag whose corners are found in pictures by OpenCV, and which the renderer draws."""
+"""The tag on a palm: an AprilTag that the renderer draws, and whose corners are found in pictures by OpenCV."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ SMALLEST = 5.0  # px: the side of a tag below which its corners are not used
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """A square tag on a palm.
+    """A square AprilTag on a palm.
 
-    `marker`: of the robot, whose normal points out of the palm.  `size`: m, the side of its black border.  `above`: m, along the normal.
+    `marker`: name of the robot's marker whose normal points out of the palm. `size`: side of the tag's black border, m. `above`: distance
+    of the tag from the marker along the normal, m.
     """
 
     marker: str
@@ -54,13 +55,14 @@ class Tag:
 
     @property
     def corners(self) -> Array:
-        """The corners (4, 3) m of the border in the tag's frame, clockwise as one sees them, from the upper left."""
+        """The corners (4, 3) m of the black border in the tag's frame, as seen from outside: clockwise from the upper left."""
         return 0.5 * self.size * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 
     def frame(self, robot: Robot) -> tuple[int, Array, Array]:
-        """Return link, position (3,) m and rotation (3, 3), root frame at zero pose; columns: right and down as one sees it, and inwards.
+        """Return the number of the tag's link, and the tag's position (3,) m and rotation (3, 3) in the root frame at the zero pose.
 
-        Raises UnknownName for a robot without the marker.
+        The columns of the rotation are the directions right and down, as seen from outside, and into the palm. Raises UnknownName for a
+        robot without the marker.
         """
         marker = robot.marker(self.marker)
         inwards = -marker.normal
@@ -72,7 +74,10 @@ class Tag:
 
 
 def tag_solids(tag: Tag, robot: Robot, mount: Array) -> list[LinkSolid]:
-    """Return the tag as the renderer draws it, with a white margin; `mount` (6,): where it is on the hand, see `mounted`."""
+    """Return the tag with a white margin as solids for the renderer.
+
+    `mount`: (6,), displacement [m] and rotation vector [rad] of the true tag from that of the model, in the tag's axes.
+    """
     link, position, rotation = tag.frame(robot)
     position, rotation = mounted(position, rotation, mount)
     count = len(CELLS)
@@ -109,9 +114,9 @@ def _squares(cells: list[tuple[int, int]], side: float, first: float) -> Piece:
 
 
 def find_tag(picture: Picture, lens: Lens) -> Array | None:
-    """Return the corners (4, 2) px, column and row, of the tag in a picture, in the order of `Tag.corners`; None if it is not there.
+    """Return the corners (4, 2) px, column and row, of the tag in a picture, in the order of `Tag.corners`; None if it is not found.
 
-    OpenCV finds them to a pixel, and the whole pattern is then aligned with the picture.  Raises NotInstalled without OpenCV.
+    OpenCV finds the corners to a pixel; then the whole pattern is aligned with the picture. Raises NotInstalled without OpenCV.
     """
     gray = _cv2().cvtColor(picture, _cv2().COLOR_RGB2GRAY)
     corners, numbers, _ = _detector().detectMarkers(gray)

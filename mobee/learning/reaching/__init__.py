@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning to reach: from which state to reach for which target, and how to get there (thesis chapter 8)."""
+"""Learning to reach: the state from which to reach for each target, and a path to this state (thesis chapter 8)."""

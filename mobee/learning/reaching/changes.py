@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detects that the world has changed, from how probable the outcomes of transitions and reaches were.
+"""Detects that the world has changed, from the probabilities of the outcomes of transitions and reaches.
 
-Before a change of the world, a small share of the outcomes contradicts what was learned; after it, a larger share does.  A detector gets,
-for each outcome, its probability (density) according to what was learned, and according to no knowledge at all.
+Before a change of the world, a small share of the outcomes contradicts what was learned; after the change, a larger share does. For each
+outcome a detector gets two probabilities (densities for rewards): according to what was learned, and without any knowledge.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ CERTAIN = 0.95  # probability that the share of a new run differs from that of t
 
 
 class Detector(Protocol):
-    """Decides from a sequence of outcomes when the world has changed; its decisions follow from that sequence alone."""
+    """Decides from a sequence of outcomes when the world has changed. Its decisions must depend only on this sequence."""
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """Add an outcome; returns the number of outcomes since a change that is detected now, this one included, else None.
+        """Process one outcome; if a change is detected now, return the number of outcomes since the change, with this one, else None.
 
-        `learned`: probability or density of the outcome by what was learned; `unknown`: without any knowledge.
+        `learned`: probability, or density, of the outcome according to what was learned. `unknown`: the same without any knowledge.
         """
         ...
 
 
 DetectorOf = Callable[[], Detector]
-"""A class or function that makes the detector of a learner."""
+"""A class or function without arguments that makes the detector of a learner."""
 
 
 class RunLength:
-    """Bayesian online change point detection: a change is detected when it is more probable than none (Adams and MacKay 2007).
+    """Bayesian online change point detection (Adams and MacKay 2007): a change is detected when it is more probable than no change.
 
-    In a run without a change, a constant share of the outcomes has the probability `unknown` and the others have `learned`.  Neither the
-    share nor the probability of a change is a setting: they are integrated over `SHARES` and `HAZARDS`.  A change to a smaller share,
-    as when the learner learns, begins a new run but is not reported.
+    Between two changes, a constant share of the outcomes contradicts what was learned and has the probability `unknown`; the others have
+    the probability `learned`. The share and the probability of a change are not settings: they are integrated over `SHARES` (0.01 to 0.95)
+    and `HAZARDS` (0.01 to 0.00001). A change to a smaller share is not reported, because it occurs when the learner learns.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,10 @@ class RunLength:
         self._before: Array = self._share[0]  # (shares,) in the run that is certain
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """See Detector."""
+        """Process one outcome; if a change is detected now, return the number of outcomes since the change, with this one, else None.
+
+        `learned` and `unknown`: probability or density of the outcome, as in `Detector.add`.
+        """
         likely = (1.0 - SHARES) * learned + SHARES * unknown
         fresh = np.full((1, len(SHARES)), 1.0 / len(SHARES))
         begun = self._weight.sum(axis=0) * HAZARDS * likely.mean()
@@ -89,13 +92,13 @@ class RunLength:
 
 NONE = "none"
 DETECTORS: dict[str, DetectorOf | None] = {NONE: None, "run_length": RunLength}
-"""By name: what makes a detector that has seen nothing; None: changes are ignored."""
+"""By name, what makes the detector of a learner; None: changes are not detected."""
 
 NOISE, IMAGINED = 0.05, 4.0  # standard deviation of a reward around its mean before there are repeats; its weight, in repeats
 
 
 class RewardScale:
-    """The scatter of rewards of the same reach, from repeated reaches."""
+    """Estimates how much the rewards of the same reach (from one state, for one target) scatter, from reaches that were repeated."""
 
     def __init__(self) -> None:
         self._square, self._weight = IMAGINED * NOISE**2, IMAGINED
@@ -103,11 +106,11 @@ class RewardScale:
 
     @property
     def variance(self) -> float:
-        """Variance of the rewards of one reach around their mean."""
+        """The variance of the rewards of one reach around their mean; before there are repeated reaches, 0.05^2."""
         return self._square / self._weight
 
     def add(self, state: int, target: Array, reward: float) -> None:
-        """Add the reward of a reach from a state for a target (3,) m."""
+        """Record the reward of a reach from a state for a target at (3,) m, root frame."""
         key = state, target.tobytes()
         count, mean = self._known.get(key, (0, 0.0))
         if count:
@@ -116,12 +119,12 @@ class RewardScale:
         self._known[key] = count + 1, mean + (reward - mean) / (count + 1.0)
 
     def repeated(self, state: int, target: Array) -> bool:
-        """Return whether this reach was made before."""
+        """Return whether a reach from this state for this target, (3,) m, was recorded before."""
         return (state, target.tobytes()) in self._known
 
 
 def normal_density(value: float, mean: float, variance: float) -> float:
-    """Return the density of a normal distribution."""
+    """Return the density of the normal distribution with this mean and variance at `value`."""
     return math.exp(-0.5 * (value - mean) ** 2 / variance) / math.sqrt(2.0 * math.pi * variance)
 
 
@@ -130,13 +133,13 @@ UNKNOWN = 0.5, 1.0  # without knowledge: probability that a transition reaches i
 
 
 class WorldChanges:
-    """Reports changes of the world to the memory of failures of a learner, as soon as they are detected.
+    """Detects changes of the world from a learner's steps, and reports them to the learner's memory of failures.
 
     Args:
         detector: decides when the world has changed.
-        planning: knows the outcomes of the transitions.
-        predictor: knows the deviations of the rewards.
-        failures: gets the number of transitions since a change.
+        planning: has the probabilities of the outcomes of transitions.
+        predictor: has the standard deviations of rewards; if it has none, only repeated reaches are used.
+        failures: the memory of failures; it gets the number of transitions since each change.
     """
 
     def __init__(self, detector: Detector, planning: ReachPlanning, predictor: RewardPredictor, failures: FailuresSinceChange) -> None:
@@ -147,9 +150,10 @@ class WorldChanges:
         self._is_reach: list[bool] = []  # of all outcomes that the detector got
 
     def probabilities(self, step: Step, target: Array, goal: int) -> tuple[float, float] | None:
-        """Return the probability of a step's outcome before it is learned, and that without knowledge; None if the target caused it.
+        """Return the probabilities of a step's outcome for `Detector.add`, according to what was learned and without knowledge.
 
-        `target`: (3,) m.  `goal`: the state that a transition should reach.
+        Call it before the step is learned. For a reach they are densities of its reward. None if a transition ended in contact with the
+        target, because its outcome then informs about the target. `target`: (3,) m. `goal`: the goal state of a transition.
         """
         if step.a == REACH:
             variance = self._variance(step.s, target)
@@ -161,7 +165,10 @@ class WorldChanges:
         return max(success if step.s_next == goal else 1.0 - success, LEAST), UNKNOWN[0]
 
     def observe(self, step: Step, target: Array, probabilities: tuple[float, float]) -> bool:
-        """Add a step that was learned, with what `probabilities` returned before; returns whether a change was detected."""
+        """Process a step after it was learned; return whether a change of the world was detected.
+
+        `target`: (3,) m. `probabilities`: what the method `probabilities` returned before the step was learned.
+        """
         self._is_reach.append(step.a == REACH)
         if step.a == REACH:
             self._scale.add(step.s, target, step.reward)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluates a reach learner without changing it (thesis 8.3.3)."""
+"""Evaluates what a reach learner has learned, without changing the learner (thesis 8.3.3)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 
 def move(plant: Plant, space: Space, state: int, action: int) -> tuple[Outcome, int]:
-    """Make a transition; returns its outcome and state."""
+    """Perform an action of a state on the plant; return its outcome and the state in which it ended."""
     outcome = plant.act(space.part, space.target(space.goal(state, action)))
     return outcome, space.state_of(outcome.q)
 
 
 def reach(plant: ReachPlant, space: Space, marker: str) -> tuple[ReachOutcome, int]:
-    """Reach for the presented target; returns the outcome, and the state in which the part came to rest afterwards."""
+    """Reach with a marker for the target that the plant presents; return the outcome, and the state in which the part then rests."""
     outcome = plant.reach(space.part, marker)
     return outcome, space.state_of(outcome.after.q)
 
@@ -37,10 +37,11 @@ NO_STATE = -1  # instead of a state, where no reach was made
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """Results of P problems in R repetitions.
+    """The results of an evaluation: arrays (R, P) for R repetitions of P problems.
 
-    `rewards`: (R, P), 0 if no reach was made.  `states`: (R, P) from which the reach was made, -1 if none.  `missing`: (R, P) m, remaining
-    error, NaN if none.  `failures`: (R, P) failed transitions.  `actions`: (R, P), the reach included.  `duration`: (R, P) s of plant time.
+    `rewards`: of the reach, 0 if none was made. `states`: from which the reach was made, -1 if none. `missing`: m, remaining distance after
+    the reach, NaN if none was made. `failures`: number of failed transitions. `actions`: number of actions, with the reach. `duration`: s
+    of plant time.
     """
 
     rewards: Array
@@ -52,15 +53,15 @@ class Evaluation:
 
     @property
     def scores(self) -> Array:
-        """Sum of the rewards over the problems, shape (R,), as in thesis figure 8.2."""
+        """The sum of the rewards of all problems in each repetition, shape (R,), as in thesis figure 8.2."""
         total: Array = self.rewards.sum(axis=1)
         return total
 
 
 def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: int) -> Evaluation:
-    """Reach for every problem in random order, starting from a random state, in each repetition.
+    """Let an agent try every problem once in each repetition, in random order, starting from a random state; return the results.
 
-    The agent does not learn from these reaches; failed transitions are remembered until the end of a repetition.
+    The agent does not learn from this. Failed transitions are remembered only until the end of a repetition.
     """
     shape = repetitions, len(problems)
     found = Evaluation(

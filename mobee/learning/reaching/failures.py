@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Failed transitions as negative rewards: for all targets, nearby ones, or similar transitions (thesis 8.1)."""
+"""Memories of failed transitions, which give negative rewards: for all targets, near ones, or similar transitions (thesis 8.1)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,11 @@ MAX_CACHED = 256  # targets whose sums are in memory
 
 
 def midpoints(space: Space, reaches: Reaches) -> Array:
-    """Return the midpoint of each transition, shape (S A, 3 + d): marker, then joints, in units of the scales above."""
+    """Return the midpoint of each transition, shape (S A, 3 + d): the mean of its start and goal, for marker and joints.
+
+    The marker's position (3,) is in units of LENGTH_SCALE (0.08 m), the joints (d,) in units of JOINT_SCALE (0.4) times the spread of their
+    samples. For an action that does not exist the goal is the start.
+    """
     goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
     scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
     hands, joints = ((one[:, None] + one[goals]) / 2.0 for one in (reaches.hands / LENGTH_SCALE, scaled))
@@ -34,11 +38,11 @@ def midpoints(space: Space, reaches: Reaches) -> Array:
 
 
 class AlikeFailures:
-    """Rewards of transitions from failures on the same target, and from failures of similar transitions on other targets.
+    """Rewards of transitions from failures with the same target, and from failures of similar transitions with other targets.
 
-    A transition that was tried on this target has the average of its rewards and one reward of 0.  Any other has a negative reward if
-    similar transitions failed more often than transitions do on average, at least -`MAX_COST`: enough to plan around it at small cost,
-    not enough to exclude a state that was never tried.
+    A transition that was tried with this target has the average of its rewards and of one imagined reward of 0. Any other transition has a
+    negative reward if similar transitions failed more often than all transitions on average. This reward is at least -MAX_COST (-0.4):
+    large enough that plans avoid the transition if another path costs little, and too small to exclude a state that was never tried.
 
     Args:
         space: states and transitions.
@@ -55,7 +59,10 @@ class AlikeFailures:
         self._sums: dict[bytes, tuple[int, Array]] = {}  # by target: events in them, failures and weights (2, S A)
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Record the reward of a transition made while a target (3,) m was presented; `touched` is not used."""
+        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+
+        `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
+        """
         transition, tried = state * self._shape[1] + action, self._own.setdefault(target.tobytes(), {})
         total, count = tried.get(transition, (0.0, 0))
         tried[transition] = total + reward, count + 1
@@ -68,7 +75,7 @@ class AlikeFailures:
         self._failed += reward < 0.0
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
         usual = self._failed / (self._used + 1.0)
         failed, weight = self._alike(target)
         more = (failed + PRIOR_WEIGHT * usual) / (weight + PRIOR_WEIGHT) - usual
@@ -80,7 +87,7 @@ class AlikeFailures:
         return worth.reshape(self._shape)
 
     def copy(self) -> AlikeFailures:
-        """Return an independent copy."""
+        """Return a copy; later calls of `add` change only one of the two."""
         other = object.__new__(AlikeFailures)
         other.__dict__.update(self.__dict__)
         other._events, other._sums = self._events.copy(), self._sums.copy()
@@ -113,13 +120,13 @@ NEAR_DISTANCE = 0.025  # m, between targets of the published size that block nea
 
 
 class Failures:
-    """Histories of all transitions: 0 for each success and a penalty for each failure, by target.
+    """Rewards of transitions from their histories: for each target, 0 for every success and a penalty for every failure.
 
     Args:
-        states, actions: of the space.
-        scale: m, the unit of distances.
+        states, actions: number of states, and largest number of actions of a state.
+        scale: unit of distances between targets, m.
         kind: "spread": every failure counts for all targets, less for distant ones (thesis eq. 8.1, with 1 added to its denominator,
-            since otherwise one failure would exclude a transition for all targets); "local": it counts for targets within 25 mm only.
+            because otherwise one failure would exclude a transition for all targets); "local": it counts only for targets within 25 mm.
     """
 
     def __init__(self, states: int, actions: int, scale: float, kind: Literal["spread", "local"] = "spread") -> None:
@@ -127,36 +134,43 @@ class Failures:
         self._histories = Histories(states * actions, scale, NEAR_DISTANCE if kind == "local" else np.inf)
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Append the reward of a transition made while a target (3,) m was presented; `touched` is not used."""
+        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+
+        `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
+        """
         self._histories.add(state * self._shape[1] + action, target, reward)
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
         return self._histories.average(target, 0.0).reshape(self._shape)
 
     def copy(self) -> Failures:
-        """Return an independent copy."""
+        """Return a copy; later calls of `add` change only one of the two."""
         other = object.__new__(Failures)
         other._shape, other._histories = self._shape, self._histories.copy()
         return other
 
 
 def has_failed(values: Array, state: int, following: int) -> bool:
-    """Return whether a transition failed: it led to no state of higher value, by the values (S,) of its plan (thesis 8.1)."""
+    """Return whether a transition failed: the state `following`, to which it led, has no higher value than `state` (thesis 8.1).
+
+    `values`: (S,) values of the states in the plan.
+    """
     return bool(values[following] <= values[state])
 
 
 class FailuresSinceChange:
-    """Failures as before, and, after a change of the world, transitions that the world blocks whatever the target is.
+    """A memory of failures that also learns which transitions are blocked for all targets since a change of the world.
 
-    Failures in which the target was touched are those of the target.  Any other failure since the change counts for all targets: with the
-    average of its transition's rewards and one of 0, and, for transitions that were not tried since, as in `AlikeFailures`, but by the
-    place of the hand in the root frame.
+    Before the first change it returns the rewards of the memory `usual`. A failure in contact with the target is always attributed to the
+    target. Any other failure since the last change counts for all targets: the reward of its transition is the average of its rewards and
+    of one imagined reward of 0. Transitions that were not tried since the change have a reward from the failures of similar transitions, as
+    in `AlikeFailures`; similar means similar joints and position of the hand in the root frame.
 
     Args:
         space: states and transitions.
         reaches: the marker's position in each state.
-        usual: the memory without changes.
+        usual: the memory of failures without changes of the world.
     """
 
     def __init__(self, space: Space, reaches: Reaches, usual: Failures | AlikeFailures) -> None:
@@ -166,7 +180,10 @@ class FailuresSinceChange:
         self._clear()
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Record the reward of a transition made while a target (3,) m was presented; `touched`: objects in contact at its end."""
+        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+
+        `target`: (3,) m, the target that was presented meanwhile. `touched`: names of the world objects in contact at the end.
+        """
         self._usual.add(state, action, target, reward)
         if not by_target(touched):
             self._since.append((state * self._shape[1] + action, reward))
@@ -174,7 +191,7 @@ class FailuresSinceChange:
                 self._learn(*self._since[-1])
 
     def change(self, transitions: int) -> None:
-        """Report a change before the last `transitions` transitions that touched no target."""
+        """Record that the world changed before the last `transitions` transitions; transitions that touched the target are not counted."""
         self._since = self._since[len(self._since) - transitions :]
         self._changed = True
         self._clear()
@@ -182,7 +199,7 @@ class FailuresSinceChange:
             self._learn(*one)
 
     def blocked(self, state: int, action: int) -> float:
-        """Return the probability that the changed world blocks a transition; 0 before the first change."""
+        """Return the probability that the world, since its change, blocks a transition; 0 before the first change."""
         if not self._changed:
             return 0.0
         transition = state * self._shape[1] + action
@@ -190,7 +207,7 @@ class FailuresSinceChange:
         return float((failed + self._alike()[transition]) / (count + 1.0))
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
         usual = self._usual.rewards(target)
         if not self._changed:
             return usual
@@ -202,7 +219,7 @@ class FailuresSinceChange:
         return np.minimum(usual, worth.reshape(self._shape))
 
     def copy(self) -> FailuresSinceChange:
-        """Return an independent copy."""
+        """Return a copy; later calls of `add` and `change` change only one of the two."""
         other = object.__new__(FailuresSinceChange)
         other.__dict__.update(self.__dict__)
         other._usual, other._since = self._usual.copy(), self._since.copy()
@@ -228,12 +245,12 @@ class FailuresSinceChange:
 
 
 def by_target(touched: tuple[str, ...]) -> bool:
-    """Return whether a transition that touched these objects of the world may have failed because of the target."""
+    """Return whether the target may have caused the failure of a transition, because it is among the world objects `touched` at its end."""
     return TARGET in touched
 
 
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
-    """Make the memory of failures: "spread" or "local", see `Failures`, or "alike", see `AlikeFailures`.
+    """Make a memory of failures without any failure: "spread" or "local", a `Failures`, or "alike", an `AlikeFailures`.
 
     Raises UnknownName if there is no such kind.
     """

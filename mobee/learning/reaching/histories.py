@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Histories of values by state and target, and their averages weighted by distance (thesis eqs. 8.1, 8.5, 8.7)."""
+"""Histories of values by action and target, and their averages weighted by distance (thesis eqs. 8.1, 8.5, 8.7)."""
 
 from __future__ import annotations
 
@@ -16,26 +16,29 @@ from mobee.learning.transitions import Scalar
 
 
 def grown(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
-    """Return the array, or, if the index is beyond its end, a copy of twice the length that is filled with zeros."""
+    """Return an array in which `index` is valid: the given one, or a copy of twice the length, whose second half is 0."""
     return array if index < len(array) else np.concatenate([array, np.zeros_like(array)])
 
 
 def forget(found: dict[bytes, Any], most: int) -> None:
-    """Delete the entries inserted first until there are fewer than `most`; callers insert an entry again at each use, to keep it longer."""
+    """Delete the oldest entries of a dict until fewer than `most` remain, to limit the size of a cache.
+
+    The oldest entry is the one inserted first. Callers delete and insert an entry at each use, so that the entry used least recently is
+    deleted.
+    """
     while len(found) >= most:
         del found[next(iter(found))]
 
 
 class Histories:
-    """The values of each action with their targets.
+    """For each action, the values that were observed, each with the target to which it belongs.
 
-    Repeats on one target are stored as their sum and number: one entry for an action and a target, so that a weighted sum over all
-    entries takes microseconds.
+    Values of one action with one target are stored as their sum and number. So a weighted sum over all entries takes microseconds.
 
     Args:
-        actions: their number.
-        scale: m, unit of the distances.
-        near: m, distance from a target beyond which other targets are ignored.
+        actions: number of actions.
+        scale: unit of distances between targets, m.
+        near: m; `average` ignores targets that are farther than this from its target.
     """
 
     def __init__(self, actions: int, scale: float, near: float = np.inf) -> None:
@@ -47,7 +50,7 @@ class Histories:
         self._sums = np.zeros((4, 2))
 
     def add(self, action: int, target: Array, value: float) -> None:
-        """Append a value to the history of an action; target (3,) m."""
+        """Append a value to the history of an action; `target`: (3,) m. Raises InvalidValue if there is no such action."""
         if not 0 <= action < self._actions:
             raise InvalidValue(f"action {action!r}: valid are 0 to {self._actions - 1}.")
         key = action, self._index(target)
@@ -59,9 +62,10 @@ class Histories:
         self._sums[entry] += value, 1.0
 
     def average(self, target: Array, prior: float) -> Array:
-        """Return the weighted average of each action's history and one value `prior` at distance 0, shape (actions,).
+        """Return for each action the weighted average of its values and of one value `prior`, shape (actions,).
 
-        Weights are 1 / (1 + |x - x_i|).  A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
+        The weight of a value is 1 / (1 + distance / scale), with the distance between its target and `target` (3,) m; the prior has
+        distance 0. A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
         """
         totals, weights = sums = np.ones((2, self._actions))
         totals[:] = prior
@@ -72,7 +76,7 @@ class Histories:
         return found
 
     def copy(self) -> Histories:
-        """Return an independent copy."""
+        """Return a copy; later calls of `add` change only one of the two."""
         other = Histories(self._actions, self._scale, self._near)
         other._targets, other._known = self._targets.copy(), self._known.copy()
         other._entries, other._keys, other._sums = self._entries.copy(), self._keys.copy(), self._sums.copy()

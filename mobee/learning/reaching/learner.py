@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reach learner: predictor, failures, plans and choices, without a plant (thesis 8.1 to 8.3)."""
+"""The reach learner: predictor, failures, plans and choices; it does not act (thesis 8.1 to 8.3)."""
 
 from __future__ import annotations
 
@@ -30,19 +30,22 @@ class ReachSettings(Settings):
     """Settings of a `ReachAgent`.
 
     Args:
-        predictor: predicts rewards: a name in `predictors.PREDICTORS` ("weighted" is the thesis'), a class or function that makes one from
-            the `Reaches`, `module:name` of one, or a `RewardPredictor` that has learned nothing yet.
-        strategy: the reward that it plans for while it learns: a name in `strategies.STRATEGIES` ("intrinsic", "greedy" and "random" are
-            the thesis'), a class or function that makes one, see `StrategyOf`, or `module:name` of one.
-        failures: how failed transitions are remembered: "spread" over all targets, as published, "local" to nearby targets, or "alike",
-            as evidence about similar transitions.
-        detector: of changes of the world, after which failed transitions count for all targets, see `FailuresSinceChange`: a name in
-            `changes.DETECTORS`, a class or function that makes one, see `changes.DetectorOf`, or `module:name` of one.
+        predictor: predicts rewards of reaches: a name in `predictors.PREDICTORS` ("weighted" is that of the thesis), a class or function
+            that makes a predictor from the `Reaches`, the text `module:name` of such a class or function, or a `RewardPredictor` that has
+            learned nothing yet.
+        strategy: computes the rewards of reaches for which the agent plans while it learns: a name in `strategies.STRATEGIES` ("intrinsic",
+            "greedy" and "random" are those of the thesis), a class or function that makes a strategy, see `strategies.StrategyOf`, or the
+            text `module:name` of such a function.
+        failures: the targets for which a failed transition counts: "spread": all targets, as published; "local": targets within 25 mm;
+            "alike": all targets, as evidence about similar transitions.
+        detector: detects changes of the world, after which failed transitions count for all targets, see `FailuresSinceChange`: a name in
+            `changes.DETECTORS`, a class or function that makes a detector, see `changes.DetectorOf`, or the text `module:name` of such a
+            function.
         discount: factor of future rewards in plans.
-        scale: m, unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.
+        scale: unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m.
         penalty: reward of a failed transition, below 0.
         limit: number of actions after which a problem-try ends, the reach included.
-        seed: of ties and draws; agents of different parts draw differently under the same seed.
+        seed: seed of all random choices; with the same seed, agents of different parts choose differently.
     """
 
     predictor: str | RewardPredictor | PredictorOf = "weighted"
@@ -57,17 +60,21 @@ class ReachSettings(Settings):
 
 
 class ReachLearner:
-    """Learns from the steps of problem-tries and chooses the next; its choices follow from its settings and its steps alone.
+    """Learns from the steps of problem-tries and chooses the next action. Its choices depend only on its settings and its steps.
+
+    A problem-try is one attempt to reach a target: transitions to a state, then a reach. The learner does not act; `ReachAgent` adds a
+    plant and a store.
 
     Args:
         space: states and transitions of the part.
         reaches: the marker's position in each state, and the unit of distances.
-        settings: see `ReachSettings`.
-        beliefs: outcomes of transitions; None: those of `model`, or of an untrained model, debiased.
-        model: transition model to be learned at the same time; None: none.
+        settings: settings of the learner.
+        beliefs: outcomes of transitions, with which plans are made; None: the outcomes of `model`, or of an untrained model, without
+            imagined outcomes.
+        model: transition model that is learned at the same time; None: none.
 
     Raises:
-        UnknownName: no such predictor or strategy.
+        UnknownName: no such predictor, strategy, detector or kind of failures.
     """
 
     def __init__(
@@ -82,9 +89,9 @@ class ReachLearner:
         self._strategy_name, make_strategy = named("strategy", settings.strategy, STRATEGIES)
         self.predictor = made_predictor(settings.predictor, reaches)
         self.failures: Failures | AlikeFailures | FailuresSinceChange = failures_of(space, reaches, settings.failures)
-        """Rewards of transitions, learned from failures."""
+        """The memory of failures, which gives negative rewards to transitions."""
         self.problems = Problems()
-        """The targets so far."""
+        """The targets that were tried, with their numbers."""
         self.steps, self.tries = 0, 0
         """Number of actions and of problem-tries that have ended, those of the store included."""
         self.last: Try | None = None
@@ -112,7 +119,7 @@ class ReachLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The learner's settings, without its space and its beliefs, as plain JSON values."""
+        """The settings of the learner, without its space and its beliefs, as JSON values."""
         return {
             "predictor": self.predictor.settings,
             "strategy": self._strategy_name,
@@ -126,20 +133,23 @@ class ReachLearner:
 
     @property
     def under_way(self) -> int | None:
-        """Number of the problem of the problem-try that has not ended; None between two."""
+        """The number of the problem that is being tried; None if no problem-try is under way."""
         return self._problem
 
     def begin(self, target: ReachTarget) -> None:
-        """Start a problem-try, or continue the one under way if its target has this position; one at another position ends now."""
+        """Start a problem-try for a target, or continue the present one if its target is at the same position.
+
+        A problem-try with a target at another position ends.
+        """
         problem = self.problems.index(target)
         if problem != self._problem:
             self._end()
             self._problem = problem
 
     def planned(self) -> tuple[Array, Array]:
-        """Return V (S,) and Q (S, A + 1) of the plan of the problem-try under way, see `ReachPlanning.values`.
+        """Return the values of states V (S,) and of actions Q (S, A + 1) in the plan of the present problem-try.
 
-        Raises InvalidValue if none is under way.
+        The last column of Q is the reach. Raises InvalidValue if no problem-try is under way.
         """
         if self._plan is None:
             if self._worth is None:
@@ -148,20 +158,23 @@ class ReachLearner:
         return self._plan
 
     def decide(self, state: int) -> int:
-        """Choose the action to take in a state, or REACH."""
+        """Choose the action to take in a state: the number of a transition, or REACH (-1) to reach for the target.
+
+        Raises InvalidValue if no problem-try is under way.
+        """
         chosen = choose(self.planned()[1][state], self._draws.at(self.seed, self.steps))
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
-        """Return whether a transition failed: it led to no state of higher value in the plan of the problem-try under way."""
+        """Return whether a transition failed: `following` has no higher value than `state` in the plan of the present problem-try."""
         return has_failed(self.planned()[0], state, following)
 
     def expected(self, state: int) -> float:
-        """Return the expected reward of reaching for the target of the problem-try from a state."""
+        """Return the reward that the predictor expects of a reach from a state for the target of the present problem-try."""
         return float(self.predictor.mean(self._target)[state])
 
     def observe(self, step: Step) -> None:
-        """Learn from a step of the problem-try under way."""
+        """Learn from a step of the present problem-try; a reach ends it, and so does the last step that `limit` allows."""
         self._made.append(step)
         self.steps = step.n
         expected = None if self.changes is None else self.changes.probabilities(step, self._target, self._goal(step))
@@ -176,7 +189,10 @@ class ReachLearner:
             self._end()
 
     def replay(self, targets: list[ReachTarget], steps: list[Step]) -> None:
-        """Learn from recorded steps; the plans of a problem-try that has not ended are made again, because it continues with them."""
+        """Learn from recorded steps; the number of a target in `targets` is that of its problem.
+
+        If the last problem-try has not ended, its plans are computed too, because the learner continues with them.
+        """
         for target in targets:
             self.problems.index(target)
         last = [step for step in steps if step.number == steps[-1].number]
@@ -190,7 +206,7 @@ class ReachLearner:
             self.observe(step)
 
     def problem_draws(self) -> np.random.Generator:
-        """Return the random generator for the choice of the next problem."""
+        """Return the random generator for the choice of the next problem; it depends on the seed and the number of problem-tries."""
         return self._draws_of_problem.at(self.seed, self.tries)
 
     @property
@@ -222,7 +238,10 @@ class ReachLearner:
 
 
 def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches) -> RewardPredictor:
-    """Return the predictor made by a class, a function or the class of this name; a predictor object is returned unchanged."""
+    """Return a predictor: made from `reaches` by a class, a function, or the class of this name.
+
+    A predictor object is returned unchanged. Raises UnknownName.
+    """
     if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
         make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]  # `named` returns any callable
         return make(reaches)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans that end in a reach: one more action of every state, after which the problem-try ends (thesis 8.2, 8.3.1)."""
+"""Plans that end in a reach: every state has one more action, the reach, after which the problem-try ends (thesis 8.2, 8.3.1)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ TOLERANCE = 1e-6  # of values; the largest are about 1
 
 
 class ReachPlanning:
-    """Values of states and actions where every state has a reach action, which ends the plan.
+    """Computes the values of states and actions for plans in which every state has one more action, the reach, which ends the plan.
+
+    It is an `OutcomeModel` with one more state, the end of the plan, and one more action, the reach.
 
     Args:
         space: states and transitions.
@@ -32,16 +34,19 @@ class ReachPlanning:
 
     @property
     def outcomes(self) -> Ints:
-        """States that each action may reach, shape (S + 1, A + 1, B): the last state is the end, the last action the reach."""
+        """The states in which each action may end, shape (S + 1, A + 1, B).
+
+        The last state is the end of the plan, the last action the reach.
+        """
         return self._outcomes
 
     @property
     def probabilities(self) -> Array:
-        """Their probabilities, shape (S + 1, A + 1, B), none in the end."""
+        """The probabilities of the outcomes of each action, shape (S + 1, A + 1, B); all 0 in the last state, the end of the plan."""
         return self._probabilities
 
     def refresh(self) -> None:
-        """Copy the outcomes of the beliefs as they are now."""
+        """Copy the outcomes and probabilities of the beliefs again, after these have changed."""
         states, actions = self._states, self._actions
         bins = self._beliefs.probabilities.shape[2]
         self._outcomes: Ints = np.full((states + 1, actions + 1, bins), states, dtype=np.int64)
@@ -51,9 +56,10 @@ class ReachPlanning:
         self._probabilities[:states, actions, 0] = 1.0
 
     def values(self, reaches: Array, moves: Array | float) -> tuple[Array, Array]:
-        """Compute V (S,) and Q (S, A + 1), with the reach in the last column of Q.
+        """Compute the values of states V (S,) and of actions Q (S, A + 1); the last column of Q is the reach.
 
-        `reaches`: (S,) rewards of the reaches, -inf where none is allowed.  `moves`: (S, A) rewards of the transitions.
+        `reaches`: (S,) rewards of a reach from each state, -inf where no reach is allowed. `moves`: (S, A) rewards of the transitions, or
+        one number for all.
         """
         self._reward[:-1, :-1], self._reward[:-1, -1] = moves, reaches
         start = np.append(np.where(reaches == -np.inf, 0.0, reaches), 0.0)  # the values of reaching at once
@@ -63,11 +69,12 @@ class ReachPlanning:
 
 @dataclass(frozen=True, slots=True)
 class ReachPlan:
-    """A path to a state and the reach from there.
+    """A path to a state, and the reach from there.
 
-    `path`: states from start to the pre-reach state.  `actions`: the action in each but the last.  `probabilities`: that each action ends
-    in the next state of the path; `success`: that all of them do.  `state`: where the reach starts.  `expected`: reward of that reach
-    (thesis eq. 8.4).  `avoided`: transitions, as (state, goal), that the path would contain if no failure were remembered.
+    `path`: states from the start to the state of the reach. `actions`: the action in each state of the path except the last.
+    `probabilities`: the probability that each action ends in the next state of the path; `success`: the product of them. `state`: where the
+    reach starts. `expected`: expected reward of the reach (thesis eq. 8.4). `avoided`: transitions, as (state, goal state), that the path
+    would contain if no failure were remembered.
     """
 
     path: tuple[int, ...]
@@ -80,10 +87,10 @@ class ReachPlan:
 
 
 def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
-    """Plan the path and the reach of highest value from a state.
+    """Compute the path from the state `start`, and the reach at its end, that have the highest value.
 
-    `expected`: (S,) rewards of the reaches, at least 0: the best plan never makes a reach of negative reward.  `failures`: (S, A) rewards
-    of the transitions.  Raises InvalidValue if the space has no such state.
+    `expected`: (S,) expected rewards of the reaches, at least 0, because the best plan never makes a reach of negative reward. `failures`:
+    (S, A) rewards of the transitions, below 0 for those that have failed. Raises InvalidValue if the space has no such state.
     """
     space.actions(start)
     path, actions, probabilities = _best_path(planning, start, *planning.values(expected, failures))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The agent that learns from which pose each target is best reached, and a path there (thesis chapter 8)."""
+"""The reach agent: learns from which state a target is best reached, and a path to this state (thesis chapter 8)."""
 
 from __future__ import annotations
 
@@ -25,27 +25,29 @@ from mobee.settings import accepts
 
 
 class ReachAgent(ReachLearner):
-    """Learns to put a marker of one part on targets: each position is a problem, and every problem-try informs about all others.
+    """Learns to bring a marker of one part to targets. Each position of a target is a problem.
 
-    Its decisions depend only on its settings and its steps, so an agent that is restarted with its store continues as if it had never
-    stopped.  There may be any number of targets: new ones are new problems.
+    One attempt at a problem is a problem-try: move by a plan to a state, then reach for the target. The reward of a reach also informs
+    about other targets. There may be any number of targets. Decisions depend only on the settings and the steps of the agent, so an agent
+    that is restarted with its store continues as if it had never stopped.
 
     Args:
         space: states and transitions of the part.
-        plant: the robot it acts on; must have the motors of the space's robot.
-        beliefs: outcomes of transitions, e.g. `load_learned(file).model.debiased()`.  None: those of `model`; without a model, actions
-            mostly reach their goals.
-        marker: the marker to be put on the targets.
-        settings: None: the defaults.
-        store: where steps are written, and read from at the start; None: they are not kept.
-        model: transition model to be learned at the same time (thesis 9.4.1): transitions without contact with the world are
-            observed with it.
+        plant: the robot on which the agent acts; it must have the motors of the space's robot.
+        beliefs: outcomes of transitions, with which plans are made, e.g. `load_learned(file).model.debiased()`. None: the outcomes of
+            `model`; without a model: every action mostly reaches its goal.
+        marker: the marker that must reach the targets.
+        settings: settings of the agent; None: the defaults.
+        store: file to which steps are written, and from which they are read at the start; None: they are not stored.
+        model: transition model that is learned at the same time (thesis 9.4.1), from transitions without contact with the world; None:
+            none.
         hands: (S, 3) m, root frame, position of the marker in each state; None: computed by kinematics, with the other parts at home.
-        jacobians: (S, 3, d) m/rad, derivatives of `hands` by the joints of the space; None: computed, or unknown if `hands` are given.
-        **changes: fields of `ReachSettings` by keyword, in place of those in `settings`.
+        jacobians: (S, 3, d) m/rad, derivatives of `hands` with respect to the joints of the space; None: computed, or unknown if `hands`
+            are given.
+        **changes: fields of `ReachSettings` by keyword, in place of the values in `settings`.
 
     Raises:
-        UnknownName: no such setting, predictor, strategy, kind of failures, or marker.
+        UnknownName: no such setting, predictor, strategy, kind of failures, detector, or marker.
         InvalidValue: a plant of another robot, or a value out of range.
         MobeeError: the store holds reaches of another space, marker or scale.
     """
@@ -80,15 +82,19 @@ class ReachAgent(ReachLearner):
 
     @property
     def state(self) -> int:
-        """The present state of the part: measured at first and after a step that did not end, else taken from the last outcome."""
+        """The present state of the part, from the last outcome.
+
+        At the start, and after an interruption or an evaluation, reading it measures the state.
+        """
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
 
     def try_problem(self, target: ReachTarget) -> Try:
-        """Make one problem-try: present the target, go to the best pre-reach state, plan again after failures, reach, learn (thesis 8.3.1).
+        """Make one problem-try and return it: move to the state from which the plan reaches, then reach for the target (thesis 8.3.1).
 
-        Raises ActionInterrupted if the plant does; the problem-try stays under way, and the next call for the same position continues it.
+        The agent presents the target to the plant, plans again after failed transitions, and learns from every step. Raises
+        ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for the same position continues it.
         """
         self.begin(target)
         self.plant.present(target)
@@ -98,7 +104,7 @@ class ReachAgent(ReachLearner):
         return self.last
 
     def learn(self, problems: Sequence[ReachTarget], tries: int) -> None:
-        """Make `tries` more problem-tries, each of the least-tried problem; ties are broken at random (thesis 8.3.2).
+        """Make `tries` more problem-tries, each for the problem with the fewest tries; if several have it, for a random one (thesis 8.3.2).
 
         After an interrupted action the agent decides again.
         """
@@ -111,20 +117,26 @@ class ReachAgent(ReachLearner):
                 continue
 
     def plan(self, target: ReachTarget, state: int | None = None) -> ReachPlan:
-        """Plan a reach for a target from a state; None: from the state of the part.  Nothing moves, and nothing is learned."""
+        """Plan a reach for a target from a state (None: from the present one), without moving or learning."""
         expected = np.maximum(self.predictor.mean(target.position), 0.0)
         start = self.state if state is None else state
         return plan_reach(self.space, self.planning, expected, self.failures.rewards(target.position), start)
 
     def evaluate(self, problems: Sequence[ReachTarget], repetitions: int = 1) -> Evaluation:
-        """Reach for the problems with what was learned so far (thesis 8.3.3): the robot moves, but nothing is learned."""
+        """Try every problem in each repetition with what was learned so far, and return the results (thesis 8.3.3).
+
+        The robot moves, but the agent does not learn.
+        """
         try:
             return evaluate(self, problems, repetitions)
         finally:
             self._state = None
 
     def step(self) -> Step:
-        """Make one action of the problem-try under way, whose target is presented; raises ActionInterrupted if the plant does."""
+        """Perform one action of the present problem-try, learn from it, and return it; raises ActionInterrupted if the plant does.
+
+        The plant must present the target, see `try_problem`.
+        """
         state = self.state
         action = self.decide(state)
         self._state = None  # unknown if the action is interrupted, or its record fails

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reach actions of a space: the marker's position and Jacobian in each state."""
+"""The reach actions of a space: the marker's position and Jacobian in each state, from which its reach begins."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SCALE = 0.01  # m, unit of distances in the published equations; the thesis leav
 class Reaches:
     """The reach actions of a space, one for each state.
 
-    `samples`: (S, d) rad, poses of the joints at which the reaches begin.  `hands`: (S, 3) m, root frame, positions of the marker in
-    them.  `scale`: m, the unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7.  `jacobians`: (S, 3, d) m/rad, of the marker's
-    position by the joints; None: unknown.
+    `samples`: (S, d) rad, poses of the joints at which the reaches begin. `hands`: (S, 3) m, root frame, position of the marker in each of
+    them. `scale`: unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m. `jacobians`: (S, 3, d) m/rad, derivative of the marker's
+    position with respect to the joints; None: unknown.
     """
 
     samples: Array
@@ -30,7 +30,7 @@ class Reaches:
     jacobians: Array | None = None
 
     def __post_init__(self) -> None:
-        """Check; raises InvalidValue."""
+        """Check shapes and values; raises InvalidValue."""
         if self.samples.ndim != 2 or self.hands.shape != (len(self.samples), 3):
             raise InvalidValue(
                 f"samples of shape {self.samples.shape}, hands of {self.hands.shape}: give (S, d) rad and (S, 3) m, one row per state."
@@ -46,9 +46,10 @@ class Reaches:
 
 
 def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:
-    """Compute the marker's positions and Jacobians in all states of a space, all other parts at home; `scale` m: see `Reaches`.
+    """Compute the marker's position and Jacobian in each state of a space, with all other parts at home.
 
-    Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
+    `scale`: unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m. Raises UnknownName if the robot has no such marker, InvalidValue if
+    the joints of the space do not move it.
     """
     robot = space.robot
     part = robot.part(space.part)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rebuilds a reach learner from its record."""
+"""Rebuilds a reach agent from the file of a run."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from mobee.store import TransitionStore
 def load_reaches(
     file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None, jacobians: Array | None = None
 ) -> ReachAgent:
-    """Rebuild a reach agent from a run's file for use: its strategy is greedy, and it stores nothing.
+    """Rebuild a reach agent from the file of a run, to use what it learned: its strategy is "greedy", and it stores nothing.
 
-    Its beliefs come from the transitions of the part in the same file, if there are any.
+    It plans with the outcomes of the part's transitions in the same file; without such transitions, every action mostly reaches its goal.
 
     Args:
-        file: of the run.
-        plant: the robot it acts on.
-        part: of the agent; may be None if the file holds the reaches of one part.
-        hands: see ReachAgent.
-        jacobians: see ReachAgent.
+        file: the file of the run.
+        plant: the robot on which the agent acts.
+        part: the agent's part; None is valid if the file contains the reaches of one part.
+        hands: (S, 3) m, root frame, position of the marker in each state; None: computed by kinematics.
+        jacobians: (S, 3, d) m/rad, derivatives of `hands` with respect to the joints; None: computed, or unknown if `hands` are given.
 
     Raises:
-        MobeeError, UnknownName: no such file or part, no reaches in it, or a predictor that is not in `PREDICTORS`.
+        MobeeError, UnknownName: no such file or part, no reaches in the file, or a predictor that is not in `PREDICTORS`.
     """
     if not Path(file).is_file():
         raise MobeeError(f"{file}: there is no such file; runs of `mobee launch` write such files.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores the steps of a reach learner in the file of a run; each is on disk before the next action."""
+"""Stores the steps of a reach learner in the file of a run; each step is on disk before the next action."""
 
 from __future__ import annotations
 
@@ -37,8 +37,9 @@ class ReachStore(AgentFile):
     """The problems and steps of the reach learner of one part, in the file of a run.
 
     Args:
-        path, read_only: see `AgentFile`.
-        part: of the learner; its reaches are stored under the name "<part> reaching", beside the part's transitions.
+        path: the SQLite file; made if missing.
+        part: the learner's part; its reaches are stored under the name "<part> reaching", beside the part's transitions.
+        read_only: open the file for reading only; raises MobeeError if it has no reaches.
     """
 
     def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
@@ -59,7 +60,7 @@ class ReachStore(AgentFile):
             )
 
     def learner(self, settings: dict[str, Any]) -> None:
-        """Record the learner's settings (plain JSON values) for the following steps, if they differ from the last ones."""
+        """Record the settings of the learner that makes the following steps, as JSON values; if they have not changed, write nothing."""
         given = json.dumps(settings, sort_keys=True)
         with explained(self.path), transaction(self._db):
             newest = self._db.execute(
@@ -69,13 +70,16 @@ class ReachStore(AgentFile):
                 self._db.execute("INSERT OR REPLACE INTO reach_learners VALUES (?, ?, ?)", (self.agent, self._last, given))
 
     def learners(self) -> list[tuple[int, dict[str, Any]]]:
-        """Return the settings of all learners, each with the number of steps recorded before."""
+        """Return the recorded settings in order, each as (number of steps that were recorded before, settings)."""
         with explained(self.path):
             rows = self._db.execute("SELECT n, settings FROM reach_learners WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [(n, json_of(self.path, f"the settings of {self.agent}", settings)) for n, settings in rows]
 
     def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
-        """Commit one step and the targets of new problems; all is on disk when this returns."""
+        """Write one step, and the targets of problems that are new; all is on disk when this returns.
+
+        `problems`: the targets of all problems so far. Raises MobeeError if the number of the step is not the next one.
+        """
         if step.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} steps: append number {self._last + 1}, not {step.n}.")
         values = (self.agent, *_row(step), time.time())
@@ -86,19 +90,19 @@ class ReachStore(AgentFile):
         self._last, self._problems = step.n, self._problems + len(new)
 
     def times(self) -> list[float]:
-        """Return the times at which the steps were committed: s since 1970, in order."""
+        """Return the time at which each step was written, in order, in s since 1970."""
         with explained(self.path):
             rows = self._db.execute("SELECT t FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [t for (t,) in rows]
 
     def problems(self) -> list[ReachTarget]:
-        """Return the target of each problem, in order."""
+        """Return the target of each problem, in the order of the problems' numbers."""
         with explained(self.path):
             rows = self._db.execute("SELECT target FROM reach_problems WHERE agent = ? ORDER BY problem", (self.agent,)).fetchall()
         return [self._problem(target) for (target,) in rows]
 
     def load(self) -> list[Step]:
-        """Return all steps, in order; raises MobeeError if one is absent."""
+        """Return all steps, in order; raises MobeeError if a step is missing or damaged."""
         with explained(self.path):
             rows = self._db.execute(f"SELECT {', '.join(COLUMNS)} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         for expected, row in enumerate(rows, start=1):
@@ -127,7 +131,7 @@ class ReachStore(AgentFile):
 
 
 def reaching_parts(file: str | Path) -> tuple[str, ...]:
-    """Return the parts with reaches in a run's file."""
+    """Return the names of the parts that have reaches in the file of a run."""
     path = Path(file)
     with explained(path), closing(opened(path, read_only=True)) as database:
         if not _has_reaches(database):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strategies compute the reward of a reach from each state: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
+"""Strategies, which compute the rewards of reaches for plans: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ RANDOM_SHARE = 0.2  # of the problem-tries, which reach from a random state
 
 
 class Progress:
-    """The reward of a reach is the change of its state's rewards over the last eight reaches; 1 where there are fewer than two."""
+    """A strategy for learning progress: the reward of a reach from a state is how much this state's rewards have changed recently.
+
+    The mean of the newer half of its last eight rewards is compared with that of the older half; the reward is 1 if it has fewer than two.
+    In one of five problem-tries the reward is 1 for a random state and 0 for all others.
+    """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._lately: list[deque[float]] = [deque(maxlen=WINDOW) for _ in range(len(reaches))]
         self._interest: Array = np.ones(len(reaches))
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Add a reward to the state's recent rewards and update the state's interest: how much these rewards have changed."""
+        """Record the reward of a reach that began in `state`. `target` and `expected` are not used."""
         lately = self._lately[state]
         lately.append(reward)
         if len(lately) > 1:
@@ -34,7 +38,10 @@ class Progress:
             self._interest[state] = abs(rewards[-half:].mean() - rewards[:half].mean())
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the change of the rewards of each state, (S,); in one of five problem-tries, 1 for a random state and 0 for all others."""
+        """Return for each state how much its rewards have changed recently, (S,).
+
+        With a probability of 0.2, return 1 for a random state and 0 for all others instead. `target` is not used.
+        """
         if rng.random() >= RANDOM_SHARE:
             return self._interest.copy()
         worth = np.zeros(len(self._interest))
@@ -46,83 +53,95 @@ OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
 class Strategy(Protocol):
-    """Computes the rewards of the reach actions that a learner plans with.
+    """Computes the rewards of the reach actions for which a learner plans while it learns.
 
-    They must follow from the reaches added and the generator alone; `rewards` changes nothing.
+    The rewards must depend only on the reaches that were added and on the random generator; the method `rewards` must change nothing.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach; the arguments are those of `RewardPredictor.add`."""
+        """Learn from a reach that began in `state`, for a target (3,) m.
+
+        `reward`: the observed reward. `expected`: the reward that the predictor expected before the reach.
+        """
         ...
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the reward of reaching from each state, shape (S,); the generator is the same throughout a problem-try."""
+        """Return the reward of a reach from each state for a target (3,) m, shape (S,).
+
+        `rng`: random generator; within one problem-try it always starts in the same state.
+        """
         ...
 
 
 class Random:
-    """The reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2)."""
+    """A strategy: the reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._states = len(reaches)
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn nothing."""
+        """Do nothing: this strategy does not learn."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return 1 for one state and 0 for the others, shape (S,)."""
+        """Return 1 for one random state and 0 for all others, shape (S,). `target` is not used."""
         worth = np.zeros(self._states)
         worth[rng.integers(self._states)] = 1.0
         return worth
 
 
 class Greedy:
-    """The reward of a reach is the predictor's expected reward, which may be optimistic (thesis eq. 8.5)."""
+    """A strategy: the reward of a reach is the reward that the predictor expects, which may be optimistic (thesis eq. 8.5)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._predictor = predictor
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn nothing; the predictor learns from the reach."""
+        """Do nothing: only the predictor learns from the reach."""
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the expected rewards, shape (S,)."""
+        """Return the reward that the predictor expects of a reach from each state for a target (3,) m, shape (S,)."""
         return self._predictor.mean(target)
 
 
 class Intrinsic:
-    """The reward of a reach is the prediction error to expect from the predictor's past errors (thesis eqs. 8.6 and 8.7)."""
+    """A strategy: the reward of a reach is the prediction error that the predictor's earlier errors suggest (thesis eqs. 8.6 and 8.7)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._errors = Histories(len(reaches), reaches.scale)
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append the error, expected minus actual reward, to the history of the state."""
+        """Record the predictor's error, `expected` minus `reward`, in a reach that began in `state`, for a target (3,) m."""
         self._errors.add(state, target, expected - reward)
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the expected errors, shape (S,): 1 for a state that was never tried."""
+        """Return the expected prediction error of a reach from each state for a target (3,) m, shape (S,); 1 for a state never tried."""
         return self._errors.average(target, 1.0)
 
 
 class UpperBound(Greedy):
-    """The reward of a reach is the expected reward plus two standard deviations; needs a predictor that has a deviation."""
+    """A strategy: the reward of a reach is the predictor's expected reward plus two of its standard deviations.
+
+    It needs a predictor that has deviations.
+    """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the upper confidence bounds, shape (S,)."""
+        """Return expected reward plus two standard deviations of a reach from each state for a target (3,) m, shape (S,)."""
         return self._predictor.mean(target) + OPTIMISM * self._predictor.deviation(target)
 
 
 class Thompson(Greedy):
-    """The reward of a reach is that of one sample of the reward function for each problem-try; needs a predictor with samples."""
+    """A strategy: the rewards of all reaches are one random sample from the predictor, drawn for each problem-try (Thompson sampling).
+
+    It needs a predictor that can be sampled.
+    """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the drawn rewards, shape (S,)."""
+        """Return a random sample of the rewards of a reach from each state for a target (3,) m, shape (S,)."""
         return self._predictor.sample(target, rng)
 
 
 StrategyOf = Callable[[Reaches, RewardPredictor], Strategy]
-"""A class or function that makes the strategy of a learner from its reaches and its predictor."""
+"""A class or function that makes the strategy of a learner from its `Reaches` and its `RewardPredictor`."""
 
 STRATEGIES: dict[str, StrategyOf] = {
     "random": Random,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tabular plant with reaches, for tests and for worlds with known ground truth."""
+"""A plant with reaches that is given by tables, for tests and for worlds with known ground truth."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ World = Callable[[Array], tuple[Array, Array]]
 
 
 class ReachTable(TabularPlant):
-    """A TabularPlant on which a part can reach, and the presented target may block transitions.
+    """A `TabularPlant` on which a part can also reach, and where the presented target may block transitions.
 
-    The random outcome of the n-th action depends on the seed and n alone.
+    The random outcome of the n-th action depends only on the seed and n.
 
     Args:
-        space, outcomes, probabilities, seed, start: of the TabularPlant.
-        world: function of a target (3,) m that returns the mean remaining error of a reach from each state, (S,) m, and the probability
-            that the target blocks each transition, (S, A); a blocked one
-            ends in the state where it began.  Called once for each position.
-        noise: m, standard deviation of the remaining error.
+        space, outcomes, probabilities, seed, start: as for `TabularPlant`.
+        world: a function of a target's position (3,) m, called once for each position. It returns the mean remaining distance [m] of a
+            reach from each state, (S,), and the probability that the target blocks each transition, (S, A). A blocked transition ends in
+            its start state.
+        noise: standard deviation of the remaining distance, m.
     """
 
     def __init__(
@@ -51,11 +51,11 @@ class ReachTable(TabularPlant):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A hash of the table of transitions, and the noise, as plain JSON values; they do not cover the function `world`."""
+        """A hash of the tables of transitions, and the noise, as JSON values; the function `world` is not part of them."""
         return super().settings | {"noise": self._noise}
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world; None removes it."""
+        """Put the target into the world, in place of the previous one; None: remove it."""
         if target is None:
             self._presented = None
             return
@@ -65,7 +65,11 @@ class ReachTable(TabularPlant):
         self._presented = self._seen[key]
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Act as the TabularPlant does, unless the presented target blocks the transition; each takes 1 s."""
+        """Perform the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
+
+        If the presented target blocks the action, it ends in its start state and touches the target. Raises InvalidValue if the state has
+        no such action.
+        """
         if self._presented is not None:
             action = self._action[self.state].get(self.space.state_of(target))
             if action is not None and self._chance() < self._presented[1].item(self.state, action):
@@ -74,7 +78,11 @@ class ReachTable(TabularPlant):
         return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach with the remaining error of the table and return to the start; takes 2 s.  The marker's position is always 0."""
+        """Reach for the presented target; the remaining distance is that of the table, with noise, and the part stays in its state.
+
+        A reach counts as 2 s. The position of the marker in the outcome is always 0. `stay` is not used. Raises InvalidValue if no target
+        is presented.
+        """
         if self._presented is None:
             raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")
         q = self.measure(part)

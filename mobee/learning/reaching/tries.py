@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Problems (targets), problem-tries and their steps (thesis 8.3.1)."""
+"""Problems (targets), problem-tries (attempts to reach a target), and the steps of which they consist (thesis 8.3.1)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mobee.reach import ReachTarget
 
 
 class Problems:
-    """Targets by number, in the order of their first problem-tries, and how often each was tried."""
+    """The targets that were tried, numbered in the order of their first problem-tries, and how often each was tried."""
 
     def __init__(self) -> None:
         self.targets: list[ReachTarget] = []
@@ -27,7 +27,7 @@ class Problems:
         return len(self.targets)
 
     def index(self, target: ReachTarget) -> int:
-        """Return the number of the problem at the target's position; a new position is a new problem."""
+        """Return the number of the problem with the target's position; a new position gets the next number."""
         number = self._known.setdefault(place(target), len(self.targets))
         if number == len(self.targets):
             self.targets.append(target)
@@ -35,7 +35,10 @@ class Problems:
         return number
 
     def least_tried(self, targets: Sequence[ReachTarget], rng: np.random.Generator) -> ReachTarget:
-        """Return the target tried least often, drawn among equals (thesis 8.3.2); raises InvalidValue if there is none."""
+        """Return the target with the fewest problem-tries; if several have it, a random one of them (thesis 8.3.2).
+
+        Raises InvalidValue if `targets` is empty.
+        """
         if not targets:
             raise InvalidValue("there are no problems to choose from: give at least one target.")
         tries = [self.tries[n] if (n := self._known.get(place(target))) is not None else 0 for target in targets]
@@ -45,19 +48,20 @@ class Problems:
 
 
 def place(target: ReachTarget) -> bytes:
-    """Return the key of a problem: its position."""
+    """Return the key of a problem in dicts: the bytes of the target's position."""
     return (target.position + 0.0).tobytes()  # -0 and 0 are one position
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One action of a problem-try.
+    """One action of a problem-try: a transition, or the reach.
 
-    `n`: number of the step, 1, 2, ...  `number`: of its problem-try, 1, 2, ...  `problem`: of the target, 0, 1, ...  `s`, `s_next`: states
-    before and after.  `a`: the action of a transition, or REACH.  `failed`: the transition did not lead to a state of higher value.
-    `reward`: of a transition 0 or the penalty, of a reach that of thesis eq. 8.4.  `expected`, `missing`: of a reach, the reward predicted
-    just before, and the remaining error [m].  `settled`: False after a timeout.  `duration`: s, by the plant's clock.  `q`: rad, all
-    motors of the part at the end; of a reach, when its force ended.  `touched`: world objects in contact.
+    `n`: number of the step, 1, 2, ... `number`: number of its problem-try, 1, 2, ... `problem`: number of its target, 0, 1, ... `s`,
+    `s_next`: states before and after. `a`: the action of a transition, or REACH (-1). `failed`: whether a transition led to no state of
+    higher value. `reward`: of a transition 0, or the penalty if it failed; of a reach that of thesis eq. 8.4. `expected`: the reward
+    predicted before a reach. `missing`: m, remaining distance after a reach. Both are 0 for a transition. `settled`: False after a timeout.
+    `duration`: s, by the plant's clock. `q`: rad, all motors of the part at the end (of a reach: when its force ended). `touched`: names of
+    world objects in contact then.
     """
 
     n: int
@@ -80,10 +84,10 @@ class Step:
 class Try:
     """A problem-try that has ended.
 
-    `number`: 1, 2, ...  `problem`: number of its target.  `path`: its transitions, as (s, a, s', failed).  `reach_state`: where the reach
-    started; None: the try ended at the limit of actions without a reach.  `reward`, `expected`: observed and predicted reward of the reach;
-    `intrinsic`: expected minus observed reward (thesis eq. 8.6); `missing`: m, remaining error.  These four are 0 without a reach.
-    `timeouts`: number of actions that did not settle.  `duration`: s, by the plant's clock.
+    `number`: 1, 2, ... `problem`: number of its target. `path`: its transitions, as (s, a, s', failed). `reach_state`: the state where the
+    reach started; None: the try ended at the limit of actions without a reach. `reward`, `expected`: observed and predicted reward of the
+    reach. `intrinsic`: expected minus observed reward (thesis eq. 8.6). `missing`: m, remaining distance after the reach. These four are 0
+    without a reach. `timeouts`: number of actions that timed out. `duration`: s, by the plant's clock.
     """
 
     number: int
@@ -99,12 +103,12 @@ class Try:
 
     @property
     def failures(self) -> int:
-        """Number of its transitions that failed."""
+        """The number of transitions of this problem-try that failed."""
         return sum(failed for _, _, _, failed in self.path)
 
 
 def made_of(steps: Sequence[Step]) -> Try:
-    """Return the problem-try that consists of these steps, at least one."""
+    """Return the problem-try that consists of these steps, in order; at least one is needed."""
     moves, last = [step for step in steps if step.a != REACH], steps[-1]
     reached = last.a == REACH
     return Try(

@@ -19,18 +19,21 @@ NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)
 
 
 class AdaptiveRoadmap:
-    """A roadmap whose edges are not checked in advance, with the observed outcomes of its edges.
+    """A roadmap whose edges are not checked for contacts in advance; it counts how often motions along each edge succeeded.
 
-    It is a simple Markov decision process: states are vertices, actions are edges, and an action ends at its goal or
-    where it began.  Its graph is a `Space`, its beliefs are an `OutcomeModel`: `mobee.Planner` and
-    `mobee.value_iteration` plan on `roadmap.space` and `roadmap.beliefs` as on those of a curious agent.  `plan` finds
-    the same paths faster: an edge of length d that succeeds with probability p costs d / p, since it takes 1 / p tries.
+    It is a simple Markov decision process: states are vertices, actions are edges, and an action ends at the goal of its edge or at the
+    vertex where it began. `space` is the graph (`mobee.learning.space.Space`, S vertices with at most A edges each); `beliefs` are the
+    success probabilities of the edges (`EdgeBeliefs`). `mobee.Planner` and `mobee.value_iteration` can plan on these two as on those of a
+    curious agent. `plan` finds the same paths faster: an edge of length d that succeeds with probability p costs d / p, since it needs 1 /
+    p tries on average.
 
     Args:
-        space: vertices and edges over joints of one part, e.g. `mobee.Voronoi(robot, joints, 20, neighbours=10)`
-            or `mobee.roadmap_space(roadmap)`.
-        mode: how a failed edge is treated, "remove" (thesis) or "reweigh"; see `EdgeBeliefs`.
-        forgetting: see `EdgeBeliefs`.
+        space: vertices and edges over joints of one part, e.g. `mobee.Voronoi(robot, joints, 20, neighbours=10)` or
+            `mobee.roadmap_space(roadmap)`.
+        mode: what happens to a failed edge. "remove": it is excluded until it succeeds again (thesis). "reweigh": its probability of
+            success is estimated from counts.
+        forgetting: factor in (0, 1] on all counts at each observation of any edge, so that old failures are forgotten; no effect with
+            "remove".
         both_ways: whether an observation of an edge also counts for the edge in the opposite direction.
 
     Raises:
@@ -50,29 +53,29 @@ class AdaptiveRoadmap:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings of the map as plain JSON values."""
+        """The constructor's arguments as plain JSON values, with the settings of the space."""
         beliefs = self.beliefs
         made = {"mode": beliefs.mode, "forgetting": beliefs.forgetting, "both_ways": self.both_ways}
         return made | {"space": self.space.settings}
 
     @property
     def tried(self) -> int:
-        """Number of edges that were tried."""
+        """Number of edges that were tried at least once."""
         return int((self.beliefs.tried > 0).sum())
 
     @property
     def unexplored(self) -> Ints:
-        """The edges that were never tried, as rows of (state, action)."""
+        """The edges that were never tried, shape (E, 2): numbers of state (vertex) and action (column of `space.goals`)."""
         return np.argwhere((self.space.goals != NO_ACTION) & (self.beliefs.tried == 0))
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Whether each edge ended at its goal when it was last tried, shape (S, A)."""
+        """Whether each edge was tried and ended at its goal when it was last tried, shape (S, A)."""
         return (self.beliefs.tried > 0) & self.beliefs.last
 
     @property
     def stuck(self) -> Ints:
-        """Vertices from which every edge was tried and failed when it was tried last (thesis 4.3.1)."""
+        """Numbers of the vertices from which every edge was tried and failed at its last try (thesis 4.3.1)."""
         return np.flatnonzero(~self.beliefs.last.any(axis=1))
 
     @property
@@ -83,9 +86,10 @@ class AdaptiveRoadmap:
         return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((steps**2).sum(axis=-1)))
 
     def plan(self, start: int, goals: ArrayLike) -> tuple[int, ...]:
-        """Return the vertices of the cheapest path from a start to one of the goals, both included.
+        """Return the vertices of the cheapest path from vertex `start` to one of the vertices `goals`, start and goal included.
 
-        Raises InvalidValue for a vertex that does not exist, MobeeError if no path is left.
+        The cost of an edge is its length divided by its probability of success. Raises InvalidValue for a vertex that does not exist, and
+        MobeeError if no path is left because failed edges were removed.
         """
         here = int(target_states(self.space, start)[0])
         targets = set(target_states(self.space, goals).tolist())
@@ -103,7 +107,11 @@ class AdaptiveRoadmap:
         return tuple(path)
 
     def costs(self, goals: ArrayLike) -> Array:
-        """Return the cost of the cheapest path from each vertex to a goal, shape (S,), infinite where no path is left."""
+        """Return the cost of the cheapest path from each vertex to one of the vertices `goals`, shape (S,).
+
+        The cost of an edge is its length [rad] divided by its probability of success. It is infinite for a vertex from which no path is
+        left.
+        """
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
@@ -115,9 +123,10 @@ class AdaptiveRoadmap:
         return found
 
     def reward(self, goals: ArrayLike) -> Array:
-        """Return the reward (S, A) for which value iteration finds the paths of `plan`: minus the length of each edge.
+        """Return the reward (S, A) for which value iteration finds the paths of `plan` to the vertices `goals`.
 
-        It is -inf for edges that are removed, that do not exist, or that begin in a goal.
+        The reward is minus the length of the edge [rad]. It is -inf for edges that are removed, that do not exist, that begin in a goal, or
+        that begin or end at a vertex without a path to a goal.
         """
         left = self.costs(goals)
         usable = np.isfinite(self._edge_costs()) & np.isfinite(left)[self.space.goals] & np.isfinite(left)[:, None]
@@ -125,7 +134,7 @@ class AdaptiveRoadmap:
         return np.where(usable, -self.lengths, -np.inf)
 
     def reachable(self, start: int) -> NDArray[np.bool_]:
-        """Return whether each vertex can be reached from `start`, (S,); True for `start` itself."""
+        """Return whether each vertex can be reached from vertex `start` over edges that are not removed, (S,); True for `start` itself."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import breadth_first_order
 
@@ -136,16 +145,19 @@ class AdaptiveRoadmap:
         return found
 
     def next_target(self, start: int, rng: np.random.Generator) -> int | None:
-        """Draw a vertex to explore next, in proportion to its untried edges (thesis 4.3.1).
+        """Draw the vertex to explore next; its probability is proportional to its number of untried edges (thesis 4.3.1).
 
-        Returns None if all edges of the reachable vertices were tried.
+        Only vertices that can be reached from `start` are drawn. Returns None if all of their edges were tried.
         """
         untried = np.bincount(self.unexplored[:, 0], minlength=len(self)) * self.reachable(start)
         total = int(untried.sum())
         return int(rng.choice(len(self), p=untried / total)) if total else None
 
     def observe(self, state: int, action: int, arrived: int) -> None:
-        """Record that a motion along an edge, from vertex `state`, ended at vertex `arrived`: its goal, or another one."""
+        """Record the end of a motion along the edge `action` of vertex `state`; `arrived`: the vertex where the motion ended.
+
+        The try counts as a success if `arrived` is the goal of the edge, else as a failure.
+        """
         goal = self.space.goal(state, action)
         self.beliefs.observe(state, action, arrived == goal)
         back = self.action(goal, state) if self.both_ways else None
@@ -153,12 +165,15 @@ class AdaptiveRoadmap:
             self.beliefs.observe(goal, back, arrived == goal)
 
     def action(self, state: int, goal: int) -> int | None:
-        """Return the edge from a vertex to another, None if there is none."""
+        """Return the action (column of `space.goals`) whose edge leads from vertex `state` to vertex `goal`; None if no edge does."""
         found = np.flatnonzero(self.space.actions(state) == goal)
         return int(found[0]) if len(found) else None
 
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
-        """Add poses of the joints (N, d) rad as vertices, with edges to and from the nearest ones; return their numbers."""
+        """Add poses of the joints (N, d) rad as vertices; return the numbers of the new vertices, (N,).
+
+        Each new vertex gets edges to and from its `neighbours` nearest vertices; distances are measured in ranges of the joints.
+        """
         new = self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
         spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
@@ -172,9 +187,10 @@ class AdaptiveRoadmap:
         return np.arange(old, len(poses))
 
     def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
-        """Add a path in both directions between two vertices, through K >= 1 new poses of the joints (K, d) rad.
+        """Add a path in both directions between the vertices `state` and `goal`, through K >= 1 new poses of the joints (K, d) rad.
 
-        Returns the numbers of the new vertices.  This repairs a vertex without usable edges by a path that a single-query planner found.
+        Returns the numbers of the new vertices, (K,). A path that a single-query planner has found can thus repair a vertex without usable
+        edges.
         """
         first, last = (int(target_states(self.space, vertex)[0]) for vertex in (state, goal))
         new, old = self._new(samples), len(self)
@@ -184,10 +200,11 @@ class AdaptiveRoadmap:
         return np.arange(old, old + len(new))
 
     def prune(self, start: int) -> Ints:
-        """Remove the vertices that cannot be reached from `start`, and the failed edges of vertices that have other edges.
+        """Remove the vertices that cannot be reached from vertex `start`; return the new number of every vertex, (S,), -1 for removed ones.
 
-        A vertex always keeps an edge, if necessary a new one to the nearest vertex.  Returns the new number of every
-        vertex, -1 for removed ones, shape (S,).
+        With the mode "remove", failed edges of the remaining vertices are removed too. A vertex always keeps at least one edge: if all its
+        edges failed, these remain; if all its edges led to removed vertices, it gets a new edge to the nearest vertex. Raises MobeeError if
+        no other vertex can be reached from `start`.
         """
         kept = np.flatnonzero(self.reachable(start))
         if len(kept) < 2:

@@ -21,15 +21,16 @@ PRIOR = (0.2, 0.01)  # imagined successes and failures of every edge: optimistic
 
 
 class EdgeBeliefs:
-    """An `OutcomeModel` with two outcomes of an edge: its goal, with probability p, or else the vertex where it began.
+    """Beliefs about the outcomes of edges: an edge ends at its goal with probability p, or else at the vertex where it began.
 
-    "remove": a failed edge is excluded until it succeeds (thesis).  "reweigh": p is the mean of a Beta distribution over
-    weighted counts; each observation of any edge lowers the weight of all counts, so that old failures are forgotten.
+    The class has the interface of `mobee.learning.value_iteration.OutcomeModel`, so planners can use it.
 
     Args:
-        goals: (S, A) vertices, NO_ACTION where there is no edge.
-        mode: "remove" or "reweigh".
-        forgetting: factor of all counts for each observation, in (0, 1]; of no effect with "remove".
+        goals: (S, A) goal vertex of each edge; NO_ACTION (-1) where there is no edge.
+        mode: "remove": a failed edge is excluded (p = 0) until it succeeds; all other edges have p = 1 (thesis). "reweigh": p is the mean
+            of a Beta distribution over weighted counts of successes and failures.
+        forgetting: factor on all counts at each observation of any edge, in (0, 1], so that old failures are forgotten; no effect with
+            "remove".
     """
 
     def __init__(self, goals: Ints, mode: Mode = "remove", forgetting: float = 1.0) -> None:
@@ -41,13 +42,13 @@ class EdgeBeliefs:
         self.forgetting = forgetting
         self.goals = goals
         self.worked: Array = np.zeros(goals.shape)
-        """Weighted successes, shape (S, A)."""
+        """Weighted number of successes of each edge, shape (S, A)."""
         self.failed: Array = np.zeros(goals.shape)
-        """Weighted failures, shape (S, A)."""
+        """Weighted number of failures of each edge, shape (S, A)."""
         self.tried: Ints = np.zeros(goals.shape, dtype=np.intp)
         """Number of observations of each edge, shape (S, A)."""
         self.last: NDArray[np.bool_] = goals != NO_ACTION
-        """Whether each edge ended at its goal when it was last observed; True before, shape (S, A)."""
+        """Whether each edge ended at its goal when it was last observed, shape (S, A); True for edges that were never observed."""
 
     @property
     def success(self) -> Array:
@@ -60,18 +61,18 @@ class EdgeBeliefs:
 
     @property
     def outcomes(self) -> Ints:
-        """The two outcomes of each edge, shape (S, A, 2): its goal, and the vertex where it began."""
+        """The two possible end vertices of each edge, shape (S, A, 2): its goal, and the vertex where it began."""
         began = np.broadcast_to(np.arange(len(self.goals))[:, None], self.goals.shape)
         return np.stack([np.where(self.goals == NO_ACTION, began, self.goals), began], axis=-1)
 
     @property
     def probabilities(self) -> Array:
-        """Probabilities of the outcomes, shape (S, A, 2), all 0 where there is no edge."""
+        """Probabilities of the two `outcomes` of each edge, shape (S, A, 2); both are 0 where there is no edge."""
         p = self.success
         return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
 
     def observe(self, state: int, action: int, arrived: bool) -> None:
-        """Count a try of an edge; `arrived`: whether the motion ended at the goal of the edge."""
+        """Count a try of the edge `action` of vertex `state`; `arrived`: whether the motion ended at the goal of the edge."""
         if self.forgetting < 1.0:
             self.worked *= self.forgetting
             self.failed *= self.forgetting
@@ -81,7 +82,11 @@ class EdgeBeliefs:
         self.last[state, action] = arrived
 
     def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
-        """Return these beliefs for a new table of goals, whose entries (states, actions) were the entries `before` of the old table."""
+        """Return a copy of these beliefs for a changed graph with the table `goals` (S', A').
+
+        `states`, `actions` (E,): positions in the new table of the edges that remain. `before`: positions (states, actions) of the same
+        edges in the old table. All other edges of the new table start without observations.
+        """
         found = EdgeBeliefs(goals, self.mode, self.forgetting)
         for name in ("worked", "failed", "tried", "last"):
             getattr(found, name)[states, actions] = getattr(self, name)[before]
@@ -94,15 +99,15 @@ DECIMALS = 9  # of rad: poses that are equal to this precision are one
 def roadmap_space(roadmap: Roadmap, joints: Sequence[str] | None = None) -> Space:
     """Return a space whose states are a roadmap's poses and whose actions are its edges, in both directions.
 
-    States are the vertices of the map's largest connected part, in their order; other parts cannot be reached from it.
-    Vertices that differ only in motors other than the joints are one state.  The part's other motors keep their position in the map.
+    States are the vertices of the map's largest connected part, in their order; the other parts cannot be reached from it. Vertices that
+    have the same positions of `joints` become one state. The other motors of the part keep their position in the map.
 
     Args:
         roadmap: e.g. of `mobee.build_roadmap`.
         joints: motor names of one part; None: the motors that may move in the map.
 
     Raises:
-        InvalidValue, UnknownName: joints of several parts, or less than two states.
+        InvalidValue, UnknownName: the joints belong to several parts, a name is unknown, or no edge joins two different states.
     """
     robot = roadmap.model.robot
     names = tuple(roadmap.motors if joints is None else joints)

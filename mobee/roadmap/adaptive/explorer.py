@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Explores which edges of an optimistic roadmap are free (thesis 4.3.1)."""
+"""Explores which edges of an adaptive roadmap are free; edges that were never tried count as free (thesis 4.3.1)."""
 
 from __future__ import annotations
 
@@ -23,16 +23,20 @@ Query = Callable[[Array, Array], Array | None]
 
 
 class MapExplorer(Walker):
-    """A Walker that moves to untried edges until all reachable edges were tried.
+    """A `Walker` that moves to untried edges of an adaptive roadmap until all reachable edges were tried.
 
-    A vertex may have feasible edges that lead to it and none that leave it.  There the explorer queries a path to a vertex with
-    untried edges, and adds this path to the map.  An explorer that is started again with its store continues.
+    A vertex may have feasible edges that lead to it and none that leave it. At such a vertex the explorer queries a path to a vertex with
+    untried edges, and adds this path to the map. An explorer that is started again with its store continues.
 
     Args:
-        roadmap, plant, near, store: see Walker; the part always moves back after an edge failed.
-        seed: of its random choices.
-        query: finds a path where the map has none: from a pose of the joints (d,) to one of several (G, d), as poses (K, d)
-            from the first to the last, or None; see `mobee.roadmap.ompl.query`.  None: the explorer stops there.
+        roadmap: the map, which the explorer changes.
+        plant: executes the actions; its robot must be that of the map.
+        near: largest distance of every joint from a vertex at which the part counts as being there [rad].
+        seed: of the random choices.
+        query: finds a path where the map has none. Arguments: a pose of the joints (d,) and several goal poses (G, d), rad. Result: poses
+            (K, d) from the start to one of the goals, or None; `mobee.roadmap.ompl.query` makes such a function. None: the explorer stops
+            at a vertex that no usable edge leaves.
+        store: receives the observations and the changes of the map; if it already has some, the explorer continues from them.
     """
 
     def __init__(
@@ -47,14 +51,14 @@ class MapExplorer(Walker):
         self.seed = seed
         super().__init__(roadmap, plant, near, True, store)
         self.repairs = 0
-        """Number of paths that the query has found."""
+        """Number of paths that the query has found and that were joined to the map."""
         self._query, self._draws = query, Draws(f"map of {self.part}")
         self._asked_for: Counter[int] = Counter()
         self._target: int | None = None
 
     @property
     def settings(self) -> dict[str, Any]:
-        """See Walker."""
+        """The settings of the `Walker` and the seed, as plain JSON values."""
         return super().settings | {"seed": self.seed}
 
     def explore(self, edges: int | None = None) -> bool:

@@ -22,7 +22,11 @@ CREATE TABLE IF NOT EXISTS map_changes (
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A change of a map after `n` transitions; `what`: the method of AdaptiveRoadmap; `given`: its arguments as plain JSON values."""
+    """A recorded change of an adaptive roadmap.
+
+    `n`: number of transitions before the change. `what`: name of the method of AdaptiveRoadmap ("grow", "join" or "prune"). `given`: the
+    arguments of the method by name, as plain JSON values.
+    """
 
     n: int
     what: str
@@ -30,10 +34,15 @@ class Change:
 
 
 class MapStore(TransitionStore):
-    """A TransitionStore that also records the changes of a map between transitions.
+    """A TransitionStore that also records the changes of an adaptive roadmap between the transitions.
 
     Args:
-        path, agent, read_only: see `AgentFile`, also for the errors.
+        path: the SQLite file of the run; it is created if it does not exist.
+        agent: the name under which the data are stored.
+        read_only: whether to open the file for reading only.
+
+    Raises:
+        MobeeError: from every method, if the file cannot be read or written, as in `mobee.store.AgentFile`.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False) -> None:
@@ -43,7 +52,10 @@ class MapStore(TransitionStore):
                 self._db.execute(TABLE)
 
     def changed(self, what: str, **given: Any) -> None:
-        """Commit a change; it is on disk when this returns."""
+        """Commit a change of the map; it is on disk when the method returns.
+
+        `what`: name of the method of AdaptiveRoadmap. `given`: its arguments, plain JSON values.
+        """
         with explained(self.path), transaction(self._db):
             (number,) = self._db.execute("SELECT count(*) FROM map_changes WHERE agent = ?", (self.agent,)).fetchone()
             self._db.execute("INSERT INTO map_changes VALUES (?, ?, ?, ?)", (self.agent, number, self._last, json.dumps([what, given])))
@@ -67,23 +79,32 @@ CHANGES = ("grow", "join", "prune")
 
 
 class MapRecord:
-    """An adaptive map and its store, if any: a store with content restores the map.
+    """An adaptive roadmap together with its store: applies observations and changes to the map, and writes them to the store.
 
-    Raises MobeeError if the store is of another map or other settings.
+    Args:
+        roadmap: the map. If the store has content, the recorded observations and changes are applied to it.
+        store: the file; None: nothing is written.
+        settings: settings of the walker or explorer, which must equal those in the store.
+
+    Raises:
+        MobeeError: the store belongs to another map or to other settings.
     """
 
     def __init__(self, roadmap: AdaptiveRoadmap, store: MapStore | None, settings: dict[str, Any]) -> None:
         self.roadmap, self._store = roadmap, store
         self.transitions = 0
-        """Number of observed edges, those of the store included."""
+        """Number of observed tries of edges, those read from the store included."""
         self.joined: set[int] = set()
-        """Vertices that were added when a path was joined to the map."""
+        """Numbers of the vertices that were added by `join`."""
         if store is not None:
             store.bind(settings)
             self._replay(store)
 
     def observe(self, state: int, action: int, arrived: int, outcome: Outcome) -> None:
-        """Observe and record the outcome of an edge."""
+        """Learn and record the outcome of a motion along the edge `action` of vertex `state`.
+
+        `arrived`: the vertex where the motion ended. `outcome`: what the plant returned for the action.
+        """
         made = Transition(
             n=self.transitions + 1,
             s=state,
@@ -100,7 +121,11 @@ class MapRecord:
         self._learn(made)
 
     def change(self, what: str, **given: Any) -> Any:
-        """Call a method that changes the map ("grow", "join", "prune") with plain JSON values, record it, and return its result."""
+        """Change the map and record the change; return the result of the method.
+
+        `what`: name of the method of AdaptiveRoadmap, "grow", "join" or "prune". `given`: its arguments, plain JSON values. Raises
+        UnknownName for another method.
+        """
         if what not in CHANGES:
             raise UnknownName("change of a map", what, CHANGES)
         if self._store is not None:

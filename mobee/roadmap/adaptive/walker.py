@@ -23,7 +23,10 @@ TRAIL = 50  # number of vertices visited last that are tried first
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """The result of a walk: whether it ended in a goal, the number of edges tried, and the number that failed."""
+    """The result of a walk.
+
+    `arrived`: whether it ended in a goal. `edges`: number of edges tried. `bumps`: number of edges that failed.
+    """
 
     arrived: bool
     edges: int
@@ -31,17 +34,18 @@ class Walk:
 
 
 class Walker:
-    """Moves one part along the edges of an adaptive map.
+    """Moves one part of a robot along the edges of an adaptive roadmap.
 
-    To move along an edge, the part is commanded to the edge's goal.  The edge succeeds if the part comes to rest within `near` of the
-    goal.  Otherwise the part moves back to its start (thesis 4.1: the reflex), the map records the failure, and a new path is planned.
+    To move along an edge, the walker commands the part to the pose of the edge's goal. The edge succeeds if the part comes to rest within
+    `near` of the goal. Otherwise the map records the failure, the part moves back to the start of the edge (thesis 4.1: the reflex), and
+    the walker plans a new path.
 
     Args:
         roadmap: the map, which the walker changes.
         plant: executes the actions; its robot must be that of the map.
-        near: largest distance from a vertex, in every joint of the map [rad].
-        back: whether the part always moves back after a failure; False: it moves directly to the next vertex of the new path, and back
-            only if it does not arrive there.
+        near: largest distance of every joint from a vertex at which the part counts as being there [rad].
+        back: whether the part always moves back after a failure; False: it moves directly to the next vertex of the new path, and back only
+            if it does not arrive there.
         store: receives the observations; if it already has some, the walker continues from them.
 
     Raises:
@@ -59,20 +63,20 @@ class Walker:
         self.roadmap, self.plant, self.part = roadmap, plant, roadmap.space.part
         self.near, self.back = near, back
         self.here: int | None = None
-        """The vertex where the part is; None: off the map, or not known."""
+        """The vertex where the part is; None if the part is at no vertex, or if its position is not known."""
         self._trail: list[int] = []  # the vertices visited, the last one at the end
         self.record = MapRecord(roadmap, store, self.settings)
-        """Record of observations and changes; every change goes through it, and sets `here` to None if vertices may be renumbered."""
+        """The record of observations and changes; change the map only by `record.change`, and set `here` to None after "prune"."""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings that determine its behaviour, without the plant, as plain JSON values."""
+        """The settings that determine the walker's behaviour, with those of the map but without the plant, as plain JSON values."""
         return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
 
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
-        """Move to one of the goals over at most `most` edges (None: no limit), with a new plan after each edge that fails.
+        """Move to one of the vertices `goals` over at most `most` edges (None: no limit); plan a new path after each failed edge.
 
-        Raises MobeeError if there is no path, ActionInterrupted if the plant interrupts an action.
+        Raises MobeeError if there is no path, and ActionInterrupted if the plant interrupts an action.
         """
         targets = set(target_states(self.roadmap.space, goals).tolist())
         edges, bumps = 0, 0
@@ -86,7 +90,11 @@ class Walker:
         return Walk(True, edges, bumps)
 
     def follow(self, state: int, goal: int) -> bool:
-        """Move along one edge and observe it; return whether it succeeded.  If not, move back if `back` is set."""
+        """Move along the edge from vertex `state` to vertex `goal` and record the outcome; return whether the motion succeeded.
+
+        After a failure the part moves back to `state` if `back` is set. Raises InvalidValue if the map has no such edge, and
+        ActionInterrupted if the plant interrupts an action.
+        """
         action = self.roadmap.action(state, goal)
         if action is None:
             raise InvalidValue(f"the map has no edge from {state} to {goal}: valid are {self.roadmap.space.actions(state).tolist()}.")
@@ -101,9 +109,10 @@ class Walker:
         return worked
 
     def enter(self) -> int:
-        """Return the vertex of the part; if it is off the map, move to the last vertex, or else to the nearest ones, until one is reached.
+        """Return the vertex where the part is; if the part is at no vertex, move it to one.
 
-        Raises MobeeError if none is reached.
+        The part then tries the vertices that it visited last, the latest first, and after them the five nearest vertices, until it arrives
+        at one. Raises MobeeError if it arrives at none.
         """
         if self.here is None:
             q = self.plant.measure(self.part)

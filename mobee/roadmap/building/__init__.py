@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Task-relevant roadmaps: task spaces, the advancing front, and the flood (thesis 3.3)."""
+"""Task-relevant roadmaps: task spaces, and builders by evolution strategy and by least squares on a lattice (thesis 3.3)."""

@@ -47,9 +47,9 @@ def build_roadmap(
     The same seed gives the same roadmap, also if the building was interrupted and resumed.
 
     Args:
-        model: robot and world; the world must not change meanwhile.
-        costs: terms of mobee.costs, and plain functions of pose and contacts.  The term `collision` is added if it is absent.  Costs may
-            be called from several threads.
+        model: robot and world; the world must not change while the roadmap is built.
+        costs: terms of mobee.costs, and plain functions of pose and contacts.  The term `collision` is added if it is absent.  Costs may be
+            called from several threads.
         task: a task space of mobee.tasks.
         spacing: distance between vertices in the units of the task's coordinates: one number, or one per coordinate.
         start: (n,) rad, where the search for the first pose begins, and the posture of the motors that may not move; None: home.
@@ -57,8 +57,8 @@ def build_roadmap(
         seed: of the random numbers.
         settings: method, edges, margin from the joint limits, and details of the search.
         file: a .npz file in which the unfinished roadmap is saved at least every 10 s.  If it exists and has the same settings, building
-            resumes from it.
-        progress: called several times per second.
+            resumes from it; if it holds the finished roadmap, this is returned.
+        progress: called several times per second with the vertices and evaluations so far.
 
     Raises:
         InvalidValue, UnknownName: an argument is not valid; the message says what is.

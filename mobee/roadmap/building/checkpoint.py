@@ -28,7 +28,10 @@ _PROBES, _DIGITS = 8, 9  # poses that identify costs and coordinates by their va
 
 
 def request(model: Model, problem: Problem, task: Task, spacing: Array, others: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all settings that determine the roadmap, as plain JSON values."""
+    """Return all settings that determine the roadmap, as plain JSON values; `others`: further settings, which are added by name.
+
+    `spacing`: (m,) distance between vertices in each task coordinate.
+    """
     return {
         **digests(model),
         "costs": list(problem.by_name),
@@ -44,7 +47,7 @@ def request(model: Model, problem: Problem, task: Task, spacing: Array, others: 
 
 
 def digest(requested: Mapping[str, Any]) -> str:
-    """Return 16 hex digits that identify a request."""
+    """Return 16 hex digits that identify the settings `requested`, as `request` returns them."""
     return hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -66,7 +69,11 @@ _PREFIX = "front_"  # of the names of arrays that only the building needs
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a roadmap: vertices, evaluated poses, vertices or points that are still open, and seconds of work."""
+    """Progress of building a roadmap.
+
+    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: number of vertices or points from which the
+    builder may still continue. `seconds`: time spent.
+    """
 
     vertices: int
     evaluations: int
@@ -75,14 +82,17 @@ class Progress:
 
 
 class Builder(Protocol):
-    """A builder finds vertices step by step; equal states, generators and numbers of evaluations give equal steps."""
+    """The interface of a builder, which finds the vertices of a roadmap step by step.
+
+    Steps are deterministic: they depend only on the builder's state, the state of its generator `rng`, and `problem.evaluations`.
+    """
 
     rng: np.random.Generator
     problem: Problem
 
     @property
     def vertices(self) -> int:
-        """Number of vertices."""
+        """Number of vertices found so far."""
 
     @property
     def open(self) -> int:
@@ -92,16 +102,27 @@ class Builder(Protocol):
         """Search for further vertices; return False if there is nothing left to try."""
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state, with the vertices' "q" (V, n) rad and "y" (V, m)."""
+        """Return the state as arrays by name; "q" (V, n) rad and "y" (V, m) are the poses and task coordinates of the vertices."""
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `state` of a builder with the same settings."""
+        """Continue from `state`, which the method `state` of a builder with the same settings has returned."""
 
 
 class Checkpoint:
-    """Runs the builders of a roadmap, saves their state to a file if there is one, and reports progress.
+    """Runs the builders of a roadmap, saves their state to a file, and reports progress.
 
-    `stage`: name of the stage in which the file was written; None without a file.
+    The attribute `stage` is the name of the builder that ran when an existing file was written ("flood": lattice, "front": evolution
+    strategy); None if there is no such file, or if it holds a finished roadmap.
+
+    Args:
+        model: robot and world.
+        requested: all settings of the roadmap, as `request` returns them.
+        spacing: (m,) distance between vertices in each task coordinate.
+        file: the .npz file; None: nothing is saved.
+        progress: called at most ten times per second; None: no reports.
+
+    Raises:
+        MobeeError: the file was built with other settings, or is damaged.
     """
 
     def __init__(
@@ -120,13 +141,16 @@ class Checkpoint:
             self.stage = self._found[1].get("stage")
 
     def finished(self) -> Roadmap | None:
-        """Return the roadmap if the file holds a finished one."""
+        """Return the roadmap if the file holds a finished one, else None."""
         if self._file is None or self._found is None or not self._found[1]["settings"].get("finished", False):
             return None
         return load_roadmap(self._file, self._model)
 
     def run(self, name: str, builder: Builder) -> None:
-        """Run all steps of a builder; it continues from the state in the file if this was written in the stage `name`."""
+        """Run all steps of a builder; `name`: name of this stage of the building.
+
+        If the existing file was written in the same stage, the builder continues from the state in the file.
+        """
         if self._found is not None and self.stage == name:
             arrays, notes = self._found
             state = {key.removeprefix(_PREFIX): value for key, value in arrays.items() if key.startswith(_PREFIX)}
@@ -155,7 +179,11 @@ class Checkpoint:
             self._progress(Progress(vertices, evaluations, open, self._reported - self._began))
 
     def finish(self, q: Array, y: Array, evaluations: int) -> Roadmap:
-        """Return the finished roadmap and save it; raises MobeeError if the robot or the world has changed since the start."""
+        """Return the finished roadmap and save it to the file, if there is one.
+
+        `q`: (V, n) rad, poses. `y`: (V, m) task coordinates. `evaluations`: number of evaluated poses. Raises MobeeError if the robot or
+        the world has changed since the start of the building.
+        """
         here = digests(self._model)
         if any(self._requested[key] != here[key] for key in here):
             made, now = (" ".join(one[f"{key}_digest"] for key in ("robot", "world")) for one in (self._requested, here))

@@ -18,7 +18,7 @@ Flags = NDArray[np.bool_]
 
 
 class GrowingArray:
-    """Rows of one shape, to which more can be appended."""
+    """An array to which rows can be appended; `shape`: the shape of one row."""
 
     def __init__(self, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> None:
         self._buffer: NDArray[Any] = np.empty((64, *shape), dtype=dtype)
@@ -29,7 +29,7 @@ class GrowingArray:
 
     @property
     def rows(self) -> NDArray[Any]:
-        """A writable view (N, ...) of all rows; invalid after the next `append`."""
+        """A writable view (N, ...) of all rows; it is invalid after the next `append`."""
         return self._buffer[: self._count]
 
     def append(self, row: object) -> None:
@@ -45,7 +45,10 @@ MANY_DIRECTIONS = 128  # in higher dimensions
 
 
 def directions(dimensions: int) -> Array:
-    """Return unit vectors (D, dimensions): +-1 in 1-D, a circle in 2-D, a spiral over the sphere in 3-D, else random opposite pairs."""
+    """Return the unit vectors (D, m) in which a roadmap searches from each vertex, for a task space of m = `dimensions`.
+
+    2 directions in 1-D, 24 on a circle in 2-D, 64 on a spiral over the sphere in 3-D, else 128 in random opposite pairs.
+    """
     count = DIRECTIONS.get(dimensions, MANY_DIRECTIONS)
     if dimensions == 1:
         return np.array([[1.0], [-1.0]])
@@ -68,7 +71,10 @@ _BORDER = 1e-9  # barycentric: points on the border are inside
 
 
 class SimplexRegion:
-    """The region covered by simplices (R of thesis Algorithm 4), each stored as an origin and the inverse of its edges."""
+    """The region of a task space that is covered by simplices (R of thesis Algorithm 4).
+
+    A simplex is stored as its first corner, the origin, and the inverse of the matrix of its edges. `dimensions`: m of the task space.
+    """
 
     def __init__(self, dimensions: int) -> None:
         self._origins = GrowingArray((dimensions,))
@@ -78,7 +84,10 @@ class SimplexRegion:
         return len(self._origins)
 
     def add(self, corners: Array) -> Array | None:
-        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of its edges from the first corner, or None if it is flat."""
+        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of the matrix of its edges from the first corner.
+
+        Returns None, and adds nothing, if the simplex is nearly flat (its determinant, in spacings, is below MIN_DETERMINANT = 0.05).
+        """
         edges = (corners[1:] - corners[0]).T
         if abs(np.linalg.det(edges)) < MIN_DETERMINANT:
             return None
@@ -88,7 +97,7 @@ class SimplexRegion:
         return inverse
 
     def covers(self, points: Array) -> Flags:
-        """Return whether each of the points (N, m), all near each other, is inside a simplex, (N,)."""
+        """Return whether each of the points (N, m) is inside a simplex of the region, (N,). The points should be near each other."""
         covered: Flags = np.zeros(len(points), dtype=bool)
         if not len(self._origins) or not len(points):
             return covered
@@ -101,7 +110,10 @@ class SimplexRegion:
 
 
 def inside_simplex(points: Array, origins: Array, inverses: Array) -> Flags:
-    """Return whether points (..., m) lie in the simplices of origins (..., m) and inverse edges (..., m, m)."""
+    """Return whether points (..., m) lie inside simplices, (...,).
+
+    `origins` (..., m): first corners of the simplices. `inverses` (..., m, m): inverses of the matrices of their edges.
+    """
     barycentric = np.einsum("...ij,...j->...i", inverses, points - origins)
     found: Flags = (barycentric >= -_BORDER).all(axis=-1) & (barycentric.sum(axis=-1) <= 1.0 + _BORDER)
     return found
@@ -113,10 +125,11 @@ MAX_NEIGHBOURS = 1.5  # spacings from a new vertex to the furthest of the n near
 
 
 class Frontier:
-    """Vertices V, edges E, region R and expansion weights of thesis Algorithm 4.
+    """Vertices V, edges E, region R and expansion weights of thesis Algorithm 4, in task coordinates divided by the spacing.
 
-    A direction of a vertex is free if the point one spacing away is inside the box, keeps MIN_DISTANCE to all vertices and is not
-    covered.  The free directions of all vertices are updated with each new vertex, so that no search is started that cannot succeed.
+    A direction of a vertex is free if the point one spacing away is inside the box, keeps MIN_DISTANCE (0.8) to all vertices and is not
+    covered by a simplex. The free directions of all vertices are updated with each new vertex, so that no search is started that cannot
+    succeed. `low`, `high`: (m,) corners of the box. m is the dimension of the task space.
     """
 
     def __init__(self, low: Array, high: Array) -> None:
@@ -134,34 +147,38 @@ class Frontier:
 
     @property
     def points(self) -> Array:
-        """Points of the vertices, (V, m)."""
+        """Points of the vertices, (V, m), in spacings."""
         return self._points.rows
 
     @property
     def weights(self) -> Array:
-        """Expansion weights (V,), lowered by the caller where a search fails."""
+        """Expansion weights of the vertices, (V,), 1 at first; a writable view: the caller lowers the weight after a failed search."""
         return self._weights.rows
 
     @property
     def free(self) -> Flags:
-        """Whether each of the `directions` is free at each vertex, (V, D)."""
+        """Whether each of the D `directions` is free at each vertex, (V, D)."""
         return self._free.rows
 
     @property
     def edges(self) -> Ints:
-        """Edges (E, 2): each vertex and the n vertices nearest to it when it was added (Algorithm 4)."""
+        """Edges (E, 2): each vertex is joined to the m vertices that were nearest to it when it was added (Algorithm 4)."""
         found: Ints = self._edges.rows
         return found
 
     def nearest(self, point: Array, count: int) -> tuple[Ints, Array]:
-        """Return up to `count` vertices nearest to a point (m,) and their distances, nearest first (Algorithm 2)."""
+        """Return up to `count` vertices nearest to a point (m,), nearest first, and their distances in spacings (Algorithm 2)."""
         squares = ((self.points - point) ** 2).sum(axis=1)
         some = np.argpartition(squares, count - 1)[:count] if count < len(squares) else np.arange(len(squares))
         order = some[np.lexsort((some, squares[some]))]
         return order, np.sqrt(squares[order])
 
     def accepts(self, point: Array) -> bool:
-        """Return whether a vertex may be added at a point (m,): in the box, not covered, neither too near to others nor too far away."""
+        """Return whether a vertex may be added at a point (m,).
+
+        The point must be in the box and not covered by a simplex, at least 0.8 and at most 1.25 spacings from the nearest vertex, and at
+        most 1.5 spacings from each of the m nearest vertices. The first point only has to be in the box.
+        """
         if not ((point >= self.low).all() and (point <= self.high).all()):
             return False
         if not len(self):
@@ -172,7 +189,11 @@ class Frontier:
         )
 
     def add(self, point: Array) -> Array | None:
-        """Add a vertex (m,), its edges, and the simplex of it and its n nearest; return the simplex's inverse edges, None without one."""
+        """Add a vertex at a point (m,), its edges to the m nearest vertices, and the simplex of the new vertex and these m.
+
+        Returns the inverse (m, m) of the matrix of the simplex's edges; None if there are fewer than m other vertices, or if the simplex is
+        flat.
+        """
         number, n = len(self), self.dimensions
         corners, _ = self.nearest(point, n)
         simplex = self.region.add(np.concatenate([point[None], self.points[corners]])) if len(corners) == n else None

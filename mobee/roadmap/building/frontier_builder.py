@@ -30,7 +30,11 @@ BATCH = 80  # poses per call of the model; fixed, so that results do not depend 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvaluatedPoses:
-    """N poses: `cost` (N,); `valid` (N,): all terms met, inside the box; `point` (N, m): in the task space, in spacings."""
+    """The evaluation of N poses.
+
+    `cost`: (N,). `valid`: (N,) whether all terms are within their tolerances and the pose is inside the task's box. `point`: (N, m) task
+    coordinates divided by the spacing.
+    """
 
     cost: Array
     valid: NDArray[np.bool_]
@@ -38,7 +42,10 @@ class EvaluatedPoses:
 
 
 class PoseEvaluator:
-    """Evaluates poses for a task, in the threads of a pool: cost, validity, task coordinates."""
+    """Evaluates the cost, validity and task coordinates of poses.
+
+    `spacing`: (m,) distance between vertices in each task coordinate. `pool`: executor whose threads share the work; None: one thread.
+    """
 
     def __init__(self, problem: Problem, task: Task, spacing: Array, pool: Executor | None = None) -> None:
         self.problem, self.task, self.spacing = problem, task, spacing
@@ -46,7 +53,7 @@ class PoseEvaluator:
         self._pool = pool
 
     def evaluate(self, q: Array) -> EvaluatedPoses:
-        """Evaluate poses q (N, n) rad; the result for a pose does not depend on the others."""
+        """Evaluate poses q (N, n) rad; the result of a pose does not depend on the other poses."""
         self.problem.evaluations += len(q)
         batches = [q[k : k + BATCH] for k in range(0, len(q), BATCH)]
         if len(batches) == 1:
@@ -55,7 +62,7 @@ class PoseEvaluator:
         return EvaluatedPoses(*(np.concatenate(column) for column in zip(*((one.cost, one.valid, one.point) for one in done), strict=True)))
 
     def violations(self, q: Array) -> str:
-        """Return a text that lists which terms and task coordinates a pose (n,) violates."""
+        """Return a text that lists the terms and task coordinates that a pose (n,) rad violates, with the amounts."""
         pose = self.problem.model.evaluate(q[None])
         found = [
             f"{name} by {float(term.residual(pose)[0]):.3g} (tolerance {term.tolerance:.3g})"
@@ -86,7 +93,11 @@ class PoseEvaluator:
 
 
 def scaled_cost(term: Term, residual: Array) -> Array:
-    """Return the cost of residuals: (residual / tolerance)^2; for tolerance 0, a step of 1 and a slope; without one, weight * residual."""
+    """Return the cost (N,) of residuals (N,) of a term.
+
+    It is (residual / tolerance)^2. For tolerance 0 it is 1 + 10 weight residual where the residual is above 0, else 0. Without a tolerance
+    it is weight * residual.
+    """
     if term.tolerance is None:
         return term.weight * residual
     if term.tolerance == 0.0:
@@ -100,9 +111,10 @@ LIMIT_COST = 1000.0  # of a sample that was clipped to the limits: times its squ
 
 
 class FrontierBuilder:
-    """Grows a roadmap: each `step` computes one generation of every search and adds the vertices that they found.
+    """Grows a roadmap by searches with an evolution strategy (thesis Algorithms 3 and 4).
 
-    `frontier`: the vertices in the task space, in spacings.  `rng`: draws all random numbers.  `problem`: counts the evaluations.
+    Each `step` computes one generation of every search and adds the vertices that the searches found. `frontier`: the vertices in the task
+    space, in spacings. `rng`: draws all random numbers. `problem`: counts the evaluations.
     """
 
     def __init__(self, evaluator: PoseEvaluator, settings: SearchSettings, rng: np.random.Generator) -> None:
@@ -118,7 +130,7 @@ class FrontierBuilder:
 
     @property
     def vertices(self) -> int:
-        """Number of vertices."""
+        """Number of vertices found so far."""
         return len(self.frontier)
 
     @property
@@ -127,7 +139,7 @@ class FrontierBuilder:
         return int(self.scheduler.expandable().sum())
 
     def result(self) -> tuple[Array, Array]:
-        """Return the poses (V, n) rad and their task coordinates (V, m)."""
+        """Return the poses (V, n) rad of the vertices and their task coordinates (V, m)."""
         return self._poses(self._postures.rows), self.frontier.points * self.evaluator.spacing
 
     def begin_from(self, q: Array, y: Array) -> None:
@@ -137,7 +149,7 @@ class FrontierBuilder:
             self._add(posture, point)
 
     def step(self) -> bool:
-        """Compute a generation of all searches and add the vertices found; return False if no search can start.
+        """Compute a generation of all searches and add the vertices found; return False if no further search can start.
 
         Raises:
             MobeeError: no first pose was found.
@@ -167,13 +179,13 @@ class FrontierBuilder:
         return True
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state for `restore`, without the generator, with the vertices' poses "q" and task coordinates "y"."""
+        """Return the state as arrays by name, without that of `rng`; "q" and "y" are the poses and task coordinates of the vertices."""
         q, y = self.result()
         known = {"q": q, "y": y, "postures": self._postures.rows, "places": self.frontier.points, "weights": self.frontier.weights}
         return self.scheduler.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `state` of a builder with the same settings."""
+        """Continue from `state`, which the method `state` of a builder with the same settings has returned."""
         for posture, point in zip(state["postures"], state["places"], strict=True):
             self._add(posture, point)
         self.frontier.weights[:] = state["weights"]

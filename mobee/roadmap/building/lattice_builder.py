@@ -23,9 +23,11 @@ _ROUNDING = 1e-9  # spacings
 
 
 class Lattice:
-    """The points of a lattice in a box (m, 2), one spacing (m,) apart from their neighbours; one point is the middle of the box.
+    """The points of a lattice in a box of a task space; neighbours are one spacing apart, and one point is the middle of the box.
 
-    Intermediate points, half-way between lattice points, fill the gaps that the lattice leaves at the border of the reachable region.
+    A point is a tuple of m whole numbers, which count half edges of the lattice from the middle of the box. If all numbers are even, it is
+    a lattice point; otherwise it is an intermediate point, half-way between lattice points. Intermediate points fill the gaps that the
+    lattice leaves at the border of the reachable region. `box`: (m, 2), `spacing`: (m,), in the units of the task coordinates.
     """
 
     def __init__(self, box: Array, spacing: Array) -> None:
@@ -40,24 +42,24 @@ class Lattice:
         self._close = [tuple(offset) for offset in offsets[distances < MIN_DISTANCE].tolist()]
 
     def y(self, points: Ints) -> Array:
-        """Return the task coordinates (N, m) of points (N, m)."""
+        """Return the task coordinates (N, m) of points (N, m), in the units of the coordinates."""
         found: Array = self._origin + (points @ self._edges) * self._spacing
         return found
 
     def neighbours(self, points: Ints) -> list[list[Point]]:
-        """Return the lattice points in the box within a spacing of each of the points (N, m)."""
+        """Return for each of the points (N, m) a list of the lattice points in the box that are at most one spacing away."""
         return self._shifted(points, self._neighbours, lattice_only=True)
 
     def intermediate(self, points: Ints) -> list[list[Point]]:
-        """Return the points in the box half a spacing from each of the lattice points (N, m)."""
+        """Return for each of the lattice points (N, m) a list of the points in the box that are half a spacing away."""
         return self._shifted(points, self._halves, lattice_only=False)
 
     def too_close(self, point: Point) -> list[Point]:
-        """Return the points that are nearer than MIN_DISTANCE to a point."""
+        """Return the points that are nearer than MIN_DISTANCE (0.8 spacings) to a point."""
         return [tuple(a + b for a, b in zip(point, offset, strict=True)) for offset in self._close]
 
     def nearest(self, y: Array) -> Ints:
-        """Return the lattice points in the box that are approximately nearest to task coordinates (N, m); they have the same shape."""
+        """Return lattice points (N, m) in the box that are approximately nearest to task coordinates y (N, m)."""
         scaled = np.clip((y - self._origin) / self._spacing, -self._width, self._width)
         edges = 0.5 * scaled @ np.linalg.inv(self._edges)
         whole, inward = (2 * rounded.astype(np.intp)[:, None] for rounded in (np.rint(edges), np.trunc(edges)))
@@ -99,7 +101,11 @@ def _offsets(dimensions: int) -> Ints:
 
 @dataclass(slots=True, eq=False)
 class FailedPoint:
-    """A point that was not reached so far: its best posture (n,), the violation of that posture, and the number of tries left."""
+    """A lattice point for which no valid pose was found so far.
+
+    `q`: (n,) rad, the best posture found. `violation`: weighted sum of the residuals of this posture beyond their tolerances; infinite if
+    least squares has found no posture at the point. `left`: number of tries left.
+    """
 
     q: Array
     violation: float
@@ -107,11 +113,15 @@ class FailedPoint:
 
 
 class PointTable:
-    """The points of a lattice by their status.
+    """The status of the points of a lattice.
 
-    `vertex`: number of a point's vertex.  `q`, `y`: poses and task coordinates of the vertices.  `untried`: points next to vertices, and
-    the vertices from which they are still to be tried.  `failed`: points that were not reached so far.  `intermediate`: the intermediate
-    points that were or will be tried.
+    `vertex`: number of the vertex at each point that was reached. `q`, `y`: poses (n,) rad and task coordinates (m,) of the vertices, by
+    number. `untried`: points next to vertices, each with the vertices from which a try still has to start. `failed`: points for which no
+    valid pose was found so far. `intermediate`: the intermediate points that were tried or are scheduled.
+
+    Args:
+        motors: number n of motors of the robot.
+        coordinates: number m of task coordinates.
     """
 
     def __init__(self, motors: int, coordinates: int) -> None:
@@ -130,7 +140,7 @@ class PointTable:
         return self._points(self.vertex), q, y
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the table as arrays."""
+        """Return the table as arrays by name; "q" and "y" are the poses and task coordinates of the vertices."""
         points, q, y = self.vertices()
         failed = self.failed.values()
         return {
@@ -148,7 +158,7 @@ class PointTable:
         }
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Replace the table by the `state` of another one."""
+        """Replace the content of this table by `state`, which the method `state` of another table has returned."""
         self.q, self.y = list(state["q"]), list(state["y"])
         self.vertex = {point: number for number, point in enumerate(_tuples(state["points"]))}
         sources = iter(state["sources"].tolist())
@@ -177,8 +187,9 @@ FIRST_ROUNDS = 8  # of tries at random points, until the first pose is found
 class Patience:
     """Limits of the work on a lattice point that was not reached from its neighbours' postures.
 
-    `starts`: least-squares starts per try.  `tries`: number of tries; `hopeless`: number of tries of a point that no solution reaches
-    even with contacts; `between`: number of tries of an intermediate point.  `scouts`: random points tried at once, far from all vertices.
+    `starts`: number of least-squares starts per try. `tries`: number of tries of a lattice point. `hopeless`: number of tries of a point
+    for which no pose was found even with contacts. `between`: number of tries of an intermediate point. `scouts`: number of random points
+    anywhere in the box that are tried together when no other points are left.
     """
 
     starts: int = 8
@@ -199,13 +210,21 @@ def lattice_poses(
     progress: Callable[[int], None] | None = None,
     patience: Patience = _DEFAULT,
 ) -> tuple[Array, Array]:
-    """Return poses q (V, n) and their task coordinates y (V, m), one for every reachable point of a lattice of that spacing (m,).
+    """Return poses q (V, n) rad and their task coordinates y (V, m), one for every reachable point of a lattice over the task's box.
 
-    Every pose is within all tolerances and in the task's box; its y is within MAX_DEVIATION spacings of its point.  V is 0 if no first
-    pose is found.  `progress` is called with the number of vertices.
+    Every pose is within all tolerances and in the task's box; its y is within MAX_DEVIATION (0.02 spacings) of its lattice point. V is 0 if
+    no first pose is found.
+
+    Args:
+        problem: the terms, and the motors that may move.
+        task: the task coordinates and their box.
+        spacing: (m,) distance between lattice points in each task coordinate.
+        rng: draws all random numbers.
+        progress: called with the number of vertices after each step; None: no reports.
+        patience: limits of the work on points that are hard to reach.
 
     Raises:
-        InvalidValue: a coordinate has no derivative.
+        InvalidValue: a task coordinate has no derivative.
     """
     builder = LatticeBuilder(problem, task, spacing, rng, patience)
     while builder.step():
@@ -215,7 +234,11 @@ def lattice_poses(
 
 
 class LatticeBuilder:
-    """Fills a lattice step by step, see `lattice_poses`; `rng` draws all random numbers."""
+    """Finds a pose for every reachable point of a lattice in the task space, step by step, outward from the first pose.
+
+    `spacing`: (m,) distance between lattice points in each task coordinate. `rng`: draws all random numbers. `patience`: limits of the work
+    on points that are hard to reach. Raises InvalidValue if a task coordinate has no derivative.
+    """
 
     def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, patience: Patience = _DEFAULT) -> None:
         self.problem, self.rng = problem, rng
@@ -226,7 +249,7 @@ class LatticeBuilder:
 
     @property
     def vertices(self) -> int:
-        """Number of vertices."""
+        """Number of vertices found so far."""
         return len(self._table.q)
 
     @property
@@ -235,21 +258,21 @@ class LatticeBuilder:
         return len(self._table.untried)
 
     def step(self) -> bool:
-        """Try the next points; return False if there are none left."""
+        """Try the next points; return False if there are none left to try."""
         if not self.vertices:
             return self._find_first()
         return self._try_neighbours() or self._retry_failed() or self._add_intermediate() or self._try_random_points()
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state between two steps except that of `rng`, with the vertices' poses "q" and task coordinates "y"."""
+        """Return the state as arrays by name, without that of `rng`; "q" and "y" are the poses and task coordinates of the vertices."""
         return self._table.state()
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from the `state` of another builder."""
+        """Continue from `state`, which the method `state` of a builder with the same settings has returned."""
         self._table.restore(state)
 
     def result(self) -> tuple[Array, Array]:
-        """Return poses (V, n) and task coordinates (V, m), after neighbours' postures were made similar."""
+        """Return the poses (V, n) rad and task coordinates (V, m), after the postures of neighbours were made more similar."""
         points, q, y = self._table.vertices()
         vertex = self._table.vertex
         pairs = [(k, vertex[one]) for k, neighbours in enumerate(self._lattice.neighbours(points)) for one in neighbours if one in vertex]

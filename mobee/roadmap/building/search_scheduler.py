@@ -29,10 +29,19 @@ IDLE, FIRST = -1, -2  # in place of a start vertex
 
 
 class SearchScheduler:
-    """Starts and ends L simultaneous searches.
+    """Starts and ends L simultaneous searches for new vertices of a roadmap (thesis Algorithm 4).
 
-    `vertex` (L,): the start vertex of each search, IDLE, or FIRST for a search for the first pose.  `aim` (L, m): the point that it aims
-    at, in spacings; NaN without an aim.  `near` (L, K, m): the vertices nearest to that aim; infinite where there are fewer.
+    `vertex` (L,): the start vertex of each search; IDLE (-1) where no search runs, FIRST (-2) for a search for the first pose. `aim` (L,
+    m): the point to which the search aims, in spacings; NaN without an aim. `near` (L, K, m): the points of the K vertices nearest to this
+    aim; infinite where there are fewer.
+
+    Args:
+        frontier: the vertices in the task space.
+        postures: (V, d) positions of the free motors at the vertices, in fractions of their ranges.
+        start: (d,) posture at which the search for the first pose begins, in fractions of the ranges.
+        settings: settings of the searches.
+        population: number of samples per generation.
+        rng: draws the random choices.
     """
 
     def __init__(
@@ -57,16 +66,16 @@ class SearchScheduler:
 
     @property
     def exhausted(self) -> bool:
-        """Whether the search for the first pose has ended without a result."""
+        """Whether all searches for the first pose have ended and none has found a pose."""
         return not len(self._frontier) and self._begun >= MAX_FIRST_SEARCHES and not (self.vertex == FIRST).any()
 
     def expandable(self) -> Flags:
-        """Return whether a search may start from each vertex, (V,)."""
+        """Return whether a search may start from each vertex, (V,): its weight is above 0 and, by default, it has a free direction."""
         able: Flags = self._frontier.weights > 0.0
         return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
 
     def refill(self) -> None:
-        """Start new searches until L are running: first at the vertex with the largest weight, the oldest one among equals."""
+        """Start new searches until L are running or no vertex is left; the vertex with the largest weight first, then the older one."""
         room = np.flatnonzero(self.vertex == IDLE).tolist()
         if not len(self._frontier):
             self._begin_first(room)
@@ -85,7 +94,11 @@ class SearchScheduler:
                 busy.append(self._centre(room.pop(0)))
 
     def end_successful(self, number: int, point: Array, simplex: Array | None) -> None:
-        """End a search that has found a vertex (m,) with its simplex, and those whose aims are now occupied; they did not fail."""
+        """End the search `number`, which has found a vertex, and all searches whose aims the new vertex occupies.
+
+        The latter do not count as failures. `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) inverse of the edges of its
+        simplex, or None.
+        """
         if self.vertex[number] >= 0:
             self._ages.append(self.searches.age[number])
         self.vertex[number] = IDLE
@@ -101,7 +114,7 @@ class SearchScheduler:
         self._note_vertex(active, point)
 
     def end_failed(self) -> None:
-        """End the searches that have failed, and lower the weights of their start vertices."""
+        """End the searches that ran too long or whose distribution is too narrow, and lower the weights of their start vertices."""
         over = (self.vertex != IDLE) & ((self.searches.age >= self._patience) | (self.searches.sigma < STALLED_STD))
         for number in np.flatnonzero(over & (self.vertex >= 0)):
             self._frontier.weights[self.vertex[number]] -= self._settings.delta
@@ -109,13 +122,13 @@ class SearchScheduler:
         self.vertex[over] = IDLE
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state for `restore`, without the frontier, its postures and the generator."""
+        """Return the state of the searches as arrays by name, without the frontier, its postures and the random generator."""
         searches = {name: getattr(self.searches, name) for name in ("mean", "sigma", "shape", "path", "age")}
         own = {"vertex": self.vertex, "aim": self.aim, "patience": self._patience, "begun": np.array(self._begun)}
         return searches | own | {"failed": self._failed.rows, "ages": self._ages.rows}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Continue from a `state`; the frontier must be as it was."""
+        """Continue from `state`, which the method `state` has returned; the frontier must be the same as at that time."""
         for array, name in ((self._failed, "failed"), (self._ages, "ages")):
             for row in state[name]:
                 array.append(row)
@@ -195,7 +208,10 @@ _DAMPING = 0.1  # spacings squared
 
 
 def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Array) -> Array:
-    """Return a posture (d,) in [0, 1] for a point `aim` (m,), extrapolated linearly from similar `postures` (V, d) around a vertex."""
+    """Return the predicted posture (d,) for a point `aim` (m,), by a linear fit to similar postures around a vertex.
+
+    Postures (V, d) and the result are in fractions of the motors' ranges, 0 to 1; `aim` is in spacings.
+    """
     near, distances = frontier.nearest(frontier.points[vertex], 6 * frontier.dimensions + 1)
     near = near[distances < _FIT_RADIUS]
     near = near[(np.abs(postures[near] - postures[vertex]) < _SAME_BRANCH).all(axis=1)]

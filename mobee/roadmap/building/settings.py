@@ -19,14 +19,16 @@ class SearchSettings:
     Raises InvalidValue for a value out of range.
 
     Attributes:
-        delta: decrease of a vertex's expansion weight, 1 at first, for each failed search from it.
-        frontier: search only where a point one spacing away is free, and aim at it.  False: from all vertices, without an aim, as printed.
-        predict: begin a search that has an aim at a posture extrapolated from those of the neighbours.  False: at the vertex.
+        delta: decrease of a vertex's expansion weight (1 at first) for each failed search that started from the vertex.
+        frontier: True: start a search only where a point one spacing away is free, and aim at this point.  False: start from all vertices,
+            without an aim, as printed in the thesis.
+        predict: True: a search that has an aim begins at a posture extrapolated from the neighbours' postures.  False: at the posture of
+            its vertex.
         std: largest standard deviation of a search from a vertex, in ranges of the motors.
         wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
-        population: samples per generation; None: 4 + 3 ln(d).
+        population: samples per generation; None: 4 + 3 ln(d) for d motors that may move.
         patience: a search fails after this factor times the number of generations within which 3/4 of the recent searches succeeded.
-        tries: failed searches within half a spacing of a point, after which the point is given up.
+        tries: failed searches within half a spacing of a point, after which the point is not tried again.
         searches: number of simultaneous searches.
     """
 
@@ -60,10 +62,11 @@ class RoadmapSettings:
     Raises InvalidValue or UnknownName for a value that is not valid.
 
     Attributes:
-        method: "nes": thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task points, for coordinates
-            with derivatives.  "hybrid": least squares where all coordinates have derivatives, then evolution for the points that it missed.
-        neighbours: number of nearest vertices to which each vertex is joined.  None: as many of the earlier vertices as the task space
-            has dimensions (Algorithm 4).
+        method: "nes": evolution strategy, thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task
+            points, only for coordinates with derivatives.  "hybrid": least squares if all coordinates have derivatives, then the evolution
+            strategy for the points that were not reached.
+        neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to as many of the vertices found
+            before it as the task space has dimensions (Algorithm 4).
         longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.
         margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
             out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.

@@ -17,7 +17,8 @@ from mobee.roadmap.ik.terms import Aim
 class TaskIK:
     """Finds poses that satisfy the terms of a problem and have given task coordinates, by least squares.
 
-    `deviations`: (m,) largest accepted deviation of each coordinate.  Raises InvalidValue for a coordinate that has no derivative.
+    `deviations`: (m,) largest accepted deviation of each task coordinate, in its unit. Raises InvalidValue for a coordinate that has no
+    derivative.
     """
 
     def __init__(self, problem: Problem, task: Task, deviations: Array) -> None:
@@ -32,24 +33,30 @@ class TaskIK:
         self._descent = Descent(problem, [pair for number, low in enumerate(task.box[:, 0]) for pair in self._aims(number, float(low))])
 
     def random_starts(self, count: int, rng: np.random.Generator) -> Array:
-        """Draw start poses (count, n): random for motors that affect aims or terms; all other motors keep the problem's start."""
+        """Draw start poses (count, n) rad: random positions for motors that affect the task or the terms; the others keep their start."""
         low, high = self._problem.limits.T
         drawn = rng.uniform(low, high, (count, len(low)))
         return self._problem.whole(np.where(self._descent.drawn, drawn, self._problem.start[self._problem.free]))
 
     def starts_around(self, q: Array, std: Array, rng: np.random.Generator) -> Array:
-        """Draw starts around postures q (N, n), with standard deviations (N,) in ranges of the motors that affect the aims and terms."""
+        """Draw start poses (N, n) rad around postures q (N, n) rad.
+
+        `std`: (N,) standard deviations in ranges of the motors. Only the motors that affect the task or the terms are varied.
+        """
         low, high = self._problem.limits.T
         here = q[:, self._problem.free]
         drawn = std[:, None] * (high - low) * rng.standard_normal(here.shape)
         return self._problem.whole(np.clip(here + np.where(self._descent.drawn, drawn, 0.0), low, high))
 
     def solve(self, y: Array, starts: Array) -> tuple[Array, Array, Array, Array]:
-        """Find poses with task coordinates y (N, m), by least squares from starts (N, n); only the free motors move, within their limits.
+        """Find poses with task coordinates y (N, m), by least squares from start poses `starts` (N, n) rad.
+
+        Only the motors that may move are changed, within their limits.
 
         Returns:
-            Poses (N, n), their task coordinates (N, m), violations (N,) and costs (N,).  A violation is 0 for a pose within all
-            tolerances and the task's box, infinite where least squares fails, else the weighted sum of the terms beyond their tolerances.
+            Poses (N, n) rad, their task coordinates (N, m), violations (N,) and costs (N,).  A violation is 0 for a pose within all
+            tolerances and the task's box; infinite if least squares fails or the pose misses y or the box; else the sum of weight *
+            residual over the terms that are beyond their tolerances.
         """
         free = self._problem.free
         q, converged = self._descent.met(self._problem.whole(np.clip(starts[:, free], *self._problem.limits.T)), self._reals(y))
@@ -99,13 +106,13 @@ def smoothed(ik: TaskIK, wanted: Array, q: Array, y: Array, pairs: Ints, rng: np
     Args:
         ik: solves for task coordinates.
         wanted: (V, m) task coordinates of the lattice points.
-        q: (V, n) poses.
+        q: (V, n) rad, poses.
         y: (V, m) their task coordinates.
-        pairs: (E, 2) neighbours.
-        rng: draws the poses of each sweep.
+        pairs: (E, 2) numbers of poses that are neighbours.
+        rng: chooses the poses that are solved in each sweep.
 
     Returns:
-        Poses (V, n) and task coordinates (V, m).  A new pose replaces an old one if it is valid and has a smaller sum of squared joint
+        Poses (V, n) rad and task coordinates (V, m).  A new pose replaces an old one if it is valid and has a smaller sum of squared joint
         distances to its neighbours.
     """
     q, y = q.copy(), y.copy()

@@ -28,8 +28,9 @@ Range = tuple[float, float]
 class Coordinate:
     """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
 
-    `unit`: "m", "rad" or "".  `function`: computes the coordinate (N,) of a batch of poses q (N, n).  `aims`: residuals by which least
-    squares reaches a value; None without a derivative.  Raises InvalidValue unless low < high.
+    `low`, `high`: the range, in the unit. `unit`: "m", "rad" or "". `function`: computes the coordinate (N,) of a batch of poses q (N, n).
+    `aims`: function of the robot and a value that returns the residuals by which least squares reaches the value; None if the coordinate
+    has no derivative. Raises InvalidValue unless low < high.
     """
 
     name: str
@@ -64,7 +65,7 @@ class Task:
 
     @property
     def box(self) -> Array:
-        """Lowest and highest value of every coordinate, (m, 2), in the units of the coordinates."""
+        """Lowest and highest value of each of the m coordinates, (m, 2), in the units of the coordinates."""
         return np.array([(one.low, one.high) for one in self.coordinates])
 
     def of(self, pose: Pose) -> Array:
@@ -85,12 +86,15 @@ class Task:
         return tuple(found)
 
     def __add__(self, other: Task) -> Task:
-        """Return the task space with the coordinates of both."""
+        """Return the task space that has the coordinates of this task and then those of `other`."""
         return Task((*self.coordinates, *other.coordinates))
 
 
 def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
-    """Return a marker's position along `axes` of the root frame as a task (table 3.2, second row); `box`: (low, high) m of each axis."""
+    """Return a task space: a marker's position along the `axes` ("xyz" or some of them) of the root frame (table 3.2, second row).
+
+    `box`: (low, high) in m for each axis.
+    """
     if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(AXES):
         raise InvalidValue(f"axes {axes!r}: valid are 'x', 'y', 'z', each at most once, as 'xy'.")
     if len(box) != len(axes):
@@ -103,7 +107,10 @@ def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
 
 
 def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
-    """Return direction . x as a task; x: a marker's position [m]; `direction` (3,): of any length, (1, 1, 1) for table 3.2, first row."""
+    """Return a task space of one coordinate: the scalar product of `direction` (3,), root frame, and the position of a marker [m].
+
+    The direction may have any length; (1, 1, 1) gives table 3.2, first row. `low`, `high`: range of the product.
+    """
     components = vector("direction", direction)
     if not components.any():
         raise InvalidValue("direction is 0; it must be 3 numbers that are not all 0.")
@@ -111,12 +118,12 @@ def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
 
 
 def motors(ranges: Mapping[str, Range]) -> Task:
-    """Return the positions of motors as a task (table 3.2, third row); `ranges`: (low, high) rad by name of the motor."""
+    """Return a task space: the positions of motors (table 3.2, third row); `ranges`: (low, high) rad by name of the motor."""
     return Task(tuple(_motor(name, low, high) for name, (low, high) in ranges.items()))
 
 
 def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: float, direction: ArrayLike | None = None) -> Task:
-    """Return the angle of a marker's direction about an axis, in (-pi, pi] rad, as a task.
+    """Return a task space of one coordinate: the angle of a marker's direction about an axis, in (-pi, pi] rad.
 
     Least squares also makes the direction perpendicular to the axis.
 
@@ -124,9 +131,9 @@ def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: floa
         marker: its name.
         about: the axis (3,), root frame; the component of the direction along the axis is ignored.
         zero: (3,), root frame: the direction of angle 0, perpendicular to the axis.
-        low: rad, at least -pi.
-        high: rad, at most pi: a roadmap does not wrap around.
-        direction: (3,), in the marker's frame; None: its normal.
+        low: lowest angle [rad], at least -pi.
+        high: highest angle [rad], at most pi: a roadmap does not wrap around.
+        direction: (3,), in the marker's frame; None: the marker's normal.
     """
     axis, start = unit_vector("about", about), unit_vector("zero", zero)
     start = start - (start @ axis) * axis
@@ -152,10 +159,17 @@ def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: floa
 
 
 def function(f: Callable[[Pose], ArrayLike], low: float, high: float, name: str = "", unit: str = "") -> Task:
-    """Return a function of the pose, between low and high, as a task; it has no derivative, so least squares cannot follow it.
+    """Return a task space of one coordinate: a function of the pose, between `low` and `high`.
 
-    `f`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and returns N numbers; or it takes one pose
-    (`pose.position(marker)` (3,)) and returns one number: then it is called pose by pose, which takes longer.
+    The coordinate has no derivative, so roadmaps over it need the method "nes".
+
+    Args:
+        f: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and returns N numbers.  A function that takes one
+            pose (`pose.position(marker)` (3,)) and returns one number is also accepted; it is called for each pose, which takes longer.
+        low: lowest value.
+        high: highest value.
+        name: name of the coordinate; "": the name of the function.
+        unit: unit of the values, for texts.
     """
     if not callable(f):
         raise InvalidValue(f"{f!r} is not a task coordinate: it must be a function of a pose.")

@@ -16,9 +16,16 @@ from mobee.errors import InvalidValue, UnknownName
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathRates:
-    """Weights and rates of an evolution strategy with a path: those of CMA-ES (Hansen 2016, arXiv:1604.00772).
+    """Weights and learning rates of an evolution strategy with an evolution path: those of CMA-ES (Hansen 2016, arXiv:1604.00772).
 
-    `weights` (population,), best sample first: the better half's are positive and sum up to 1, the others' are negative.
+    Attributes:
+        weights: (population,), best sample first; the weights of the better half are positive and their sum is 1, the others are negative.
+        effective: effective number of samples in the better half.
+        path: decay of the path per generation.
+        damping: damping of the changes of the step size.
+        rank_one: learning rate of the shape from the path.
+        rank_all: learning rate of the shape from the samples.
+        length: mean length of a standard normal vector.
     """
 
     weights: Array
@@ -31,7 +38,10 @@ class PathRates:
 
 
 def path_rates(dimensions: int, population: int, separable: bool = False) -> PathRates:
-    """Return the default rates; a diagonal shape has fewer parameters, which are learned faster (Ros and Hansen 2008)."""
+    """Return the default rates for d = `dimensions` and a number of samples per generation.
+
+    `separable`: for a diagonal shape, which has fewer parameters, so that it can be learned faster (Ros and Hansen 2008).
+    """
     d = dimensions
     weights = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))
     better, worse = weights[weights > 0.0], weights[weights <= 0.0]
@@ -53,7 +63,10 @@ def path_rates(dimensions: int, population: int, separable: bool = False) -> Pat
 
 
 def published_utilities(population: int) -> Array:
-    """Return the utilities of the samples in the published forms, (population,), best first; their sum is 0 (Glasmachers et al. 2010)."""
+    """Return the utilities (weights) of the samples in xNES and SNES as published, (population,), best sample first.
+
+    Their sum is 0 (Glasmachers et al. 2010).
+    """
     better = np.maximum(0.0, math.log(population / 2 + 1) - np.log(np.arange(1, population + 1)))
     utilities: Array = better / better.sum() - 1.0 / population
     return utilities
@@ -68,9 +81,10 @@ _NEGLIGIBLE = 1e-17
 
 
 def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
-    """Return the updated shape B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)), exact to rounding; z (k, d), weights (k,).
+    """Return the updated shape B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)) of a search distribution, exact to rounding.
 
-    The sum has at most rank k, so for k < d the series is computed with matrices (k, k).
+    `shape`: B (d, d), or its diagonal (d,); the result has the same form. `z`: (k, d) standard normal samples. `weights`: (k,). The sum has
+    at most rank k, so for k < d the series is computed with matrices (k, k).
     """
     if shape.ndim == 1:
         diagonal: Array = shape * np.exp(0.5 * (weights @ z**2 - shrink))
@@ -99,7 +113,7 @@ def _series(a: Array) -> Array:
 
 
 def stretched(shape: Array, z: Array) -> Array:
-    """Return B z for samples z (k, d) or one sample (d,); `shape`: B, or its diagonal."""
+    """Return B z for samples z (k, d), or for one sample (d,); `shape`: B (d, d), or its diagonal (d,)."""
     moved: Array = z * shape if shape.ndim == 1 else z @ shape.T
     return moved
 
@@ -111,17 +125,16 @@ METHODS: tuple[str, ...] = get_args(Method)
 class NES:
     """A natural evolution strategy: `ask` returns a generation of samples, `tell` updates the search distribution by their costs.
 
-    The same seed gives the same samples.  Only the order of the costs matters: any increasing function of the costs gives the same
-    search.
+    The same seed gives the same samples.  Only the order of the costs matters: any increasing function of the costs gives the same search.
 
     Args:
-        start: (d,) mean to start from.
-        std: standard deviation, one number or (d,).
-        population: samples per generation; None: 4 + 3 ln(d), at least 5.
-        method: "full": exponential NES with an evolution path and negative weights; "separable": the same with a diagonal shape, for
-            many dimensions; "xnes" and "snes": the published full and diagonal forms with their rates, which need more samples
+        start: (d,) first mean of the search distribution.
+        std: first standard deviation, one number or (d,).
+        population: samples per generation, at least 4; None: 4 + 3 ln(d), rounded down.
+        method: "full": exponential NES with an evolution path and negative weights.  "separable": the same with a diagonal shape, for many
+            dimensions.  "xnes" and "snes": the published full and diagonal forms with their rates, which need more samples
             (docs/roadmaps.md).
-        seed: of the samples; or a generator to draw them from.
+        seed: seed of the samples, or a generator that draws them.
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -165,13 +178,13 @@ class NES:
 
     @property
     def std(self) -> Array:
-        """The standard deviation along each coordinate, (d,)."""
+        """The present standard deviation along each coordinate, (d,)."""
         spread = self.shape if self.shape.ndim == 1 else np.sqrt((self.shape**2).sum(axis=1))
         deviation: Array = self.sigma * self._scale * spread
         return deviation
 
     def ask(self) -> Array:
-        """Return the next generation, (population, d); a second call before `tell` draws another one."""
+        """Return the next generation of samples, (population, d); a second call before `tell` draws other samples."""
         self._z = self._rng.standard_normal((self.population, len(self.mean)))
         samples: Array = self.mean + self.sigma * self._scale * stretched(self.shape, self._z)
         return samples

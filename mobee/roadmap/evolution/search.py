@@ -18,9 +18,10 @@ _NEGLIGIBLE = 1e-12
 
 
 class Searches:
-    """L search distributions over d coordinates; the arrays are their whole state.
+    """L simultaneous search distributions over d coordinates; the arrays are their whole state.
 
-    `mean` (L, d), `sigma` (L,), `shape` (L, d, d), `path` (L, d), `age` (L,) generations since they began.
+    Samples are mean + sigma * shape @ z, with z standard normal. `mean` (L, d). `sigma` (L,): step size. `shape` (L, d, d). `path` (L, d):
+    evolution path. `age` (L,): generations since the search began. `population`: samples per generation of each search.
     """
 
     def __init__(self, count: int, dimensions: int, population: int) -> None:
@@ -33,17 +34,20 @@ class Searches:
         self._rates = path_rates(dimensions, population)
 
     def begin(self, number: int, mean: Array, std: float) -> None:
-        """Start a search from a mean (d,) with the same standard deviation in all coordinates."""
+        """Start search `number` anew at a mean (d,), with the same standard deviation `std` in all coordinates."""
         self.mean[number], self.sigma[number], self.age[number] = mean, std, 0
         self.shape[number], self.path[number] = np.eye(len(mean)), 0.0
 
     def ask(self, which: Ints, z: Array) -> Array:
-        """Return samples (k, population, d) of searches (k,), from standard normal samples z of the same shape."""
+        """Return samples (k, population, d) of the k searches with the numbers `which`; `z`: standard normal samples of the same shape."""
         samples: Array = self.mean[which, None] + self.sigma[which, None, None] * (z @ self.shape[which].transpose(0, 2, 1))
         return samples
 
     def tell(self, which: Ints, z: Array, costs: Array) -> None:
-        """Update searches (k,) with the costs (k, population) of their samples, see `NES.tell`."""
+        """Update the distributions of the k searches with the numbers `which`.
+
+        `z`: (k, population, d), the standard normal samples given to `ask`. `costs`: (k, population) of these samples; the lowest is best.
+        """
         rates, d = self._rates, z.shape[-1]
         z = np.take_along_axis(z, np.argsort(costs, axis=1, kind="stable")[:, :, None], axis=1)
         shape, sigma = self.shape[which], self.sigma[which]
@@ -81,10 +85,10 @@ EVALUATIONS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """The condition for restarts of a search, which begin alternately at a random point of the box and at the first start.
+    """The condition under which a search restarts; it restarts alternately at a random point of the box and at its first start.
 
-    `std`: restart if the largest standard deviation is below this share of the box.  `patience`, `gain`: restart if `patience` generations
-    have not lowered the best cost by the share `gain`.
+    `std`: restart if the largest standard deviation is below this fraction of the box. `patience`, `gain`: restart if `patience`
+    generations have not lowered the best cost by the fraction `gain`.
     """
 
     std: float = 1e-3
@@ -94,7 +98,10 @@ class Restart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Minimum:
-    """The best sample x (d,), its cost, the number of evaluations, and the number of starts (1: no restart)."""
+    """The result of `minimize`.
+
+    `x`: (d,) the best sample. `cost`: its cost. `evaluations`: number of evaluated samples. `starts`: number of starts (1: no restart).
+    """
 
     x: Array
     cost: float
@@ -103,12 +110,18 @@ class Minimum:
 
 
 class Search:
-    """A search in a box: `ask` returns a generation, `tell` takes its costs; the best sample of all is kept.
+    """A search in a box: `ask` returns a generation of samples, `tell` updates the search by their costs.
+
+    `best` and `best_cost` are the best sample (d,) of all generations and its cost; `evaluations` and `starts` count samples and starts.
 
     Args:
-        start, std, population, method, seed: see `NES`.
+        start: (d,) first mean of the search distribution.
+        std: first standard deviation, one number or (d,).
         limits: (d, 2) box; samples outside are moved to its border, at an additional cost.  None: no box.
         restart: when to restart; needs limits.  None: never.
+        population: samples per generation, at least 4; None: 4 + 3 ln(d), rounded down.
+        method: "full", "separable", "xnes" or "snes", as in `NES`.
+        seed: seed of the random numbers, or a generator that draws them.
 
     Raises:
         InvalidValue, UnknownName: an argument is not valid; the message says what is.
@@ -148,7 +161,7 @@ class Search:
         self.starts = 1
 
     def ask(self) -> Array:
-        """Return the next generation, (population, d), inside the box."""
+        """Return the next generation of samples, (population, d), inside the box."""
         places = self._nes.ask()
         if not self._boxed:
             self._asked = places
@@ -159,7 +172,7 @@ class Search:
         return self._asked
 
     def tell(self, costs: ArrayLike) -> None:
-        """Update the search with the costs (population,) of the samples of `ask`; restart it if it is stuck."""
+        """Update the search with the costs (population,) of the samples from `ask`; restart it if the condition `restart` holds."""
         values = np.asarray(costs, dtype=np.float64)
         self._nes.tell(values + PENALTY * self._beyond)
         self.evaluations += len(values)
@@ -195,9 +208,10 @@ def minimize(
     method: Method = "full",
     seed: int | np.random.Generator = 0,
 ) -> Minimum:
-    """Minimise a cost until a sample costs no more than the target, or until the number of evaluations is used up.
+    """Minimise a cost until a sample costs at most `target`, or until the number of `evaluations` is used up.
 
-    `cost` takes samples (population, d) and returns their costs (population,); the other arguments are those of Search.
+    `cost`: takes samples (population, d) and returns their costs (population,). `start` (d,), `std`: first mean and standard deviation.
+    `limits`: (d, 2) box, or None. The other arguments are those of `Search`.
     """
     search = Search(start, std, limits, restart, population, method, seed)
     while search.best_cost > target:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cost terms of poses: those of thesis table 3.1, others, and user functions."""
+"""Terms of the cost of a pose: the terms of thesis table 3.1, further terms, and user functions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from mobee.robot.robot import Robot
 
 
 def vector(name: str, given: ArrayLike) -> Array:
-    """Return a copy of the vector `given` (3,); raises InvalidValue, with `name`, unless it is three finite numbers."""
+    """Return a copy of the vector `given` (3,); raise InvalidValue, with `name` in its text, unless `given` has three finite numbers."""
     found = real_array(name, given)
     if found.shape != (3,) or not np.isfinite(found).all():
         raise InvalidValue(f"{name} is {given!r}; it must be (3,) finite numbers.")
@@ -44,7 +44,7 @@ def vector(name: str, given: ArrayLike) -> Array:
 
 
 def unit_vector(name: str, given: ArrayLike) -> Array:
-    """Return the unit vector (3,) along the vector `given`; raises InvalidValue, with `name`, if that is 0 or not finite."""
+    """Return the unit vector (3,) along the vector `given`; raise InvalidValue, with `name` in its text, if it is 0 or not finite."""
     found = vector(name, given)
     if not np.linalg.norm(found) > 0.0:
         raise InvalidValue(f"{name} is {given!r}; it must be a direction (3,), or a rotation (3, 3).")
@@ -70,7 +70,7 @@ def angle_between(one: Array, other: Array) -> Array:
 
 
 def rotation(name: str, given: ArrayLike) -> Array:
-    """Return a copy of the rotation `given` (3, 3); raises InvalidValue, with `name`, if it is not a rotation."""
+    """Return a copy of the matrix `given` (3, 3); raise InvalidValue, with `name` in its text, if it is not a rotation."""
     found = real_array(name, given)
     if found.shape != (3, 3) or not np.allclose(found @ found.T, np.eye(3), atol=1e-6) or np.linalg.det(found) < 0.0:
         raise InvalidValue(f"{name} is no rotation: its rows must be a right-handed set of three unit vectors.")
@@ -78,7 +78,7 @@ def rotation(name: str, given: ArrayLike) -> Array:
 
 
 def turn_between(one: Array, other: Array) -> Array:
-    """Return the angles (...,) rad of the rotations from `one` (..., 3, 3) to `other` (..., 3, 3)."""
+    """Return the angles (...,) rad of the rotations that turn the frames `one` (..., 3, 3) into the frames `other` (..., 3, 3)."""
     apart = np.sqrt(((one - other) ** 2).sum(axis=(-2, -1)) / 8.0)  # sin(angle / 2)
     angle: Array = 2.0 * np.arcsin(np.minimum(apart, 1.0))
     return angle
@@ -89,7 +89,11 @@ _NONE = np.zeros(3)
 
 
 def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE, offset: ArrayLike | None = None) -> Term:
-    """Return the term that brings a marker, or the point at `offset` (3,) m in its frame, to a place (3,) m, root frame (table 3.1)."""
+    """Return the term that brings a marker to a place (3,) m, root frame (table 3.1). The residual is the distance [m].
+
+    `offset`: (3,) m in the marker's frame; the point there, instead of the marker itself, is brought to the place. A residual of at most
+    `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
+    """
     goal = vector("place", place)
     aside = None if offset is None else vector("offset", offset)
 
@@ -107,10 +111,12 @@ def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: f
 def orientation(
     marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD, direction: ArrayLike | None = None
 ) -> Term:
-    """Return the term that turns a marker's normal to a direction `goal` (3,), or the marker to a rotation `goal` (3, 3) (table 3.1).
+    """Return the term for the orientation of a marker (table 3.1). The residual is the remaining angle [rad].
 
-    `goal` is in the root frame. `direction` (3,), in the marker's frame, replaces the normal. The residual is the angle between the two
-    [rad]. The printed residual u.u* + 1 is smallest for opposite directions, and its slope is 0 at both ends.
+    `goal`: a direction (3,), root frame, to which the marker's normal is turned; or a rotation (3, 3) of the marker, root frame.
+    `direction`: (3,) in the marker's frame, is used instead of the normal. The printed residual u.u* + 1 is not used: it is smallest for
+    opposite directions, and its slope is 0 at both ends. A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight`
+    (2 per rad) times the residual.
     """
     wanted = np.array(goal, dtype=np.float64)
     if wanted.shape == (3, 3):
@@ -130,7 +136,10 @@ def orientation(
 
 
 def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps two markers at a distance [m] from each other (table 3.1)."""
+    """Return the term that keeps two markers at a `distance` [m] from each other (table 3.1); the residual is the distance's error [m].
+
+    A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
+    """
 
     def residual(pose: Pose) -> Array:
         found: Array = np.abs(lengths(pose.position(first) - pose.position(second)) - distance)
@@ -144,7 +153,10 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
 
 
 def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Return the term that points two markers' normals at each other's position; the residual is the larger of both angles [rad]."""
+    """Return the term that points the normal of each of two markers at the other marker; its residual is the larger angle [rad].
+
+    A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
+    """
 
     def residual(pose: Pose) -> Array:
         between = units(pose.position(second) - pose.position(first))
@@ -162,7 +174,11 @@ def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance
 
 
 def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Return the term that points a marker's normal at a place (3,) m in the root frame, or at another marker; residual [rad]."""
+    """Return the term that points a marker's normal at a goal; its residual is the angle between the normal and the goal [rad].
+
+    `goal`: a place (3,) m in the root frame, or the name of another marker. A residual of at most `tolerance` (5 degrees) meets the term;
+    the cost is `weight` (2 per rad) times the residual.
+    """
     at = goal if isinstance(goal, str) else vector("goal", goal)
 
     def residual(pose: Pose) -> Array:
@@ -178,7 +194,11 @@ def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS
 
 
 def collision(by: str = "depth", weight: float | None = None) -> Term:
-    """Return the term against solid contacts: their summed depth [m], whose gradient leads out of contact, or their number (table 3.1)."""
+    """Return the term against contacts of solids, with tolerance 0 (table 3.1).
+
+    `by`: "depth": the residual is the sum of the depths [m], whose gradient leads out of contact; "count": it is the number of contacts.
+    `weight`: None: 20 per m, or 1 per contact.
+    """
     if by not in ("depth", "count"):
         raise InvalidValue(f"collision by {by!r}: valid are 'depth' and 'count'.")
 
@@ -194,7 +214,11 @@ def collision(by: str = "depth", weight: float | None = None) -> Term:
 
 
 def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
-    """Return the term for a pose near a posture (n,) rad, None: home; the residual is the distance in ranges of the motors (table 3.1)."""
+    """Return the term that prefers poses near a posture (n,) rad; None: near the home pose (table 3.1).
+
+    The residual is the Euclidean distance, where each motor is divided by its range. The term is only minimised; it has no tolerance. The
+    cost is `weight` times the residual.
+    """
     given = None if posture is None else np.array(posture, dtype=np.float64)
 
     def residual(pose: Pose) -> Array:
@@ -205,7 +229,11 @@ def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
 
 
 def comfort(weight: float = 0.5) -> Term:
-    """Return the term against positions near motor limits: the mean of ((q - middle) / half range)^4, 1 if all motors are at a limit."""
+    """Return the term that prefers poses far from the motors' limits; it has no tolerance.
+
+    The residual is the mean over all motors of ((q - middle) / half range)^4; it is 1 if all motors are at a limit. The cost is `weight`
+    times the residual.
+    """
 
     def residual(pose: Pose) -> Array:
         low, high = pose.robot.limits.T
@@ -216,9 +244,10 @@ def comfort(weight: float = 0.5) -> Term:
 
 
 def balance(place: ArrayLike | None = None, tolerance: float | None = None, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps the centre of mass above a place; the residual is the horizontal distance [m].
+    """Return the term that keeps the robot's centre of mass above a place; its residual is the horizontal distance from the place [m].
 
-    `place`: (2,) m, x and y in the root frame; None: the place above which the centre of mass is at the home pose.
+    `place`: (2,) m, x and y in the root frame; None: the place above which the centre of mass is at the home pose. A residual of at most
+    `tolerance` [m] meets the term; None: it is only minimised. The cost is `weight` (20 per m) times the residual.
     """
     above = None if place is None else np.array(place, dtype=np.float64)
     if above is not None and above.shape != (2,):
@@ -232,7 +261,10 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
 
 
 def constraints(weight: float = PER_RAD) -> Term:
-    """Return the term for the robot's clauses (thesis eqs. 5.14-5.17): the sum of the amounts by which they are violated, rad."""
+    """Return the term for the robot's clauses, such as its cable constraints (thesis eqs. 5.14-5.17), with tolerance 0.
+
+    The residual is the sum of the amounts by which the clauses are violated [rad]. The cost is `weight` (2 per rad) times the residual.
+    """
 
     def residual(pose: Pose) -> Array:
         distance: Array = np.zeros(pose.q.shape[:-1])
@@ -246,11 +278,15 @@ def constraints(weight: float = PER_RAD) -> Term:
 def term(
     function: Callable[[Pose, ContactTable], ArrayLike], tolerance: float | None = METRES, weight: float | None = None, name: str = ""
 ) -> Term:
-    """Return a function of pose and contacts as a term, met when its value is at most the tolerance; None: it is only minimised.
+    """Return a user's function of pose and contacts as a term of the cost.
 
-    `function`: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their
-    contacts, and returns N numbers; or it is written for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) and
-    returns one number: then it is called pose by pose, which takes longer.  `weight`: None: the cost is 1 at ten times the tolerance.
+    Args:
+        function: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their contacts, and
+            returns N numbers.  A function for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) that returns one number
+            is also accepted; it is called for each pose, which takes longer.
+        tolerance: largest value at which the term counts as met; None: the term is only minimised.
+        weight: factor on the value; None: the cost is 1 at ten times the tolerance, and equal to the value without a tolerance.
+        name: name of the term; "": the name of the function.
     """
     if not callable(function):
         raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
@@ -273,7 +309,11 @@ def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Te
 
 
 def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Return the term that brings a marker to a place (3,) m in the frame of the marker `to`, for example of two hands on one object."""
+    """Return the term that brings a marker to a place (3,) m in the frame of the marker `to`; its residual is the distance [m].
+
+    Use it, for example, for two hands on one object. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per
+    m) times the residual.
+    """
     goal = vector("place", place)
 
     def residual(pose: Pose) -> Array:
@@ -287,7 +327,11 @@ def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float =
 
 
 def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Return the term that turns a marker to a rotation (3, 3) in the frame of the marker `to`; the identity: equal orientations."""
+    """Return the term that turns a marker to a rotation (3, 3) in the frame of the marker `to`; its residual is the angle [rad].
+
+    With the identity both markers have the same orientation. A residual of at most `tolerance` (5 degrees) meets the term; the cost is
+    `weight` (2 per rad) times the residual.
+    """
     wanted = rotation("goal", goal)
 
     def residual(pose: Pose) -> Array:
@@ -303,9 +347,10 @@ def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float
 def aligned(
     first: str, second: str, direction: ArrayLike, other: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD
 ) -> Term:
-    """Return the term that makes `direction` (3,) in the first marker's frame parallel to `other` (3,) in the second marker's frame.
+    """Return the term that makes a direction of one marker parallel to a direction of another; its residual is the angle [rad].
 
-    `other` None: the same three numbers as `direction`.
+    `direction`: (3,) in the frame of `first`. `other`: (3,) in the frame of `second`; None: the same three numbers as `direction`. A
+    residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
     """
     one = unit_vector("direction", direction)
     two = one if other is None else unit_vector("other", other)
@@ -322,9 +367,11 @@ def aligned(
 
 
 def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Return the term that keeps a marker's normal, or a direction (3,) in its frame, perpendicular to an axis (3,); residual [rad].
+    """Return the term that keeps a marker's normal perpendicular to an axis (3,), root frame; its residual is the error angle [rad].
 
-    The term has no derivative. Least squares needs none if an angle about the same axis is a task coordinate.
+    `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, but least squares does not need it
+    if the angle of the marker about the same axis is a task coordinate (`mobee.tasks.angle`). A residual of at most `tolerance` (5 degrees)
+    meets the term; the cost is `weight` (2 per rad) times the residual.
     """
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 
@@ -337,7 +384,12 @@ def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tol
 
 
 def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps a marker in the plane of all x with normal . x = offset [m], root frame; (0, 0, 1): at a height."""
+    """Return the term that keeps a marker in a plane; its residual is the distance from the plane [m].
+
+    The plane consists of all points x with normal . x = offset [m], root frame; `normal` (3,) is scaled to length 1. The normal (0, 0, 1)
+    gives a horizontal plane at a height. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the
+    residual.
+    """
     across = unit_vector("normal", normal)
 
     def residual(pose: Pose) -> Array:
@@ -351,7 +403,11 @@ def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METR
 
 
 def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps a marker at positions x with direction . x <= most [m], root frame; (0, 0, 1): at most at a height."""
+    """Return the term that keeps a marker on one side of a plane; its residual is the distance beyond the plane [m].
+
+    Allowed are the positions x with direction . x <= most [m], root frame; `direction` (3,) is scaled to length 1. The direction (0, 0, 1)
+    limits the height. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
+    """
     along = unit_vector("direction", direction)
 
     def residual(pose: Pose) -> Array:

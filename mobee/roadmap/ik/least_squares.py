@@ -22,9 +22,12 @@ _EXACT = 1e-6  # m or rad, for a term without a tolerance
 
 
 class Descent:
-    """Damped least squares on a problem's aims and on other aims, from many starts; the goals of the others may differ per start.
+    """Damped least squares on the aims (residuals) of a problem, from many start poses.
 
-    `threads`: number of threads that share the starts; the results do not depend on it.
+    Args:
+        problem: its terms with derivatives are solved; the motors that may move are changed, within their limits.
+        besides: further aims with their tolerances, for example of task coordinates; their goals may differ for each start.
+        threads: number of threads that share the starts; the results do not depend on it.
     """
 
     def __init__(self, problem: Problem, besides: Sequence[tuple[Aim, float]] = (), threads: int = 1) -> None:
@@ -44,24 +47,31 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each motor that may move (d,) gets a random position in a random start, see `needed`."""
+        """Whether each of the d motors that may move gets a random position in a random start, (d,): it affects an aim or a term."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
-        """Return those solutions (K, n), from starts q (B, n), that meet every aim; goals: see `ends`."""
+        """Return the solutions (K, n) rad that meet every aim, of those found from the starts q (B, n) rad.
+
+        `goals`: numbers of the further aims for each start, (B, ...), as in `Descent.ends`; None: those of the constructor.
+        """
         ends, met = self.met(q, goals)
         return ends[met]
 
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
-        """Return the solutions (B, n) from starts q (B, n), and whether each meets every aim, (B,); goals: see `ends`."""
+        """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each solution meets every aim, (B,).
+
+        `goals`: numbers of the further aims for each start, (B, ...), as in `Descent.ends`; None: those of the constructor.
+        """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
         return ends, met
 
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
-        """Return the solutions (B, n) from starts q (B, n), within the limits, and the residuals (B, aims) of every aim, m or rad.
+        """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: numbers of the other aims for each start, one row each, see `aim_reals`; None: those of the aims in the constructor.
+        `goals`: numbers of the further aims (`besides`) for each start, a row of `aim_reals` each, (B, 26 * number of further aims); None:
+        those of the constructor for all starts.
         """
         from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle
@@ -78,9 +88,9 @@ class Descent:
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
-    """Return a pose (n,) [rad] within all tolerances, or None if the problem has no aims or no such pose was found.
+    """Return a pose (n,) rad within all tolerances, or None if the problem has no aims or no such pose was found.
 
-    Of several poses found in the same run, it is the one with the lowest cost.
+    The starts are solved in groups. If several poses of one group are within all tolerances, the pose with the lowest cost is returned.
     """
     descent = Descent(problem)
     if not descent.count:
@@ -113,7 +123,10 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags)
 
 
 def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
-    """Return the real numbers of aims and their tolerances as the core reads them, REALS for each aim, one after the other."""
+    """Return the real numbers of aims and their tolerances in the form that the compiled core reads, (26 * number of aims,).
+
+    Each pair is an aim and its tolerance; None: the term has no tolerance.
+    """
     return np.concatenate([_reals(aim, tolerance) for aim, tolerance in aims]) if aims else np.empty(0)
 
 

@@ -28,8 +28,8 @@ POPULATION = 20
 class IK:
     """The result of `solve_ik`.
 
-    `q`: (n,) rad.  `reached`: every term is within its tolerance, by another evaluation of q.  `residuals`: of each term, by name.
-    `evaluations`: number of evaluated poses.  `table`: all contacts of the pose, fields included.
+    `q`: (n,) rad, the pose. `reached`: whether every term is within its tolerance, by a new evaluation of q. `residuals`: residual of each
+    term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, those of fields included.
     """
 
     q: Array
@@ -53,18 +53,19 @@ def solve_ik(
     method: Literal["hybrid", "nes", "least_squares"] = "hybrid",
     evaluations: int = EVALUATIONS,
 ) -> IK:
-    """Find a pose whose terms are all within their tolerances, or else the cheapest pose found (thesis eq. 3.1).
+    """Find a pose whose terms are all within their tolerances, or else the pose with the lowest cost found (thesis eq. 3.1).
 
-    The search ends with the first pose within all tolerances.  If no term has a tolerance it ends when it has converged.
+    The search ends with the first pose within all tolerances.  If no term has a tolerance, it ends when it has converged. With the method
+    "least_squares", the start is returned if no pose within all tolerances was found.
 
     Args:
-        model: robot and world; contacts are those of solids.
-        costs: terms of mobee.costs, and plain functions of pose and contacts, see mobee.costs.term.
+        model: robot and world; only contacts of solids count.
+        costs: terms of mobee.costs, and plain functions of pose and contacts, as `mobee.costs.term` takes them.
         start: (n,) rad, where the search begins, and the posture of the motors that may not move; None: home.
         seed: of the random numbers.
         motors: names of parts and motors that may move; None: all.
-        method: "nes": by an evolution strategy, for all terms; "least_squares": damped least squares with restarts on the terms
-            that have a derivative, accepted if the others are within their tolerances; "hybrid": least squares, then "nes" if it fails.
+        method: "nes": by an evolution strategy, for all terms; "least_squares": damped least squares with restarts on the terms that have a
+            derivative, accepted if the others are within their tolerances; "hybrid": least squares, then "nes" if it fails.
         evaluations: largest number of poses that the evolution strategy evaluates.
 
     Raises:

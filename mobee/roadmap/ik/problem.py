@@ -23,7 +23,7 @@ _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 def solid_model(model: Model) -> Model:
-    """Return a model in the same world whose robot has solid shapes but no repelling fields; cached per model."""
+    """Return a model of the same world whose robot has only its solid shapes, without fields; it is cached for each model."""
     known = _KNOWN.get(model)
     if known is None:
         known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
@@ -32,7 +32,7 @@ def solid_model(model: Model) -> Model:
 
 @per_robot
 def solid_robot(robot: Robot) -> Robot:
-    """Return the robot without its fields."""
+    """Return the robot without its fields, that is, only with its solid shapes."""
     kept = [index for index, shape in enumerate(robot.shapes) if shape.role == "solid"]
     number = {index: k for k, index in enumerate(kept)}
     pairs = [(number[int(a)], number[int(b)]) for a, b in robot.solid_pairs]
@@ -52,9 +52,9 @@ _MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Return whether each motor that may move affects an aim, or a term without aims such as a plain function, (d,).
+    """Return whether each of the d motors that may move affects one of the aims or a term without aims, (d,).
 
-    An effect on contacts does not count: a random finger posture only adds contacts.
+    An effect on contacts does not count, because a random finger posture, for example, would only add contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
@@ -89,7 +89,19 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 
 
 class Problem:
-    """A cost, the sum of its terms, over the motors that may move; the other motors keep their start. Counts evaluated poses."""
+    """The search for a pose: a cost, which is a sum of terms, over the d motors that may move; all other motors keep their start.
+
+    Attributes: `model` has only solid shapes; `terms` and `by_name` are the terms; `free` (d,) are the indices of the motors that may move;
+    `limits` (d, 2) rad are their limits, reduced by the margin; `start` (n,) rad; `must`: whether a term has a tolerance; `evaluations`
+    counts evaluated poses.
+
+    Args:
+        model: robot and world.
+        costs: terms, and plain functions of pose and contacts.
+        start: (n,) rad; None: home.
+        motors: names of parts and motors that may move; None: all.
+        margin: distance from the limits [rad], at most a quarter of a motor's range.
+    """
 
     def __init__(
         self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None, margin: float = 0.0
@@ -108,13 +120,13 @@ class Problem:
         self.evaluations = 0
 
     def whole(self, samples: Array) -> Array:
-        """Return poses of all motors (N, n) from those of the free motors (N, d)."""
+        """Return poses of all motors (N, n) rad from positions of the motors that may move (N, d) rad; the others are at the start."""
         q = np.repeat(self.start[None], len(samples), axis=0)
         q[:, self.free] = samples
         return q
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
-        """Return the costs (N,) of poses q (N, n), and whether each is within all tolerances, (N,)."""
+        """Return the costs (N,) of poses q (N, n) rad, and whether each pose is within all tolerances, (N,)."""
         pose = self.model.evaluate(q)
         self.evaluations += len(q)
         total, good = np.zeros(len(q)), np.ones(len(q), dtype=bool)
@@ -135,7 +147,10 @@ def _within(limits: Array, margin: float) -> Array:
 
 
 def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:
-    """Return the indices of motors (d,) from the names of motors and parts; None: all."""
+    """Return the sorted indices (d,) of the motors that `motors` names (motors or whole parts); None: all motors.
+
+    Raises UnknownName for an unknown name, and InvalidValue for an empty list.
+    """
     if motors is None:
         return np.arange(len(robot.motors))
     if isinstance(motors, str):
@@ -155,7 +170,7 @@ def chosen(robot: Robot, motors: Sequence[str] | None) -> Ints:
 
 
 def named(terms: Sequence[Term]) -> dict[str, Term]:
-    """Return the terms by name; a name that occurs again gets a number, as in "plane 2"."""
+    """Return the terms by name; if a name occurs again, a number is added to it, as in "plane 2"."""
     found: dict[str, Term] = {}
     for one in terms:
         name, number = one.name, 1

@@ -37,7 +37,22 @@ KINDS = PLACE, TURNED, ALONG, HOLD, FACING, COORDINATE, AT_MOST, MOTOR = tuple(r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Aim:
-    """A residual of least squares: its kind, two links (0: the root frame), a point and a frame on each, a length [m], a motor."""
+    """A residual for least squares, in the form that the compiled core reads.
+
+    Attributes:
+        kind: a number of KINDS: PLACE (the two points coincide), TURNED (the two frames are parallel), ALONG (the two directions are
+            equal), HOLD (the points are at the distance `length`), FACING (the first direction points to the second point), COORDINATE (a
+            coordinate of the first point has the value `length`), AT_MOST (it has at most this value), MOTOR (a motor is at the value
+            `length`).
+        first_link: number of the first link; 0: the root frame.
+        first_point: (3,) m, in the root frame at the zero pose.
+        first_frame: (3, 3), in the root frame at the zero pose; or (9,) with a direction in its first three numbers.
+        second_link: number of the second link; 0: the root frame.
+        second_point: (3,) m, like `first_point`.
+        second_frame: (3, 3) or (9,), like `first_frame`.
+        length: a distance or value, m or rad.
+        motor: index of the motor, for MOTOR.
+    """
 
     kind: int
     first_link: int
@@ -52,10 +67,11 @@ class Aim:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Term:
-    """One term h_i of the cost: weight * residual.
+    """One term h_i of the cost of a pose: weight * residual.
 
-    `residual`: computes numbers (N,), 0 or above, from a batch of poses q (N, n).  `tolerance`: largest residual of a pose that is
-    reached; None if the term is only minimised.  `aims`: the same term for least squares; None if it has no derivative.
+    `residual`: computes numbers (N,), at least 0, from a batch of poses q (N, n). `tolerance`: a pose with a residual up to this value
+    meets the term; None if the term is only minimised. `aims`: function of the robot that returns the same term as residuals for least
+    squares; None if the term has no derivative.
     """
 
     name: str
@@ -68,7 +84,11 @@ class Term:
 def checked_term(
     name: str, residual: Residual, weight: float, tolerance: float | None, aims: Callable[[Robot], tuple[Aim, ...]] | None = None
 ) -> Term:
-    """Return a term; raises InvalidValue if its weight or tolerance is not valid."""
+    """Return a term; raise InvalidValue if the weight is not above 0, or the tolerance is below 0 or not finite.
+
+    `residual`: computes numbers (N,), at least 0, from a batch of N poses. `aims`: function of the robot that returns the residuals for
+    least squares; None without a derivative.
+    """
     if not (np.isfinite(weight) and weight > 0.0):
         raise InvalidValue(f"weight of {name!r} is {weight!r}; it must be finite and above 0.")
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0.0):
@@ -82,22 +102,31 @@ def direction_frame(direction: Array) -> Array:
 
 
 def directed(marker: Marker, direction: Array, goal: Array) -> Aim:
-    """Return the aim that turns a direction (3,), fixed to the marker's link (root frame, zero pose), to `goal` (3,), root frame."""
+    """Return the aim that turns a direction of a marker's link to the direction `goal` (3,), root frame.
+
+    `direction`: (3,), fixed to the link, in the root frame at the zero pose.
+    """
     return Aim(ALONG, marker.link, marker.position, direction_frame(direction), 0, NOWHERE, direction_frame(goal))
 
 
 def level(marker: Marker, direction: Array, value: float) -> Aim:
-    """Return the aim that brings direction . x, x a marker's position, to a value [m times the direction's length]."""
+    """Return the aim that makes direction . x equal to `value`, where x is the position of the marker [m], root frame.
+
+    `direction` (3,) may have any length; `value` is in m times this length.
+    """
     return Aim(COORDINATE, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
 
 def below(marker: Marker, direction: Array, value: float) -> Aim:
-    """Return the aim that brings direction . x, x a marker's position, to at most a value [m times the direction's length]."""
+    """Return the aim that makes direction . x at most `value`, where x is the position of the marker [m], root frame.
+
+    `direction` (3,) may have any length; `value` is in m times this length.
+    """
     return Aim(AT_MOST, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
 
 def motor_at(motor: int, value: float) -> Aim:
-    """Return the aim that brings a motor to a value [rad]."""
+    """Return the aim that brings the motor with the index `motor` to the position `value` [rad]."""
     return Aim(MOTOR, 0, NOWHERE, UPRIGHT, 0, NOWHERE, UPRIGHT, value, motor)
 
 
@@ -105,10 +134,10 @@ Plain = Callable[..., ArrayLike]
 
 
 class Function:
-    """Calls a user's function with a batch of poses and their table of contacts, or pose by pose with a tuple of contacts.
+    """Calls a user's function with a batch of poses and the table of their contacts, or for each pose with a tuple of its contacts.
 
-    `contacts`: False for a function of the pose alone.
-    The first call tests whether the function accepts a batch: it must then return the same values as for single poses.
+    The first call tests whether the function accepts a batch: then it must return the same values as for single poses. `contacts`: False if
+    the function takes only the pose.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:
@@ -117,7 +146,7 @@ class Function:
         self._takes_batches: bool | None = None
 
     def __call__(self, pose: Pose) -> Array:
-        """Return the values of the function (N,) in poses q (N, n)."""
+        """Return the values (N,) of the function in the N poses of the batch `pose`."""
         if self._takes_batches is None:
             singly = self._singly(pose)
             self._takes_batches = self._agrees(pose, singly)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles an MJCF file through the package mujoco, the only place that imports it, and gives names and kinds as text."""
+"""Compiles an MJCF file with the package mujoco; the result gives names and kinds as text. Only this module imports mujoco."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class _RootTag(LineHandler):
 
 
 def is_mjcf(path: Path) -> bool:
-    """Return whether the root element of a file is <mujoco>; False for a file that is no XML."""
+    """Return whether a file is an MJCF file: its name ends in .xml or .mjcf, and its root element is <mujoco>."""
     if path.suffix.lower() not in (".xml", ".mjcf") or not is_file(path):
         return False
     handler = _RootTag()
@@ -48,9 +48,11 @@ def is_mjcf(path: Path) -> bool:
 class Compiled:
     """A model as MuJoCo compiles it, with every hinge and slide at zero; lists are in the order of MuJoCo's ids.
 
-    `model`: the MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: frames in the world's frame. `anchors`,
-    `axes`: (joints, 3) of the joints in the same frame. `names[kind]`: of bodies, joints, geoms, sites, keys and so on; those without a
-    name get one from their kind and number. `lines[kind]`: of the file, 0 where MuJoCo does not record one.
+    `path`: of the file. `model`: MuJoCo's MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of
+    these elements in the world's frame; `inertial`: at the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the
+    unit axis of each joint, in the world's frame. `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site",
+    "key" and so on); an element without a name gets one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0
+    if MuJoCo does not record the line. The other fields are the kinds of the elements, as text.
     """
 
     path: Path
@@ -72,7 +74,7 @@ class Compiled:
     camera_modes: tuple[str, ...]  # fixed, track, ...
 
     def where(self, kind: str, index: int) -> str:
-        """Return file and line of an element."""
+        """Return "file:line" of an element; `kind`: as in `names`, `index`: MuJoCo's id of the element."""
         return f"{self.path}:{max(self.lines[kind][index], 1)}"
 
 
@@ -131,7 +133,11 @@ def compile_mjcf(path: Path) -> Compiled:
 
 @lru_cache(maxsize=2)
 def meshes_of(path: Path) -> dict[str, tuple[Array, Ints]]:
-    """Return the vertices (v, 3) m and triangles (t, 3) of each mesh of an MJCF file, in the frames of the geoms; errors: compile_mjcf."""
+    """Return the vertices (v, 3) m and the triangles (t, 3), indices of vertices, of each mesh of an MJCF file, by the mesh's name.
+
+    The vertices are in the frame of the geom that has the mesh. Raises RobotFileError if MuJoCo refuses the file, NotInstalled without the
+    package mujoco.
+    """
     compiled = compile_mjcf(path)
     model, found = compiled.model, {}
     for mesh, name in enumerate(compiled.names["mesh"]):

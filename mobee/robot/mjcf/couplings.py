@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which joints of an MJCF model move together, by joint equalities and by driven tendons; each group has one motor."""
+"""Finds the joints of an MJCF model that move together, by joint equalities and by driven tendons; each group has one motor."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
 
 
 def drives_of(compiled: Compiled) -> dict[int, Drive]:
-    """Return the drive of each hinge and slide that moves, by MuJoCo's number of the joint.
+    """Return the drive (motor, scale and offset) of each hinge and slide that moves, by MuJoCo's number of the joint.
 
     A joint equality couples its two joints. An actuator of a fixed tendon moves the joints of the tendon together, in proportion to
-    their coefficients, unless they have actuators of their own. A motor is named after the joint of its group that has an actuator,
-    else after the one that depends on no other. Joints that an equality holds at a constant have no drive.
+    their coefficients, unless one of these joints has an actuator. A group of coupled joints has one motor, which is named after the joint
+    of the group that has an actuator, else after the joint that depends on no other. Joints that an equality holds at a constant position
+    have no drive.
     """
     held = set(held_joints(compiled))
     moving = [j for j, kind in enumerate(compiled.joint_kinds) if kind in ("hinge", "slide") and j not in held]
@@ -49,7 +50,7 @@ def drives_of(compiled: Compiled) -> dict[int, Drive]:
 
 
 def held_joints(compiled: Compiled) -> dict[int, float]:
-    """Return the joints that an equality without a second joint holds, and where [rad or m]."""
+    """Return the joints that an equality without a second joint holds: MuJoCo's number of the joint -> its position [rad or m]."""
     model = compiled.model
     return {
         int(model.eq_obj1id[k]): float(model.qpos0[model.jnt_qposadr[model.eq_obj1id[k]]] + model.eq_data[k, 0])
@@ -59,7 +60,10 @@ def held_joints(compiled: Compiled) -> dict[int, float]:
 
 
 def actuated(compiled: Compiled) -> dict[int, list[int]]:
-    """Return the numbers of the actuators that drive a joint directly, by the number of the joint."""
+    """Return the joints that an actuator drives directly (transmission `joint` or `jointinparent`).
+
+    Keys: MuJoCo's number of the joint. Values: MuJoCo's numbers of these actuators.
+    """
     found: dict[int, list[int]] = defaultdict(list)
     for actuator, kind in enumerate(compiled.transmissions):
         if kind in ("joint", "jointinparent"):
@@ -68,7 +72,7 @@ def actuated(compiled: Compiled) -> dict[int, list[int]]:
 
 
 def loops(compiled: Compiled) -> list[str]:
-    """Return descriptions of unsupported couplings: constraints that close a loop, and couplings that are not linear."""
+    """Return a description of each unsupported coupling: of constraints that close a loop, and of couplings that are not linear."""
     names, model = compiled.names["equality"], compiled.model
     closed = [f"{compiled.equality_kinds[k]} {names[k]!r}" for kind in ("connect", "weld", "tendon") for k in _active(compiled, kind)]
     bent = [f"joint {names[k]!r} (only its linear part counts)" for k in _active(compiled, "joint") if model.eq_data[k, 2:5].any()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds robots of MuJoCo Menagerie by name, through the package mujoco-menagerie, which downloads each on its first use."""
+"""Finds robots of MuJoCo Menagerie by name with the package mujoco-menagerie, which downloads a robot at its first use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PACKAGE = "mujoco_menagerie"
 
 
 def menagerie_names() -> tuple[str, ...]:
-    """Return the names of MuJoCo Menagerie; none if the package is not installed."""
+    """Return the names of the robots of MuJoCo Menagerie; empty if the package mujoco-menagerie is not installed."""
     if importlib.util.find_spec(PACKAGE) is None:
         return ()
     import mujoco_menagerie
@@ -22,10 +22,10 @@ def menagerie_names() -> tuple[str, ...]:
 
 
 def menagerie_file(name: str) -> Path | None:
-    """Return the MJCF of a robot of Menagerie; None where it has no such robot, or the package is not installed.
+    """Return the path of the MJCF file of a robot of MuJoCo Menagerie; download it if necessary, with a warning before.
 
-    The name may leave out the maker, if that is unambiguous: "panda" is "franka_emika_panda". Warns before a download.
-    Raises RobotFileError if the download fails.
+    The name may omit the maker if it is unambiguous: "panda" is "franka_emika_panda". Returns None if Menagerie has no such robot, or the
+    package mujoco-menagerie is not installed. Raises RobotFileError if the download fails.
     """
     names = menagerie_names()
     found = [name] if name in names else [known for known in names if known.endswith(f"_{name}")]

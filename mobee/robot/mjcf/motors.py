@@ -18,7 +18,10 @@ NARROWEST = 1e-6  # rad or m: couplings that leave a motor less are not used to 
 
 
 def joint_limits(compiled: Compiled, joint: int) -> Array:
-    """Return the interval (2,) of a joint in rad or m; a joint without limits gets a turn, or 2 m, about zero."""
+    """Return the lower and upper limit (2,) of a joint, rad or m; a joint without limits gets one turn, or 2 m, centred at zero.
+
+    `joint`: MuJoCo's number of the joint.
+    """
     if compiled.model.jnt_limited[joint]:
         stated: Array = compiled.model.jnt_range[joint].copy()
         return stated
@@ -27,9 +30,10 @@ def joint_limits(compiled: Compiled, joint: int) -> Array:
 
 
 def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]:
-    """Return qpos at home, and the number of its keyframe: the requested one, else the first of HOMES, else the only one.
+    """Return MuJoCo's position vector qpos at home, and the number of the keyframe from which it is, or None.
 
-    Without a keyframe it is the pose in which the file draws the robot; "zero" is every joint at 0. Raises UnknownName.
+    `asked`: name of the keyframe, or "zero" for every joint at 0. None: the first of the names HOMES ("home", "ready", ...) that a
+    keyframe has, else the only keyframe; else the pose in which the file draws the robot. Raises UnknownName.
     """
     model, names = compiled.model, compiled.names["key"]
     lower = {name.lower(): index for index, name in enumerate(names)}
@@ -43,10 +47,11 @@ def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]
 
 
 def read_motor(compiled: Compiled, group: list[tuple[int, int, Drive]], home: Array, meant: bool) -> Motor:
-    """Return the motor of a group of joints, each given as (joint of the robot, joint of MuJoCo, drive), the master first.
+    """Return the motor that drives a group of coupled joints.
 
-    `home`: qpos. `meant`: home is from a keyframe, and is kept even in a limit zone; otherwise home is the nearest position outside the
-    zones.
+    `group`: for each joint (index in the robot, MuJoCo's number, drive), the joint with the name of the motor first. `home`: MuJoCo's
+    position vector qpos at home. `meant`: whether home is from a keyframe, so that it is kept even in a limit zone of the control law;
+    otherwise the motor's home is the nearest position outside the zones.
     """
     _, master, _ = group[0]
     limits = joint_limits(compiled, master)

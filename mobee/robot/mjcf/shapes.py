@@ -22,10 +22,11 @@ WITHOUT_BODY = ("plane", "hfield")  # ground, which belongs into a world
 
 
 def read_solids(compiled: Compiled, link_of: list[int], meshes: Meshes, corners: Corners) -> Iterator[tuple[Shape, int]]:
-    """Yield the solid of each geom that can collide, and its number; the ground is left out.
+    """Yield the solid of each geom that can collide, with MuJoCo's number of the geom; the ground (plane, height field) is left out.
 
-    `link_of`: the robot's link of each body. Geoms that are drawn only (contype and conaffinity 0, in no contact pair) are left out, unless
-    there are no others.
+    `link_of`: for each body the index of the robot's link. `meshes`: "hull" (convex hull of a mesh) or "bounding" (smallest primitive
+    around it). `corners`: largest number of corners of a hull, or "all". Geoms that are only drawn (contype and conaffinity 0, in no
+    contact pair) are left out, unless the model has no other geoms.
     """
     known: dict[int, Array] = {}
     chosen = colliding(compiled)
@@ -39,7 +40,7 @@ def read_solids(compiled: Compiled, link_of: list[int], meshes: Meshes, corners:
 
 
 def colliding(compiled: Compiled) -> list[int]:
-    """Return the geoms that can collide, without ground."""
+    """Return the numbers of the geoms that can collide, without the ground; of all geoms but the ground if no geom can collide."""
     model = compiled.model
     solid = [geom for geom, kind in enumerate(compiled.geom_kinds) if kind not in WITHOUT_BODY]
     paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
@@ -57,7 +58,10 @@ def _shaped(compiled: Compiled, geom: int, shape: Shape, size: Array, known: dic
 
 
 def primitive_size(kind: str, size: Array) -> tuple[float, ...]:
-    """Return the size of a Shape of a kind in PRIMITIVES from that of a geom (3,) m: MuJoCo gives half lengths."""
+    """Convert the size of a MuJoCo geom (3,) m, which has half lengths, to that of a `mobee.robot.robot.Shape`, which has full lengths.
+
+    `kind`: "sphere", "capsule", "cylinder" or "box".
+    """
     x, y, z = map(float, size)
     match kind:
         case "sphere":
@@ -88,7 +92,7 @@ def _mesh(compiled: Compiled, geom: int, known: dict[int, Array], corners: Corne
 
 
 def around_ball() -> Array:
-    """Return the corners (32, 3) of a polyhedron around the ball of radius 1: a dodecahedron's and an icosahedron's together."""
+    """Return the corners (32, 3) of a polyhedron that contains the ball of radius 1: those of a dodecahedron and an icosahedron."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
     twelve = [np.roll((0.0, a, b), k) for a, b in product((-1.0, 1.0), (-golden, golden)) for k in range(3)]
     twenty = [

@@ -15,9 +15,10 @@ KINDS: dict[str, VisualKind] = {name: name for name in ("sphere", "capsule", "cy
 
 
 def read_visuals(compiled: Compiled, link_of: list[int]) -> tuple[Visual, ...]:
-    """Return the visuals: for each body the geoms that cannot collide, or all its geoms if all can, in the groups that are shown.
+    """Return the visuals of an MJCF model: for each body the geoms that cannot collide, or all its geoms if all can collide.
 
-    The ground (planes and height fields) and geoms that are fully transparent are left out.  `link_of`: the link of each body.
+    Only geoms of the groups 0 to 2 are taken, which MuJoCo's viewers show. The ground (planes and height fields) and geoms that are fully
+    transparent are left out.  `link_of`: for each body the index of the robot's link.
     """
     model, solid = compiled.model, set(colliding(compiled))
     shown = [
@@ -60,7 +61,10 @@ def _color(compiled: Compiled, geom: int) -> Channels:
 
 
 def read_cameras(compiled: Compiled, link_of: list[int]) -> dict[str, Camera]:
-    """Return the cameras that are fixed to a body, by name; those that follow a body from a distance are left out."""
+    """Return the cameras that are fixed to a body, by name; cameras that follow a body from a distance are left out.
+
+    `link_of`: for each body the index of the robot's link.
+    """
     model, found = compiled.model, {}
     for index, name in enumerate(compiled.names["camera"]):
         if compiled.camera_modes[index] == "fixed":

@@ -16,13 +16,13 @@ FARTHEST = 1e6  # m: a larger number is a mistake, and the arithmetic would lose
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """The position and rotation of a frame in another."""
+    """The position (3,) m and the rotation (3, 3) of a frame relative to another frame."""
 
     position: Array  # (3,) m
     rotation: Array  # (3, 3)
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """Return the product of this frame and `inner`, which is relative to this frame, as a frame relative to this one's parent."""
+        """Return the frame `inner`, which is relative to this frame, relative to the parent of this frame (product of the poses)."""
         return Frame(self.rotation @ inner.position + self.position, self.rotation @ inner.rotation)
 
 
@@ -30,7 +30,10 @@ IDENTITY = Frame(np.zeros(3), np.eye(3))
 
 
 def read_origin(parent: Node) -> Frame:
-    """Return the <origin> of a joint or shape, or the identity if it has none; raises RobotFileError."""
+    """Return the frame in the <origin> of a joint or shape, relative to the frame of its link; the identity if there is no <origin>.
+
+    Raises RobotFileError for faulty numbers.
+    """
     node = child(parent, "origin")
     if node is None:
         return IDENTITY
@@ -40,7 +43,7 @@ def read_origin(parent: Node) -> Frame:
 
 
 def child(parent: Node, tag: str) -> Node | None:
-    """Return the only child with that tag, or None; raises RobotFileError if there are two."""
+    """Return the only child element of `parent` with the given tag, or None if there is none; raises RobotFileError if there are two."""
     found = [node for node in parent if node.tag == tag]
     if len(found) > 1:
         found[1].fail("position in the file", f"a second <{tag}>", f"The first is in line {found[0].line}: remove one")
@@ -48,7 +51,7 @@ def child(parent: Node, tag: str) -> Node | None:
 
 
 def triple(node: Node, name: str) -> Array:
-    """Return three numbers of an attribute; reports an error if one is too large to be in metres or radians."""
+    """Return the three numbers (3,) of an attribute; raises RobotFileError if they are not three, or one is above 1e6 (m or rad)."""
     values = np.array(node.numbers(name, 3))
     if float(np.abs(values).max()) > FARTHEST:
         node.fail(name, f"{float(np.abs(values).max()):g} is too large", "URDF counts in metres and radians")
@@ -56,7 +59,10 @@ def triple(node: Node, name: str) -> Array:
 
 
 def bounded(node: Node, name: str, default: float | None = None) -> float:
-    """Return the number of an attribute; reports an error if it is too large to be in metres or radians."""
+    """Return the number of an attribute, or `default` if it is absent; raises RobotFileError if it is above 1e6 (m or rad).
+
+    Without a default the attribute is required.
+    """
     value = node.number(name, default)
     if abs(value) > FARTHEST:
         node.fail(name, f"{value:g} is too large", "URDF counts in metres and radians")
@@ -64,7 +70,7 @@ def bounded(node: Node, name: str, default: float | None = None) -> float:
 
 
 def rotation_of(rpy: Array) -> Array:
-    """Return the rotation (3, 3) of roll, pitch, yaw (3,) [rad]."""
+    """Return the rotation matrix (3, 3) of roll, pitch and yaw (3,) [rad]: rotations about the fixed axes x, y and z, in this order."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
     return np.array(
         [
@@ -76,7 +82,10 @@ def rotation_of(rpy: Array) -> Array:
 
 
 def rpy_of(rotation: Array) -> Array:
-    """Return roll, pitch, yaw (3,) [rad] of a rotation (3, 3); exact at a pitch of 90 deg too, where roll is arbitrary."""
+    """Return roll, pitch and yaw (3,) [rad] of a rotation matrix (3, 3).
+
+    The angles give the same matrix also at a pitch of 90 deg, where roll is arbitrary.
+    """
     r = rotation
     roll = atan2(r[2, 1], r[2, 2])
     sine, cosine = sin(roll), cos(roll)

@@ -27,9 +27,9 @@ NEAR = 1e-8  # of the mesh's size between corners that are one
 def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
     """Return the vertices (v, 3), v >= 4, of a convex body that contains all `points` (n, 3) m and has at most `corners` corners.
 
-    It is the exact hull if this has no more corners, or if `corners` is "all". Otherwise it is an intersection of planes of the hull's
-    facets: planes are added where corners protrude most, until there are `corners` corners. Flat meshes get a thickness of 0.2 mm.
-    Raises InvalidValue for points that have no hull.
+    It is the exact hull if the hull has at most `corners` corners, or if `corners` is "all". Otherwise it is bounded by some of the planes
+    of the hull's facets: planes are added where corners protrude most, until one more plane would give more than `corners` corners. Flat
+    meshes get a thickness of at least 0.2 mm. Raises InvalidValue for points that have no hull.
     """
     from scipy.spatial import ConvexHull, QhullError  # 0.3 s, and only robots with meshes need it
 
@@ -47,7 +47,10 @@ def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
 
 
 def facets(vertices: Array) -> Array:
-    """Return the triangles (f, 3, 3) of the hull of `vertices` (v, 3), corners anticlockwise as seen from outside."""
+    """Return the triangles (f, 3, 3) m of the convex hull of `vertices` (v, 3) m.
+
+    The indices are triangle, corner and coordinate; the corners of a triangle are anticlockwise as seen from outside.
+    """
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(vertices)
@@ -108,7 +111,7 @@ LEAST = 1e-6  # m, the smallest edge, radius or height, for flat and thin meshes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """A volume without a name: kind and size as in mobee.robot.robot.Shape, centre (3,) m and orientation (3, 3)."""
+    """A geometric volume: `kind` and `size` as in `mobee.robot.robot.Shape`, `centre` (3,) m and orientation `rotation` (3, 3)."""
 
     kind: ShapeKind
     size: tuple[float, ...]
@@ -117,7 +120,7 @@ class Primitive:
 
     @property
     def volume(self) -> float:
-        """The volume [m^3]."""
+        """The volume of the primitive [m^3]."""
         match self.kind:
             case "sphere":
                 return 4 / 3 * pi * self.size[0] ** 3
@@ -130,7 +133,10 @@ class Primitive:
 
 
 def smallest(points: Array) -> Primitive:
-    """Return the primitive of smallest volume that contains all points (v, 3) m."""
+    """Return the smallest sphere, capsule, cylinder or box, by volume, that contains all points (v, 3) m.
+
+    Only axes along the coordinate axes and the main axes of the points are tried.
+    """
     axes = _axes(points)
     boxes = [_box(points, frame) for frame in axes]
     round_ones = [fit(points, axis) for frame in axes for axis in frame.T for fit in (capsule_along, _cylinder)]
@@ -138,19 +144,25 @@ def smallest(points: Array) -> Primitive:
 
 
 def smallest_capsule(points: Array) -> Primitive:
-    """Return the smallest capsule that contains all points (v, 3) m and whose axis is an axis of the mesh or a main axis of its points."""
+    """Return the smallest capsule, by volume, that contains all points (v, 3) m.
+
+    Only axes along the coordinate axes and the main axes of the points are tried.
+    """
     return min((capsule_along(points, axis) for frame in _axes(points) for axis in frame.T), key=lambda one: one.volume)
 
 
 def bounding_sphere(points: Array) -> Primitive:
-    """Return a sphere around all points (v, 3) m, a little larger than the smallest one."""
+    """Return a sphere that contains all points (v, 3) m; it is a little larger than the smallest such sphere."""
     centre = _centre(points)
     radius = float(np.linalg.norm(points - centre, axis=1).max())
     return Primitive("sphere", (max(radius, LEAST) + ROOM,), centre, np.eye(3))
 
 
 def capsule_along(points: Array, axis: Array) -> Primitive:
-    """Return the shortest capsule along a unit axis that contains all points (v, 3) m, with the radius of the cylinder around them."""
+    """Return the shortest capsule along the unit vector `axis` (3,) that contains all points (v, 3) m.
+
+    Its radius is that of the smallest cylinder around the points along this axis, or larger if the capsule is a sphere.
+    """
     rotation, centre, radius, off, along = _around(points, axis)
     reach = np.sqrt(np.maximum(radius**2 - off**2, 0.0))  # how far beyond its cap's centre a point may lie
     low, high = float((along + reach).min()), float((along - reach).max())

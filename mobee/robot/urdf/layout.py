@@ -21,7 +21,11 @@ from mobee.robot.xml.volume import Z, turn_about
 
 @dataclass(slots=True, eq=False)
 class Skeleton:
-    """The tree laid out at zero pose; the links of fixed joints are merged into the links that carry them."""
+    """The tree of a URDF at zero pose; the links of fixed joints are merged into the links that carry them.
+
+    `links`: names of the robot's links. `index`: URDF link -> index of the robot's link. `frames`: URDF link -> its frame in the root
+    frame. `joints`: the robot's joints. `moving`: the same joints as in the URDF. `marked`: URDF links that become markers.
+    """
 
     links: list[str]
     index: dict[str, int]  # URDF link -> link of the robot
@@ -32,7 +36,10 @@ class Skeleton:
 
 
 def lay_out(tree: Tree) -> Skeleton:
-    """Return the skeleton of a tree; links of fixed joints, and of joints with equal limits, are merged into the links that carry them."""
+    """Lay out a URDF tree at zero pose and return it.
+
+    Links of fixed joints, and of joints whose lower and upper limits are equal, are merged into the links that carry them.
+    """
     skeleton = Skeleton([tree.root], {tree.root: 0}, {tree.root: IDENTITY})
     for joint in tree.walk():
         frame = skeleton.frames[joint.parent] @ joint.origin
@@ -67,7 +74,10 @@ def _locked(joint: UrdfJoint) -> Frame | None:
 
 
 def read_markers(tree: Tree, skeleton: Skeleton, where: dict[tuple[str, str], str]) -> Iterator[Marker]:
-    """Yield a marker at the frame of each link that is attached by a fixed joint, and of each leaf link of the tree."""
+    """Yield a marker at the frame of each URDF link that a fixed joint attaches, and of each link at an end of the tree.
+
+    File and line of each marker are added to `where`, as ("marker", name) -> "file:line".
+    """
     notes = {link: note for link in skeleton.marked for note in tree.links[link] if note.tag == "mobee" and "marker" in note.attributes}
     taken: set[str] = set()
     for link in sorted(skeleton.marked, key=lambda name: name not in notes):  # names that write_urdf noted come first
@@ -98,7 +108,10 @@ SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of a symmetric matrix
 
 
 def read_bodies(tree: Tree, skeleton: Skeleton) -> tuple[Body, ...]:
-    """Return the masses of all links, links of fixed joints merged with the links that carry them; raises RobotFileError."""
+    """Return one body with the mass of each link of the robot that has a mass; raises RobotFileError for faulty numbers.
+
+    The masses of links on fixed joints are added to those of the links that carry them.
+    """
     return one_a_link(_bodies(tree, skeleton))
 
 

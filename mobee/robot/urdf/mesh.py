@@ -25,7 +25,10 @@ REMEDY = "Put the package's folder beside or above the URDF, or name where it li
 
 
 def find_mesh(node: Node) -> Path:
-    """Return the path of the file in a <mesh filename="...">; raises RobotFileError with the places that were searched."""
+    """Return the path of the existing file that a <mesh filename="..."> element names.
+
+    Raises RobotFileError, with the searched paths, if there is no such file.
+    """
     given = node.text("filename")
     if "\0" in given:
         node.fail("filename", "holds a zero byte", "Write a path")
@@ -41,10 +44,10 @@ def find_mesh(node: Node) -> Path:
 
 
 def mesh_places(given: str, robot_file: Path) -> list[Path]:
-    """Return the paths that the name of a mesh in a robot's file can mean; none for an unknown scheme.
+    """Return the paths that the name `given` of a mesh in a robot's file can mean, in the order of the search; empty for an unknown scheme.
 
-    `package://name/...` is searched from the robot's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, then where pip
-    installs data; a plain path starts at the robot's folder.
+    `package://name/...` is searched from the robot's folder upwards, then in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, then in the folder in
+    which pip installs data; a plain path and `file://` start at the robot's folder.
     """
     try:
         scheme, rest = urlsplit(given).scheme.lower(), given.partition("://")[2]
@@ -61,7 +64,11 @@ def mesh_places(given: str, robot_file: Path) -> list[Path]:
 
 
 def mesh_name(mesh: MeshSource, path: Path) -> str:
-    """Return the name of a mesh for a robot file at `path`: unchanged if it means the same file there, else relative to that folder."""
+    """Return the name under which a robot file at `path` must name a mesh.
+
+    It is the present name if this is a package:// address that is found from there too, or if the mesh is not found; else the path of
+    the mesh relative to the folder of `path`.
+    """
     found = first_file(mesh_places(mesh.file, mesh.robot_file))
     same = first_file(mesh_places(mesh.file, path)) if mesh.file.partition("://")[0].lower() in PACKAGES else None
     if found is None or same is not None:
@@ -73,12 +80,12 @@ def mesh_name(mesh: MeshSource, path: Path) -> str:
 
 
 def first_file(candidates: list[Path]) -> Path | None:
-    """Return the first of the paths that is a file."""
+    """Return the first of the paths that is an existing file; None if there is none."""
     return next((path for path in candidates if is_file(path)), None)
 
 
 def searched(candidates: list[Path]) -> str:
-    """Return the paths as text for a message, six at most."""
+    """Return the searched paths as text for a message, at most six of them."""
     more = f" and {len(candidates) - 6} more" if len(candidates) > 6 else ""
     return ", ".join(str(path) for path in candidates[:6]) + more
 
@@ -107,9 +114,9 @@ OBJ_FACES = re.compile(rb"^[ \t]*f[ \t]+([^\r\n]+)", re.MULTILINE)
 
 
 def read_mesh(path: Path) -> Array:
-    """Return the points (v, 3) of a .stl, .obj or .dae file, in the units of the file (COLLADA: in m), each once.
+    """Return the points (v, 3) of a .stl, .obj or .dae file, each once, in the units of the file (.dae: in m).
 
-    They are the corners of its faces; for a file without faces, all its points.
+    The points are the corners of the faces of the mesh; for a file without faces, all its points.
     Raises RobotFileError, with the remedy, for a file that cannot be read, is no mesh, or holds no points.
     """
     kind = path.suffix.lower()

@@ -23,7 +23,10 @@ SLIDE = 2.0  # m, of a prismatic joint without limits
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The drive of a joint: joint = scale * motor + offset; `master`: the joint at the end of the <mimic> chain, and the motor's name."""
+    """The drive of a joint by a motor: joint = scale * motor + offset (rad or m).
+
+    `master`: name of the joint that the motor moves directly, at the end of the chain of <mimic>; it is the motor's name too.
+    """
 
     master: str
     scale: float
@@ -31,7 +34,10 @@ class Drive:
 
 
 def read_drives(joints: Mapping[str, UrdfJoint], moving: Sequence[UrdfJoint]) -> dict[str, Drive]:
-    """Return the drive of each moving joint, along chains of <mimic>; raises RobotFileError for cycles and unknown joints."""
+    """Return the drive of each moving joint, by the joint's name; chains of <mimic> are followed to the joint at their end.
+
+    `joints`: all joints, by name. `moving`: the joints that move. Raises RobotFileError for cycles of <mimic> and unknown joints.
+    """
     names = {joint.name for joint in moving}
     drives: dict[str, Drive] = {}
     for joint in moving:
@@ -69,9 +75,10 @@ def _multiplier(mimic: Node) -> float:
 
 
 def joint_limits(joint: UrdfJoint) -> Array:
-    """Return the limits (2,) of a joint, rad or m; always finite, since every motor needs limits.
+    """Return the lower and upper limit (2,) of a joint, rad or m; always finite, since every motor needs limits.
 
-    A joint without limits gets an interval of one turn, or of 2 m, about zero; with one limit, an interval of that length which ends there.
+    A joint without limits gets an interval of one turn, or of 2 m, centred at zero. A joint with only one limit gets an interval of the
+    same length that ends at this limit.
     """
     low, high = stated_limits(joint).tolist()
     span = SLIDE if joint.kind == "prismatic" else TURN
@@ -81,7 +88,7 @@ def joint_limits(joint: UrdfJoint) -> Array:
 
 
 def stated_limits(joint: UrdfJoint) -> Array:
-    """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite where the file gives no limit.
+    """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite if the file gives no limit.
 
     A limit beyond 1e6 counts as infinite. If lower is above upper, both count as infinite: files for PyBullet use this notation.
     """
@@ -126,9 +133,11 @@ def _warn_of_free(joint: UrdfJoint) -> None:
 
 
 def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
-    """Return the motor of a joint and of all joints that mimic it; its limits keep every one of these joints within its own limits.
+    """Return the motor of the joint `master` and of all joints that mimic it; its limits keep each of these joints within its own limits.
 
-    Units are those of the joint: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones.
+    `driven`: for each of these joints, `master` included, (index in the robot, joint, drive). `part`: name of the motor's part. The unit is
+    that of `master`: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones of the control law.
+    Warns of limits that are assumed or ignored.
     """
     limits = joint_limits(master)
     _warn_of_free(master)

@@ -2,10 +2,10 @@
 """Which shapes of a robot from a URDF are tested against each other, solids and generated fields.
 
 Two shapes on different links are tested, except
-- those of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
+- shapes of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
   links between them that have no solid, as in a wrist that is written as three joints;
-- those whose links (of the URDF, before fixed joints are merged) the SRDF disables;
-- fields of one part, as in a zero-position file; where the SRDF makes no parts, see own_fields.py.
+- shapes of links (of the URDF, before fixed joints are merged) whose tests the SRDF disables;
+- fields of one part, as in a zero-position file; if the SRDF does not define the parts, only fields that are not far apart (`far_apart`).
 
 Without an SRDF no other pairs are left out; `mobee check` reports shapes that overlap in every pose.
 """
@@ -30,7 +30,12 @@ OwnFields = Literal["none", "far apart", "all"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairRules:
-    """Rules for the pairs of links whose contacts are not computed, and for the fields of one part that are tested with each other."""
+    """Rules for the pairs of links whose contacts are not computed, and for the fields of one part that are tested with each other.
+
+    `links`: URDF link -> index of the robot's link. `adjacent`: pairs of adjacent links (indices), each with the reason. `srdf`: its
+    disabled and enabled pairs. `own`: which fields of one part are tested with each other: "none", "far apart"
+    (`mobee.robot.urdf.pairs.far_apart`) or "all".
+    """
 
     links: dict[str, int]  # URDF link -> link of the robot
     adjacent: dict[LinkPair, str]
@@ -39,7 +44,11 @@ class PairRules:
 
 
 def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
-    """Return pairs of links, with reasons, that are joined by one joint, or by joints at one place without a solid between them."""
+    """Return the pairs of adjacent links (indices), each with the reason as text.
+
+    Two links are adjacent if one joint connects them, or several joints at one place (within 5 cm) with links between them that have no
+    solid.
+    """
     solid = {shape.link for shape in shapes if shape.role == "solid"}
     found: dict[LinkPair, str] = {}
     for index, joint in enumerate(joints):
@@ -58,7 +67,10 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
 
 
 def shape_pairs(joints: Sequence[Joint], shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
-    """Return the tested pairs of shapes of one role, (p, 2), indices in `shapes`; `owners`: the URDF link of each shape."""
+    """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts, (p, 2), indices in `shapes`.
+
+    `owners`: for each shape the name of its URDF link.
+    """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     names = {name: k for k, name in enumerate(rules.links)}
     owner = np.array([names[owners[index]] for index in chosen], dtype=np.intp)
@@ -85,7 +97,10 @@ def _matrix(pairs: dict[NamePair, str] | set[NamePair], names: dict[str, int]) -
 
 
 def untested_links(shapes: Sequence[Shape], solid_pairs: Ints, rules: PairRules) -> dict[LinkPair, str]:
-    """Return the pairs of links that are never tested for contact, each with the reason."""
+    """Return the pairs of links (indices) that are never tested for contacts, each with the reason.
+
+    `solid_pairs`: (p, 2) indices in `shapes`, the tested pairs of solids.
+    """
     enabled = {frozenset(rules.links[name] for name in pair) for pair in rules.srdf.enabled}
     tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in solid_pairs.tolist()}
     untested = {pair: reason for pair, reason in rules.adjacent.items() if pair not in enabled}
@@ -100,7 +115,11 @@ BENT = 2  # joints between links whose fields overlap wherever they bend
 
 
 def far_apart(joints: Sequence[Joint], fields: Sequence[Shape]) -> NDArray[np.bool_]:
-    """Return a table (k, k): whether two fields are more than two joints apart and do not touch while every joint is at zero."""
+    """Return a table (k, k) of booleans: whether two fields are far apart.
+
+    Two fields are far apart if more than two joints lie between their links, and the fields (as enclosing capsules) do not touch while
+    every joint is at zero.
+    """
     link = np.array([field.link for field in fields], dtype=np.intp)
     far: NDArray[np.bool_] = (_joints_between(joints) > BENT)[link[:, None], link]
     half_axes, radii = np.zeros((len(fields), 3)), np.zeros(len(fields))
@@ -135,10 +154,11 @@ def _capsule(shape: Shape) -> tuple[Array, float]:
 
 
 def segment_distances(offsets: Array, along: Array, across: Array) -> Array:
-    """Return the distances (k,) m of one line segment from k others.
+    """Return the distances (k,) m of one line segment from k other segments.
 
-    `along` and `across`: half axes of the one (3,) and of the others (k, 3); `offsets` (k, 3): from their centres to its centre. Either
-    the nearest points are inside of both segments, or one of them is an end.
+    `along` (3,): half axis of the one segment, from its centre to an end. `across` (k, 3): half axes of the others. `offsets` (k, 3): from
+    the centres of the others to the centre of the one. All in m. Method: the nearest points are either inside both segments, or one of
+    them is an end of its segment.
     """
     a, b, c = along @ along, across @ along, (across**2).sum(axis=1)
     d, e = offsets @ along, (offsets * across).sum(axis=1)

@@ -26,12 +26,13 @@ from mobee.robot.xml.pairs import without_ignored
 
 @dataclass(frozen=True, slots=True)
 class UrdfOptions:
-    """Options for reading a URDF.
+    """Options for reading a URDF or MJCF file.
 
-    `field`: distance [m] by which fields extend beyond the solids; None: no fields. `meshes`: "hull": the convex hull of a mesh;
+    `field`: distance [m] by which fields extend beyond the solids; None: no fields. `meshes`: "hull": a mesh becomes its convex hull;
     "bounding": the smallest sphere, capsule, cylinder or box around it. `corners`: largest number of corners of a hull, at least 8; "all":
-    the exact hull. `srdf`: the SRDF file; None: see `find_srdf`. `home`: the name of a <group_state>, or "zero"; None: see
-    `choose_home`.
+    the exact hull. `srdf`: the SRDF file (URDF only); None: an SRDF beside the URDF or in ../srdf (`mobee.robot.urdf.srdf.find_srdf`).
+    `home`: the name of a <group_state> (URDF) or a keyframe (MJCF), or "zero"; None: the pose called "home", or another pose of the file
+    (`mobee.robot.urdf.srdf.choose_home`, `mobee.robot.mjcf.motors.home_pose`).
     """
 
     field: float | None = None
@@ -42,7 +43,7 @@ class UrdfOptions:
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
-    """Return the robot described by a URDF file.
+    """Return the robot described by a URDF file; `options` None: the defaults.
 
     Motors have the names of their joints; their unit is rad, or m for a prismatic joint. Raises RobotFileError with
     file, line, field and remedy, InvalidValue for options out of range; warns of elements that it ignores.
@@ -61,7 +62,7 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
 
 
 def check_options(options: UrdfOptions) -> None:
-    """Raise InvalidValue for options out of range."""
+    """Raise InvalidValue if `field`, `meshes` or `corners` of the options is out of range."""
     if options.field is not None and not 0 < options.field <= 1:
         raise InvalidValue(f"field={options.field!r} is no distance for a field. Give metres, such as field=0.03.")
     if options.meshes not in ("hull", "bounding"):
@@ -189,7 +190,10 @@ def _read_body(tree: Tree, skeleton: Skeleton, motors: tuple[Motor, ...], option
 
 
 def free_name(name: str, taken: dict[str, int]) -> str:
-    """Return the name, with a number appended if it is taken."""
+    """Return the name, with a number appended if it is already used, and record the result in `taken`.
+
+    `taken`: used names -> the next number to append.
+    """
     if name not in taken:
         taken[name] = 0
         return name

@@ -28,7 +28,7 @@ CLOSE = 1e-9  # m, for the ends of a cylinder that carries two spheres as caps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A shape, its file and line, and whether it belongs to the base."""
+    """A shape that was read from a file: `node`, its XML element with file and line; `base`: whether it belongs to the robot's base."""
 
     node: Node
     shape: Shape
@@ -37,7 +37,12 @@ class Found:
 
 @dataclass(slots=True, eq=False)
 class ShapeReader:
-    """Reads the shapes of one robot; each mesh file is opened once."""
+    """Reads the shapes of one robot; each mesh file is opened once.
+
+    `meshes`: "hull" (a mesh becomes its convex hull) or "bounding" (the smallest primitive around it). `corners`: largest number of
+    corners of a hull, or "all". `parts`: names of the robot's parts. `known`: the hulls that were computed, by file and scale. `count`:
+    number of shapes that were read.
+    """
 
     meshes: Meshes
     corners: Corners
@@ -46,7 +51,11 @@ class ShapeReader:
     count: int = 0
 
     def read(self, link: Node, index: int, frame: Frame, part: str) -> list[Found]:
-        """Return the solids of a <link>, and the fields that `write_urdf` noted; `frame`: of the link at zero pose, in the root frame."""
+        """Return the solids of a <link> element, and the fields that `mobee.robot.urdf.write.write_urdf` added to it.
+
+        `index`: of the robot's link. `frame`: of the link at zero pose, in the root frame. `part`: name of the part of its shapes. Raises
+        RobotFileError for faulty elements and for meshes that cannot be read.
+        """
         found: list[Found] = []
         for node in link:
             if node.tag not in LINK_TAGS and nearest(node.tag, LINK_TAGS):
@@ -111,7 +120,10 @@ class ShapeReader:
 
 
 def hulled(shape: Shape, vertices: Array, meshes: Meshes) -> Shape:
-    """Return the shape as the convex hull of `vertices` (v, 3) m in its own frame, or as the smallest primitive around them."""
+    """Return a copy of the shape with the form of a convex hull, or with that of the smallest primitive around the hull.
+
+    `vertices`: (v, 3) m, corners of the hull, in the frame of the shape. `meshes`: "hull" or "bounding" (primitive).
+    """
     frame = Frame(shape.position, shape.rotation)
     if meshes == "bounding":
         fit = smallest(vertices)
@@ -159,7 +171,10 @@ def _capsules(found: list[Found]) -> list[Found]:
 
 
 def grown(shape: Shape, by: float, name: str) -> Shape:
-    """Return the field around a solid, which extends `by` m beyond it; around a mesh it is a capsule."""
+    """Return a field around a solid: the same shape, larger by `by` m on all sides; around a mesh it is a capsule.
+
+    `name`: of the field.
+    """
     around = replace(shape, name=name, role="field")
     match shape.kind:
         case "sphere" | "capsule":

@@ -25,7 +25,12 @@ FREE_BASE = "root_joint"  # Pinocchio's name for the joint that lets a base move
 
 @dataclass(slots=True, eq=False)
 class Srdf:
-    """The content of an SRDF file; links and joints have the names of the URDF."""
+    """The content of an SRDF file; links and joints have the names of the URDF.
+
+    `disabled`: pairs of links -> reason, file and line. `enabled`: pairs of links. `groups`: name -> its element and its joints, in the
+    order of the file. `states`: name of a <group_state> -> its joints (`State`); the states of several groups with one name are merged.
+    `path`: of the file; None: the robot has no SRDF.
+    """
 
     disabled: dict[NamePair, str] = field(default_factory=dict)  # two links -> reason, file and line
     enabled: set[NamePair] = field(default_factory=set)
@@ -35,7 +40,10 @@ class Srdf:
 
 
 def find_srdf(urdf: Path, robot: str) -> Path | None:
-    """Return the SRDF of a URDF: named as the file or else as the robot, beside the file or in ../srdf, case ignored; None without one."""
+    """Return the path of the SRDF of a URDF: it has the name of the URDF file, or else that of the robot, and the ending .srdf.
+
+    It is searched in the folder of the URDF and in ../srdf; upper and lower case are equal. Returns None if there is no such file.
+    """
     folders = (urdf.resolve().parent, urdf.resolve().parent.parent / "srdf")
     for name in dict.fromkeys((urdf.stem.lower(), robot.lower())):
         for folder in folders:
@@ -46,7 +54,10 @@ def find_srdf(urdf: Path, robot: str) -> Path | None:
 
 
 def read_srdf(path: Path, tree: Tree) -> Srdf:
-    """Return the content of an SRDF; warns of links, joints and groups that the robot `tree` does not have; raises RobotFileError."""
+    """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have; raises RobotFileError.
+
+    `tree`: links and joints of the robot's URDF.
+    """
     root = read_xml(path)
     if root.tag != "robot":
         root.fail("root element", "this is not an SRDF file", "Its root is <robot name=...>")
@@ -133,7 +144,11 @@ def _to_root(link: str, tree: Tree) -> list[UrdfJoint]:
 
 
 def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:
-    """Return the joints of each part: the groups without subgroups, if every motor is in one of them; else one part `all`."""
+    """Return the parts of the robot: name of the part -> names of the joints whose motors it has.
+
+    The parts are the groups of the SRDF that contain no other group, if every motor is in exactly one of them; else there is one part,
+    "all". `masters`: names of the joints that have a motor. `drives`: the drive of each joint, by name.
+    """
     everything = tuple(masters)
     motors: dict[str, tuple[str, ...]] = {}
     for name, (_, joints) in srdf.groups.items():
@@ -160,7 +175,11 @@ State = dict[str, tuple[Node, float]]  # joint -> its line in the SRDF, and its 
 
 @dataclass(frozen=True, slots=True)
 class Home:
-    """A pose of joints with its name; `meant`: it is named home or was requested, so that a value beyond the limits is an error."""
+    """A home pose.
+
+    `name`: of the pose. `state`: joint -> its line in the SRDF, and its position [rad or m]. `meant`: whether the pose is named "home" or
+    was requested, so that a position beyond the limits is an error.
+    """
 
     name: str
     state: State
@@ -168,7 +187,11 @@ class Home:
 
 
 def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Collection[str]) -> State:
-    """Return the positions of moving joints in a <group_state>; `elsewhere`: virtual joints, which place the robot in the world."""
+    """Return the positions of the moving joints in a <group_state>: joint -> its line in the SRDF, and its position [rad or m].
+
+    `joints`: of the URDF, by name. `elsewhere`: names of virtual joints, which place the robot in the world; they are skipped. Warns of
+    other names that are not joints of the robot.
+    """
     found: State = {}
     for node in group_state:
         name = node.text("name")
@@ -191,9 +214,11 @@ def _value(node: Node, joint: UrdfJoint) -> float:
 
 
 def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | None) -> Home:
-    """Return the requested pose; without a request, the first of HOMES, else the only pose, else a home without a pose.
+    """Return the home pose of a robot.
 
-    Case is ignored. Raises UnknownName with the valid names.
+    `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero"; None: the pose with the first of the names
+    HOMES ("home", "ready", ...) that the SRDF has, else its only pose, else "zero", a home without positions. `srdf`: path for the message.
+    Upper and lower case are equal. Raises UnknownName with the valid names.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:
@@ -207,7 +232,11 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
 
 
 def homed(motor: Motor, home: Home, moving: list[UrdfJoint]) -> Motor:
-    """Return the motor with its home from a pose of joints; raises RobotFileError if a requested home is out of reach."""
+    """Return a copy of the motor with its home from a pose of the joints; unchanged if the pose has none of the motor's joints.
+
+    `moving`: the joints of the robot. A home beyond the motor's limits raises RobotFileError if `home.meant` is set; else it causes a
+    warning, and home is the nearest limit.
+    """
     for index, scale, offset in motor.joints:
         if moving[index].name not in home.state:
             continue

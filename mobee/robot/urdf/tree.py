@@ -25,7 +25,11 @@ FREE = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UrdfJoint:
-    """A joint with the values of its element; `axis` is a unit vector in the joint's own frame."""
+    """A joint of a URDF.
+
+    `node`: its XML element. `kind`: "revolute", "continuous", "prismatic" or "fixed". `parent`, `child`: names of the links that it
+    connects. `origin`: its frame in the frame of the parent link. `axis`: (3,) unit vector in the joint's own frame.
+    """
 
     node: Node
     name: str
@@ -38,7 +42,10 @@ class UrdfJoint:
 
 @dataclass(slots=True, eq=False)
 class Tree:
-    """Links and joints by name; `root` is the link that no joint moves."""
+    """The links (as XML elements) and joints of a URDF, by name.
+
+    `root`: the link that no joint moves. `below`: link -> the joints that it carries, in the order of the file.
+    """
 
     root: str
     links: dict[str, Node]
@@ -46,7 +53,7 @@ class Tree:
     below: dict[str, list[UrdfJoint]] = field(default_factory=dict)  # parent link -> its joints in the order of the file
 
     def walk(self) -> Iterator[UrdfJoint]:
-        """Yield every joint, parents first, depth first, siblings in the order of the file."""
+        """Yield every joint in depth-first order: a joint before those that it carries, and siblings in the order of the file."""
         stack = list(reversed(self.below.get(self.root, ())))
         while stack:
             joint = stack.pop()
@@ -77,7 +84,7 @@ def read_tree(robot: Node) -> Tree:
 
 
 def read_name(node: Node, attribute: str = "name") -> str:
-    """Return the name in an attribute; raises RobotFileError if it is empty, blank, or longer than LONGEST_NAME."""
+    """Return the name in an attribute; raises RobotFileError if it is empty, blank, or longer than LONGEST_NAME (200) letters."""
     name = node.text(attribute)
     if len(name) > LONGEST_NAME:
         node.fail(attribute, f"{shown(name)!r} has {len(name)} letters", f"Give it a name of at most {LONGEST_NAME}")

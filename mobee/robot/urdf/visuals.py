@@ -19,7 +19,10 @@ MOST_VISUALS = 2000
 
 
 def read_visuals(robot: Node, tree: Tree, skeleton: Skeleton) -> tuple[Visual, ...]:
-    """Return the visuals of all links; warns, in one line each, of elements that cannot be drawn."""
+    """Return the visuals of all links of a URDF; an element that cannot be drawn causes a warning (`Simplified`) of one line.
+
+    `robot`: the root element. `skeleton`: the tree at zero pose.
+    """
     materials = _materials(robot)
     found: list[Visual] = []
     for link, index in skeleton.index.items():

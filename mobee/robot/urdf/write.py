@@ -24,13 +24,19 @@ from mobee.robot.xml.pairs import role_elements
 
 @dataclass(slots=True)
 class GeometryWriter:
-    """Writes shapes of one robot as URDF elements; `folder`: for meshes, created for the first mesh."""
+    """Writes the shapes of one robot as URDF elements.
+
+    `folder`: for the files of meshes; it is created for the first mesh. `written`: number of meshes that were written.
+    """
 
     folder: Path
     written: int = 0
 
     def solid(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
-        """Add a solid to a link with its frame at `point` (root frame); a capsule is written as a cylinder and two spheres."""
+        """Add a solid to the element `link`; a capsule is written as a cylinder and two spheres.
+
+        `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes of an element <mobee>; empty: no such element.
+        """
         for name, part in _parts(shape):
             geometry = self._geometry(part)
             for tag in ("visual", "collision"):
@@ -41,7 +47,10 @@ class GeometryWriter:
                 ET.SubElement(element, "mobee", note)
 
     def field(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
-        """Write a field, which URDF cannot express, as a note."""
+        """Add a field to the element `link`, as an element <mobee>, because URDF has no element for fields.
+
+        `point`: (3,) m, origin of the link's frame in the root frame. `note`: further attributes of the element.
+        """
         element = ET.SubElement(link, "mobee", {"field": shape.name} | note)
         _origin(element, shape, point)
         element.append(self._geometry(shape))
@@ -100,9 +109,10 @@ Master = tuple[int, float, float]  # joint, scale, offset
 def write_urdf(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a URDF file x.urdf and return its path; beside it, write x.srdf and, for convex shapes, the folder x_meshes.
 
-    Every link's frame is at its joint, with the orientation of the root frame at zero pose. The first joint of a motor represents it; the
-    others mimic that joint. Markers are links on fixed joints. `load_robot` reads the file as the same robot, except for the clauses,
-    and for convex shapes of more than 64 vertices, which it encloses. Raises InvalidValue for a joint that no motor or several drive.
+    Every link's frame is at its joint, with the orientation of the root frame at zero pose. One joint represents each motor: the first
+    that moves as the motor does, else its first joint; the motor's other joints mimic it. Markers are links on fixed joints. `load_robot`
+    reads the file as the same robot, but without the clauses, and with an enclosing hull of at most 64 corners for each convex shape
+    with more. Raises InvalidValue for a joint that no motor or several drive.
     """
     path = Path(path)
     drives_of(robot)  # raises for a joint without a master
@@ -218,9 +228,9 @@ def _write_pairs(robot: Robot, root: ET.Element) -> None:
 
 
 def inertial_element(body: Body, point: Array) -> ET.Element:
-    """Return the <inertial> of a link whose frame is at `point` (3,) m, without rotation.
+    """Return the <inertial> element of a link whose frame is at `point` (3,) m in the root frame, without rotation.
 
-    URDF requires moments of inertia: a body without them gets those of a ball of water of its mass, marked as assumed.
+    URDF requires moments of inertia: a body without them gets those of a ball of water of its mass, and the element is marked as assumed.
     """
     element = ET.Element("inertial")
     ET.SubElement(element, "origin", xyz=numbers(body.centre - point), rpy="0 0 0")

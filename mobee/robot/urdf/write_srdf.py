@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes an SRDF: groups, home and disabled pairs; adds disabled pairs to an existing one."""
+"""Writes an SRDF file with groups, home and disabled pairs, and adds disabled pairs to an existing SRDF file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ from mobee.robot.xml.node import Node, read_xml
 
 
 def write_srdf(robot: Robot, masters: Sequence[tuple[int, float, float]], path: Path) -> None:
-    """Write the SRDF; `masters`: for each motor the joint that represents it in the URDF, with scale and offset."""
+    """Write an SRDF file with the robot's parts as groups, its home pose, and its disabled and enabled pairs of links.
+
+    `masters`: for each motor (index of the joint that represents it in the URDF, scale, offset), with joint = scale * motor + offset.
+    """
     root = ET.Element("robot", name=robot.name)
     for part in robot.parts.values():
         group = ET.SubElement(root, "group", name=part.name)
@@ -46,10 +49,10 @@ _END = re.compile(rb"[ \t]*</robot\s*>")
 
 
 def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tuple[str, str, str]]) -> None:
-    """Write an SRDF with <disable_collisions> for pairs of links, (link1, link2, reason); the file is complete or unchanged.
+    """Write an SRDF file with <disable_collisions> for `pairs` of links, each (link1, link2, reason); the file is complete or unchanged.
 
-    `base`: an SRDF whose text is kept word for word, before the new lines; None: a new one for the robot `name`.  Raises
-    RobotFileError if lines cannot be added to that text, or if the file cannot be written.
+    `base`: an existing SRDF whose text is kept word for word, with the new lines before its end; None: a new file for the robot `name`.
+    Raises RobotFileError if lines cannot be added to that text, or if the file cannot be written.
     """
     lines = [f"<disable_collisions link1={quoteattr(a)} link2={quoteattr(b)} reason={quoteattr(why)}/>" for a, b, why in pairs]
     text = _merged(base, lines) if base is not None else _begun(name, lines)
@@ -73,7 +76,7 @@ def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tup
 
 
 def disabled_and_enabled(path: Path) -> tuple[set[NamePair], set[NamePair]]:
-    """Return the pairs of links in the <disable_collisions> and in the <enable_collisions> of an SRDF; raises RobotFileError."""
+    """Return the pairs of links in <disable_collisions>, and those in <enable_collisions>, of an SRDF file; raises RobotFileError."""
     root = read_xml(path)
     return _pairs(root, "disable_collisions"), _pairs(root, "enable_collisions")
 

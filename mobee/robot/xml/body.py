@@ -19,7 +19,7 @@ HEAVIEST = 1e6  # kg
 
 
 def read_mass(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <mass>; several on one link add up."""
+    """Read a <mass> and add it to the draft; several masses on one link are added up later. Raises RobotFileError."""
     mass = node.positive("value", unit="kilograms")
     if mass > HEAVIEST:
         node.fail("value", f"{mass:g} is too large", "Masses are in kilograms")
@@ -33,7 +33,10 @@ FLAT = 1e-6  # a hull thinner than this part of its length has no inside that a 
 
 
 def read_convex(node: Node) -> Volume:
-    """Return the volume of a <convex>: `points` (x y z each, in m) about its centre, rotated like a box; raises RobotFileError."""
+    """Return the volume of a <convex> element, whose attribute `points` has x y z [m] of each corner relative to its centre.
+
+    Its rotation is computed as that of a <box>. Raises RobotFileError for too few or too many points, or points in one plane.
+    """
     numbers = node.numbers("points")
     if len(numbers) % 3 or not 4 <= len(numbers) // 3 <= MOST_POINTS:
         node.fail("points", f"has {len(numbers)} numbers", f"Write x y z of 4 to {MOST_POINTS} points, separated by blanks")
@@ -48,7 +51,10 @@ MOST_SHAPES = 2000  # the number of tested pairs grows with the square
 
 
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
-    """Add the cylinders that `radius` and `field` of a link or joint describe."""
+    """Add to the draft the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
+
+    Both are cylinders. `centre`: (3,) m, root frame. `axis`: (3,), of any length. `length`: m. Raises RobotFileError.
+    """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
             continue
@@ -70,7 +76,7 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
-    """Add the solid or field of a <sphere>, <capsule>, <cylinder>, <box> or <convex>."""
+    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; raises RobotFileError."""
     volume = read_convex(node) if node.tag == "convex" else read_volume(node)
     name = node.optional("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
     if name in draft.shape_names:
@@ -84,7 +90,7 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
 
 
 def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
-    """Append a shape, and record its line, its element and whether it belongs to the base."""
+    """Add a shape to the draft, with its line, its element and whether it belongs to the base; RobotFileError for too many shapes."""
     if len(draft.shapes) >= MOST_SHAPES:
         node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
     if place.base:
@@ -96,7 +102,7 @@ def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
 
 
 def free_name(draft: Draft, name: str) -> str:
-    """Return the name, with a number appended if a shape has it already."""
+    """Return the name, with a number appended if a shape of the draft already has it."""
     free = name
     while free in draft.shape_names:
         free = f"{name}_{draft.shape_names[name]}"
@@ -105,7 +111,11 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <marker>.  The default normal is the z axis of its rotation, or +x; the default rotation turns z to the normal."""
+    """Read a <marker> and add it to the draft; raises RobotFileError.
+
+    Without a normal in the file the normal is the z axis of the marker's rotation, or +x if there is no rotation either. Without a
+    rotation in the file it is the smallest rotation that turns z to the normal.
+    """
     name = node.text("name")
     if name in draft.markers:
         node.fail("name", f"a second marker {name!r}", "Rename one of the two")
@@ -121,7 +131,10 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
 
 
 def read_rotation(node: Node) -> Array:
-    """Return the matrix (3, 3) of the attribute `rotation`, nine numbers row by row; raises RobotFileError."""
+    """Return the rotation (3, 3) in the attribute `rotation`, nine numbers row by row, corrected for the rounding in the file.
+
+    Raises RobotFileError if it is not a rotation matrix.
+    """
     rotation: Array = np.array(node.numbers("rotation", 9)).reshape(3, 3)
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-4 or np.linalg.det(rotation) < 0:
         node.fail("rotation", "is not a rotation matrix", "Write a right-handed orthonormal 3 x 3 matrix row by row")

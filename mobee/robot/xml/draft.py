@@ -16,7 +16,14 @@ from mobee.robot.xml.node import Node
 
 @dataclass(slots=True)
 class Draft:
-    """The elements read so far."""
+    """The elements of a robot file that were read so far; indices as in `mobee.robot.robot.Robot`.
+
+    `subtree`: for each link, the element whose noSelfCollision includes it, -1: none. `drives`: for each joint, its XML element and the
+    name of its motor. `parts`: name -> its XML elements. `hands`: elements with noSelfCollision -> their names in reasons. `hosts`: for
+    each shape, its element. `shape_names`: name -> how many more shapes were named after it. `hides`: camera -> its XML element, and the
+    names of the links that it does not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements.
+    `others`: included robots, with the XML elements that include them. `where`: (kind, name) -> "file:line".
+    """
 
     links: list[str] = field(default_factory=lambda: ["base"])
     subtree: list[int] = field(default_factory=lambda: [-1])  # for each link the element whose noSelfCollision holds for it
@@ -41,13 +48,19 @@ class Draft:
     where: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def note(self, kind: str, name: str, node: Node) -> None:
-        """Record file and line of an element, the first time it is read."""
+        """Record file and line of an element in `where`, unless an element of this kind and name is recorded already."""
         self.where.setdefault((kind, name), f"{node.file}:{node.line}")
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The position of the reader in the tree: two points, link, part, motor, and the element whose noSelfCollision applies."""
+    """The position of the reader in the tree of a file.
+
+    `point`: (3,) m, root frame, the end of the current <link>, at which its links and joints are attached. `start`: (3,) m, its start, to
+    which shapes and markers are relative. `link`: index of the robot's link. `carrier`: inside a joint, the link that carries the joint,
+    else the same link; elements with turns="false" belong to it. `part`, `motor`: names, "": none. `subtree`: element whose
+    noSelfCollision applies, -1: none. `base`: whether shapes belong to the base. `element`: index of the current element.
+    """
 
     point: Array  # (3,) m, the end of a link, where its links and joints are attached
     start: Array  # (3,) m, the start of a link, to which shapes and markers are relative
@@ -61,7 +74,10 @@ class Place:
 
 
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
-    """Return the place inside a link or joint; `name`: of the element, in the reasons for excluded pairs."""
+    """Add a <link> or <joint> to the elements of the draft and return the position of the reader inside it.
+
+    `place`: position outside it. `name`: of the element, for the reasons of excluded pairs.
+    """
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:
         draft.hands[index] = name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens XML files: refuses missing, too large and hostile ones, and repairs faults that the readers of 2010 to 2014 accepted."""
+"""Opens XML files; refuses missing, too large and hostile files, and repairs faults that the programs of 2010 to 2014 accepted."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ CONFLICT = (b"<<<<<<<", b"=======", b">>>>>>>")
 
 
 class MalformedXml(RobotFileError):
-    """Raised for a file that is not well-formed XML; has line and column, counted from 1, and the message of the parser."""
+    """Raised for a file that is not well-formed XML.
+
+    `line`, `column`: of the fault, counted from 1. `problem`: the message of the parser.
+    """
 
     def __init__(self, message: str, line: int, column: int, problem: str) -> None:
         super().__init__(message)
@@ -54,12 +57,12 @@ class LineHandler(xml.sax.handler.ContentHandler):
         return (self._locator.getLineNumber() or 1) if self._locator else 1
 
     def setDocumentLocator(self, locator: xml.sax.xmlreader.Locator) -> None:
-        """Called by sax before anything else."""
+        """Store the locator, from which `line` is read; the SAX parser calls this before all other methods."""
         self._locator = locator
 
 
 def is_file(path: Path) -> bool:
-    """Return whether the file exists; False for a name that no file can have."""
+    """Return whether the path is an existing file; False, not an error, for a name that no file can have."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -67,7 +70,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether the folder exists; False for a name that no folder can have."""
+    """Return whether the path is an existing folder; False, not an error, for a name that no folder can have."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -75,7 +78,7 @@ def is_folder(path: Path) -> bool:
 
 
 def parse_xml(path: Path, handler: LineHandler) -> None:
-    """Send the elements of an XML file to `handler`.
+    """Parse an XML file and send its elements to the SAX handler `handler`.
 
     Entities and external references are refused (they can exhaust memory or read other files).
     Raises RobotFileError when the file is missing, not a regular file, larger than 8 MB, not XML or hostile.
@@ -84,7 +87,11 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
 
 
 def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
-    """Send the elements of the content of an XML file to `handler`; raises the errors of `parse_xml`."""
+    """Parse an XML text and send its elements to the SAX handler `handler`.
+
+    `content`: the bytes of the file. `path`: of the file, for messages. Raises RobotFileError if the content is not XML or hostile
+    (entities and external references).
+    """
     try:
         defusedxml.sax.parseString(content, handler)
     except defusedxml.DefusedXmlException as error:
@@ -107,7 +114,7 @@ def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
 
 
 def read_content(path: Path) -> bytes:
-    """Return the bytes of a file of at most 8 MB; raises the errors of `parse_xml`."""
+    """Return the bytes of a file; raises RobotFileError if it is missing, not a regular file, or larger than 8 MB."""
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             reason = os.strerror(21) if path.is_dir() else "Not a regular file"
@@ -129,7 +136,10 @@ _ATTRIBUTE = re.compile(rb"""\s*([\w:.-]+)\s*=\s*("[^"<]*"|'[^'<]*')""")
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """A repair of a file: its line, the change, the remedy, and the error that the file would cause without it."""
+    """A repair of a faulty file.
+
+    `line`: of the fault. `what`: the change, in words. `remedy`: for the user. `error`: the error that the file would cause without it.
+    """
 
     line: int
     what: str
@@ -146,7 +156,11 @@ class Mended:
 
 
 def mend(content: bytes, error: RobotFileError) -> Mended | None:
-    """Return the content without the fault that a parser reported; None if the programs of 2010 to 2014 refused the file too."""
+    """Repair the fault that a parser reported and return the changed content.
+
+    `content`: the bytes of the file. Only two faults are repaired, which the programs of 2010 to 2014 accepted: an attribute that is given
+    twice, and bytes that are not UTF-8. Returns None for all others.
+    """
     if not isinstance(error, MalformedXml):
         return None
     if error.problem == "duplicate attribute":

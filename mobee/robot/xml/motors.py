@@ -18,7 +18,11 @@ NARROWEST = 1e-6  # deg or m between the limits of a motor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotorDraft:
-    """A motor as written in its element, before its joints are known; positions in the unit of the file."""
+    """A motor as written in its element, before its joints are known.
+
+    `part`: name of its part. `index`: its position within the part. `low`, `high`, `home`: limits and home, in m if `in_metres`, else in
+    degrees.
+    """
 
     node: Node
     name: str
@@ -30,12 +34,12 @@ class MotorDraft:
     in_metres: bool = False  # unit="m", of a motor that slides; else degrees
 
     def si(self, value: float) -> float:
-        """Return a number of the file in rad or m."""
+        """Convert a position, velocity or acceleration of this motor from the unit of the file to rad or m."""
         return value if self.in_metres else float(np.deg2rad(value))
 
 
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
-    """Return the motor of a <motor>; `count`: motors before it."""
+    """Return the motor that a <motor> element describes; `count`: number of motors before it. Raises RobotFileError."""
     low, high = node.number("minPos"), node.number("maxPos")
     unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")
     if low == high:
@@ -55,7 +59,10 @@ def read_motor(node: Node, part: str, count: int) -> MotorDraft:
 
 
 def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:
-    """Return all motors, part by part in the order of the file, within a part by idx; raises RobotFileError for equal idx."""
+    """Return all motors in the order of q: part by part in the order of `parts`, and within a part by the attribute idx.
+
+    Raises RobotFileError if two motors of a part have the same idx.
+    """
     ordered = []
     for part in parts:
         mine = sorted((motor for motor in motors.values() if motor.part == part), key=lambda motor: motor.index)
@@ -69,7 +76,11 @@ def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list
 def finish_joints(
     joints: Sequence[Joint], drives: Sequence[tuple[Node, str]], motors: Sequence[MotorDraft]
 ) -> tuple[tuple[Joint, ...], tuple[Motor, ...]]:
-    """Return joints with limits in SI units, and motors, each with the affine map of its range onto the joint's range (thesis 2.3.1)."""
+    """Return the finished joints and motors: joints with limits in SI units, motors with the affine maps to their joints (thesis 2.3.1).
+
+    Each map takes the motor's range to the joint's range. `drives`: for each joint, its element and the name of its motor. `motors`: in
+    the order of q. Raises RobotFileError for an unknown motor, a motor without a joint, and a joint that cannot move.
+    """
     places = {motor.name: k for k, motor in enumerate(motors)}
     driven: list[list[tuple[int, float, float]]] = [[] for _ in motors]
     finished = []
@@ -107,9 +118,10 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
 
 
 def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
-    """Return a <constraintList> as a clause; a row is satisfied when a.q + b > 0, or when this is below 0 with `negate`.
+    """Return a <constraintList> as a clause; its row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0.
 
-    The attribute `q` of a row holds the names of motors of the part, or their numbers within it.
+    The attribute `q` of a row contains the names of motors of the part, or their numbers within the part. `motors`: the names of all motors
+    of the robot, in the order of q. Raises RobotFileError.
     """
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):

@@ -31,7 +31,10 @@ FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no":
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """One element: tag in lower case, attributes, children, file and line."""
+    """An XML element: tag in lower case, attributes as text, children, file and line.
+
+    `repairs`: of a root element only, the repaired faults in the form of the file.
+    """
 
     file: Path
     line: int
@@ -44,11 +47,14 @@ class Node:
         return iter(self.children)
 
     def fail(self, what: str, problem: str, remedy: str) -> NoReturn:
-        """Raise RobotFileError with file, line, field, problem and remedy."""
+        """Raise RobotFileError for this element, with file and line; `what`: the faulty attribute or field."""
         raise RobotFileError(f"{self.file}:{self.line}: <{shown(self.tag)}> {what}: {problem}. {remedy}")
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Return a finite number, in the unit of the file; without a default the attribute is required."""
+        """Return the number in the attribute `name`, in the unit of the file; `default` if it is absent.
+
+        Raises RobotFileError if it is not a finite number, or if it is absent without a default.
+        """
         if name not in self.attributes:
             if default is None:
                 self.missing(name)
@@ -56,7 +62,7 @@ class Node:
         return self.finite(name, self.attributes[name])
 
     def finite(self, name: str, text: str) -> float:
-        """Return a finite number from the text of attribute `name`."""
+        """Convert a text of the attribute `name` to a number; raises RobotFileError if it is not a finite number, at most 1e18."""
         try:
             value = float(text)
         except ValueError:
@@ -70,41 +76,50 @@ class Node:
         return value
 
     def positive(self, name: str, default: float | None = None, unit: str = "metres") -> float:
-        """Return a number above zero."""
+        """Return the number in the attribute `name`; `default` if it is absent. Raises RobotFileError unless it is above zero.
+
+        `unit`: of the number, for the message.
+        """
         value = self.number(name, default)
         if value < SMALLEST:
             self.fail(name, f"{value:g} is {'not positive' if value <= 0 else 'too small'}", f"Write a value above 0, in {unit}")
         return value
 
     def vector(self, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-        """Return three numbers from three attributes; `default` if none of them is given, 0 for single absent ones."""
+        """Return three numbers (3,) from three attributes; `default` if all three are absent, 0 for a single one that is absent."""
         if not any(name in self.attributes for name in names):
             return np.array(default)
         return np.array([self.number(name, 0.0) for name in names])
 
     def numbers(self, name: str, count: int | None = None) -> list[float]:
-        """Return a list of numbers separated by blanks or commas, of the given length."""
+        """Return the numbers in the attribute `name`, which are separated by blanks or commas; the attribute is required.
+
+        Raises RobotFileError if there are not `count` numbers; None: any number of them.
+        """
         values = [self.finite(name, word) for word in self.words(name)]
         if count is not None and len(values) != count:
             self.fail(name, f"has {len(values)} numbers", f"Write {count} numbers separated by blanks")
         return values
 
     def words(self, name: str) -> list[str]:
-        """Return a required list of words separated by blanks or commas."""
+        """Return the words in the attribute `name`, which are separated by blanks or commas; raises RobotFileError if it is absent."""
         if name not in self.attributes:
             self.missing(name)
         return self.attributes[name].replace(",", " ").split()
 
     def text(self, name: str) -> str:
-        """Return a required, non-empty text."""
+        """Return the text of the attribute `name`; raises RobotFileError if it is absent or empty."""
         return self.optional(name) or self.missing(name)
 
     def optional(self, name: str) -> str:
-        """Return a text; empty if the attribute is absent."""
+        """Return the text of the attribute `name`; "" if it is absent."""
         return self.attributes.get(name, "").strip()
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Return a boolean."""
+        """Return the boolean in the attribute `name`; `default` if it is absent.
+
+        Valid texts are true, yes, 1, false, no and 0; others raise RobotFileError.
+        """
         if name not in self.attributes:
             return default
         value = self.attributes[name].strip().lower()
@@ -113,33 +128,39 @@ class Node:
         return FLAGS[value]
 
     def choice(self, name: str, given: str, valid: Collection[str], kind: str) -> str:
-        """Return the given name if it is valid; else raise RobotFileError with the nearest one."""
+        """Return the text `given` if it is one of the `valid` ones; else raise RobotFileError with the nearest valid one.
+
+        `name`: of the attribute, and `kind`: what the text names; both are for the message.
+        """
         if given not in valid:
             self.fail(name, f"unknown {kind} {shown(given)!r}", f"{nearest(given, valid)}Valid: {listed(valid)}")
         return given
 
     def missing(self, name: str) -> NoReturn:
-        """Raise RobotFileError for a required attribute that is absent; the message names a similar attribute, perhaps a misspelling."""
+        """Raise RobotFileError because the required attribute `name` is absent; the message names a similar attribute, if there is one."""
         given = sorted(self.attributes)
         near = difflib.get_close_matches(name, given, n=1, cutoff=0.5) if len(given) <= LISTED else []
         remedy = f"Did you misspell it as {near[0]!r}? " if near else ""
         self.fail(name, "is required and missing", f'{remedy}Add {name}="..." (given: {listed(given) if given else "nothing"})')
 
     def check_attributes(self, known: Collection[str]) -> None:
-        """Warn of attributes that the grammar does not know."""
+        """Warn of each attribute of this element that is not one of the `known` names."""
         for name in self.attributes:
             if name not in known:
                 self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
     def warn(self, problem: str, category: type[Warning] = UserWarning) -> None:
-        """Warn with file, line and tag, if there is one."""
+        """Issue a warning about this element, with file, line and tag."""
         tag = f"<{shown(self.tag)}>: " if self.tag else ""
         warnings.warn(f"{self.file}:{self.line}: {tag}{problem}", category, stacklevel=2)
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A note or warning on the interpretation of an element; a warning if the element was not read literally."""
+    """A note or warning on how an element was interpreted.
+
+    `what`: the interpretation. `remedy`: for the user. `severity`: "warning" if the element was not read literally, else "note".
+    """
 
     node: Node
     what: str
@@ -148,26 +169,26 @@ class Remark:
 
 
 def nearest(given: str, valid: Collection[str]) -> str:
-    """Return a sentence that proposes the nearest valid name; empty if none is near."""
+    """Return the text "Did you mean ...? " with the valid name that is most similar to `given`; "" if none is similar."""
     lower = {name.lower(): name for name in valid}
     near = difflib.get_close_matches(given.lower(), lower, n=1) if len(given) <= 100 else []
     return f"Did you mean {lower[near[0]]!r}? " if near else ""
 
 
 def listed(names: Collection[str]) -> str:
-    """Format names, sorted, for a message; of more than LISTED only the first."""
+    """Return names as text for a message, sorted; if there are more than LISTED (40), only the first 40."""
     words = [shown(name) for name in sorted(names)]
     rest = f" and {len(words) - LISTED} more" if len(words) > LISTED else ""
     return (", ".join(words[:LISTED]) or "none") + rest
 
 
 def shown(text: str) -> str:
-    """Shorten a text to 60 characters for a message."""
+    """Return a text for a message, shortened to 60 characters if it is longer."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def descendants(root: Node) -> Iterator[Node]:
-    """Yield a node and everything inside it, in the order of the file."""
+    """Yield a node and all nodes inside it, in the order of the file."""
     waiting = [root]
     while waiting:
         node = waiting.pop()
@@ -176,9 +197,9 @@ def descendants(root: Node) -> Iterator[Node]:
 
 
 def read_xml(path: Path, *, repair: bool = False) -> Node:
-    """Return the root node of an XML file.
+    """Return the root element of an XML file, with all elements inside it.
 
-    `repair`: repair attributes given twice and bytes that are not UTF-8, and list the repairs in the root's `repairs`.
+    `repair`: True: repair attributes that are given twice and bytes that are not UTF-8, and list the repairs in the root's `repairs`.
     Entities and external references are refused (they can exhaust memory or read other files).
     Raises RobotFileError when the file is missing, not XML, hostile, or larger than any robot needs.
     """
@@ -232,7 +253,7 @@ SPELLING = {"zeropositionkinematictree": "ZeroPositionKinematicTree", "constrain
 
 
 def tree_of(node: Node) -> ET.Element:
-    """Return the elements of a node that was read, with tags in the spelling of the grammar."""
+    """Return a node that was read, with all elements inside it, as an ElementTree element; tags get the spelling of the grammar."""
     root = ET.Element(SPELLING.get(node.tag, node.tag), node.attributes)
     waiting = [(node, root)]
     while waiting:
@@ -242,9 +263,9 @@ def tree_of(node: Node) -> ET.Element:
 
 
 def write_tree(root: ET.Element, path: Path, heading: str = "") -> Path:
-    """Write elements with their attributes, one per line, and return the path; `heading` becomes a comment above the root.
+    """Write an XML file, one element per line, and return its path; `heading`: text of a comment above the root element.
 
-    The standard library's writer is recursive and fails beyond some hundred levels; a chain of 500 joints nests deeper.
+    The standard library's writer is recursive and fails beyond some hundred levels; a chain of 500 joints has more.
     The file is complete or unchanged. Raises OSError.
     """
     lines = ['<?xml version="1.0" encoding="utf-8"?>'] + ([f"<!--\n{heading.strip().replace('--', '- -')}\n-->"] if heading else [])

@@ -42,7 +42,11 @@ GENERATION = "VirtualSkin or MoBeE, 2011 to 2014"
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """A sign that a file was written in 2010 to 2014; `certain` if MoBeE 0.1 could not read the file."""
+    """A sign that a file was written for the programs of 2010 to 2014.
+
+    `node`: the element that shows it. `what`: the sign, in words. `generation`: of the programs. `certain`: True if MoBeE 0.1 could not
+    read the file, so that it cannot be a file of MoBeE 0.1.
+    """
 
     node: Node
     what: str
@@ -50,14 +54,14 @@ class Evidence:
     certain: bool = True
 
     def remark(self) -> Remark:
-        """Return a note on the element, which names the generation of programs by whose rules the file is read."""
+        """Return a note for the user that names the programs by whose rules the file is read, and the sign."""
         return Remark(self.node, f"read as a file of {self.generation}, for {self.what}", severity="note")
 
 
 def find_evidence(root: Node) -> Evidence | None:
-    """Return the clearest sign that a robot file was written in 2010 to 2014; None if there is none.
+    """Return the clearest sign that a robot file was written for the programs of 2010 to 2014; None if there is none.
 
-    A sign that shows in which years the file's format was used is preferred. The result is `certain` if any sign in the file is certain.
+    A sign that shows the years of the file's format is preferred. The result is `certain` if any sign in the file is certain.
     """
     found = sorted(_evidence(root), key=lambda one: (one.generation == GENERATION, not one.certain))
     return replace(found[0], certain=any(one.certain for one in found)) if found else None
@@ -88,7 +92,7 @@ def _evidence(root: Node) -> Iterator[Evidence]:
 
 
 def rewrite_original(root: Node) -> list[Remark]:
-    """Rewrite the elements of a robot of 2010 to 2014 into today's grammar, in place; return remarks on their interpretation."""
+    """Rewrite the elements of a robot file of 2010 to 2014 into today's grammar, in place; return remarks for the user on the changes."""
     remarks = [Remark(at_line(root, repair.line), repair.what, repair.remedy) for repair in root.repairs]
     old = any(node.tag == "branch" for node in descendants(root))
     remarks += _rewrite_structure(root, old)
@@ -103,7 +107,7 @@ def rewrite_original(root: Node) -> list[Remark]:
 
 
 def at_line(root: Node, line: int) -> Node:
-    """Return a node for a line of the file that has no element."""
+    """Return an empty node for a line of the file, for remarks on a line without an element."""
     return Node(root.file, line, "", {})
 
 
@@ -349,7 +353,7 @@ def _rewrite_marker(node: Node, taken: Counter[str]) -> list[Remark]:
 
 
 def free_name(name: str, taken: dict[str, Node] | Counter[str]) -> str:
-    """Return the name, with as many _ appended as are necessary to make it unique."""
+    """Return the name, with as many "_" appended as are necessary to make it different from all names in `taken`."""
     while name in taken:
         name += "_"
     return name
@@ -377,5 +381,5 @@ def _mark_base(root: Node) -> None:
 
 
 def vector_texts(names: tuple[str, str, str], vector: Array) -> dict[str, str]:
-    """Return the components of a vector as XML attributes; components that are 0 are left out."""
+    """Return the components of a vector (3,) as XML attributes, name -> text; components that are 0 are left out."""
     return {name: number(float(value)) for name, value in zip(names, vector, strict=True) if value != 0}

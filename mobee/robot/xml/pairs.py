@@ -30,7 +30,10 @@ class _Ignored:
 
 
 def without_ignored(robot: Robot, nodes: Iterable[Node]) -> Robot:
-    """Return the robot without the pairs in <ignore> tags; raises RobotFileError for an unknown link, shape, part or role."""
+    """Return a copy of the robot in which the pairs named in <ignore> elements are not tested for contacts.
+
+    `nodes`: the <ignore> elements. Raises RobotFileError for an unknown link, shape, part or role.
+    """
     names = {
         "links": {name: index for index, name in enumerate(robot.links)},
         "shapes": {shape.name: index for index, shape in enumerate(robot.shapes)},
@@ -89,7 +92,11 @@ Table = NDArray[np.bool_]
 
 
 def ignore_elements(robot: Robot) -> list[ET.Element]:
-    """Return the <ignore> elements of a robot: parts without internal tests, then pairs of links with reasons, then pairs of shapes."""
+    """Return the <ignore> elements that describe which pairs of shapes of the robot are not tested for contacts.
+
+    First come the pairs of links that are never tested, with reasons. Then follow, for solids and for fields: parts without tests among
+    their own shapes, pairs of links, and single pairs of shapes.
+    """
     elements = []
     for pair, reason in robot.untested.items():
         first, second = sorted(pair)
@@ -100,9 +107,10 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the <ignore> elements that exclude the pairs of a role which `robot.untested` does not exclude.
+    """Return the <ignore> elements that exclude pairs of shapes of one role, beyond the pairs of links in `robot.untested`.
 
-    `pairs`: indices of the shapes to be tested with each other. `own`: the rule also tests fields of one part with each other.
+    `role`: "solid" or "field". `pairs`: (p, 2) indices of shapes, the pairs that are tested. `own`: whether the reader of the file also
+    tests fields of one part with each other, so that these need <ignore> elements too.
     """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)

@@ -38,7 +38,10 @@ MOST_ELEMENTS_2014 = 500  # the time of the rules in pairs_2014.py grows faster
 
 
 def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
-    """Return the robot of a complete draft, joined with the robots that it includes; raises RobotFileError."""
+    """Return the robot of a file, joined with the robots that the file includes; raises RobotFileError.
+
+    `root`: the root element. `draft`: all elements of the file. `name`: of the robot.
+    """
     if not draft.parts and not draft.others:
         root.fail("bodypart", "the robot has no body part", 'Put its motors and links inside <bodypart name="...">')
     draft.note("robot", name, root)
@@ -139,9 +142,9 @@ KNOWN = {
 
 
 def read_robot(path: Path) -> Robot:
-    """Return the robot described by a zero-position XML file of any version (see versions.py).
+    """Return the robot described by a zero-position XML file of any version (`mobee.robot.xml.versions`).
 
-    Lengths in the file are in [m], angles in [deg]; everything in the Robot is in SI units, root frame, zero pose.
+    Lengths in the file are in m, angles in degrees; everything in the Robot is in SI units (rad), in the root frame at zero pose.
     Raises RobotFileError with file, line, field and remedy; warns of elements that it ignores and faults that it repairs.
     """
     return _read(path, Trail())
@@ -303,21 +306,25 @@ def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
 
 @dataclass(slots=True)
 class Trail:
-    """The chain of files that include each other down to the current one, and all files read so far."""
+    """The files that are being read when robots include other robots.
+
+    `files`: the chain of files from the first one to the current one, each of which includes the next. `counted`: all files read so far.
+    """
 
     files: tuple[Path, ...] = ()
     counted: list[Path] = field(default_factory=list)
 
     def into(self, path: Path) -> Trail:
-        """Return the trail inside a file."""
+        """Return the trail with the file `path` as the current one, and count the file."""
         self.counted.append(path)
         return Trail((*self.files, path.resolve()), self.counted)
 
 
 def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot]) -> Placed:
-    """Return the robot of a <robot> and its pose: at (px, py, pz), z turned to (hx, hy, hz), then turned by `angle` about that axis.
+    """Read the file that a <robot> element includes, and return its robot with the prefix of its names and its pose.
 
-    `read`: reads the file. Raises RobotFileError if the file is not found or includes itself, or if there are too many files.
+    The pose has the position (px, py, pz); its rotation turns z to (hx, hy, hz), then by `angle` about this axis. `read`: the function that
+    reads a zero-position XML file. Raises RobotFileError if the file is not found or includes itself, or if there are too many files.
     """
     prefix = node.optional("name")
     if prefix and not re.fullmatch("[a-z0-9_]+", prefix):

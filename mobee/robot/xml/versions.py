@@ -5,7 +5,7 @@
 | --- | --- |
 | 2.0 | today's (robots/README.md) |
 | 0.1 | MoBeE 0.1 |
-| 1.0, or none | the programs of 2010 to 2014, or MoBeE 0.1 where a tag or an attribute shows it, for it wrote 1.0 too |
+| 1.0, or none | the programs of 2010 to 2014; or MoBeE 0.1, if a tag or an attribute shows it, because MoBeE 0.1 wrote 1.0 too |
 
 MoBeE 0.1 differs from today in three rules: elements inside a <link> were placed relative to the link's end, the smallest rotation turned
 a box to its height axis, and a marker without a normal had +z. original.py lists the differences of the older programs.
@@ -58,9 +58,10 @@ class _Change:
 
 
 def upgrade_robot(root: Node) -> list[Remark]:
-    """Rewrite a robot's elements into today's grammar, in place; return remarks on their interpretation.
+    """Rewrite the elements of a robot file of any version into today's grammar, in place; return remarks for the user on the changes.
 
-    Raises RobotFileError for an unknown version, and for a fault of form in a file that is not of 2010 to 2014.
+    `root`: the root element. Raises RobotFileError for an unknown version. A fault that was repaired is accepted only in a file of 2010 to
+    2014; in other files it raises RobotFileError.
     """
     version, remarks, is_certain = _version(root)
     if version == "1.0":
@@ -75,7 +76,11 @@ def upgrade_robot(root: Node) -> list[Remark]:
 
 
 def upgrade_world(root: Node) -> list[Remark]:
-    """Rewrite a world's elements into today's grammar, in place; return remarks on their interpretation; errors: see upgrade_robot."""
+    """Rewrite the elements of a world file of any version into today's grammar, in place; return remarks for the user on the changes.
+
+    `root`: the root element. Raises RobotFileError for an unknown version. A fault that was repaired is accepted only in a <WorldList> of
+    2011 to 2014; in other files it raises RobotFileError.
+    """
     if root.tag == "worldlist":
         remarks = rewrite_world_list(root)
     else:
@@ -183,7 +188,7 @@ def _turned(node: Node) -> Iterator[_Change]:
 
 
 def report(remarks: list[Remark]) -> None:
-    """Warn, with OlderVersion, of everything in a file that was not read literally."""
+    """Issue a warning (`OlderVersion`) for each remark of severity "warning", that is, for each element that was not read literally."""
     for remark in remarks:
         if remark.severity == "warning":
             remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)

@@ -28,7 +28,7 @@ NARROWEST, WIDEST = 1.0, 170.0  # degrees
 
 
 def read_visual(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <visual>: a mesh file, or a shape with its size in m."""
+    """Read a <visual>, which is a mesh file or a shape with its size in m, and add it to the draft; raises RobotFileError."""
     rotation = read_rotation(node) if "rotation" in node.attributes else np.eye(3)
     link = place.link if node.flag("turns", default=True) else place.carrier
     kind: VisualKind = "mesh"
@@ -57,7 +57,10 @@ def _color(node: Node) -> Channels | None:
 
 
 def read_camera(node: Node, draft: Draft, place: Place) -> None:
-    """Add a <camera>: it looks along its normal with the picture upright at zero pose, or as its rotation says."""
+    """Read a <camera> and add it to the draft; raises RobotFileError.
+
+    The camera has the rotation of the file; without a rotation it looks along its normal, with the picture upright at zero pose.
+    """
     name = node.text("name")
     if name in draft.cameras:
         node.fail("name", f"a second camera {name!r}", "Rename one of the two")
@@ -75,7 +78,10 @@ def read_camera(node: Node, draft: Draft, place: Place) -> None:
 
 
 def finished_cameras(draft: Draft) -> dict[str, Camera]:
-    """Return the cameras with the links that they hide; raises RobotFileError for a link that the robot does not have."""
+    """Return the cameras of a complete draft, by name, each with the links that are not drawn in its pictures (`Camera.hidden`).
+
+    Raises RobotFileError for a link that the robot does not have.
+    """
     found = {}
     for name, camera in draft.cameras.items():
         node, links = draft.hides[name]
@@ -85,7 +91,10 @@ def finished_cameras(draft: Draft) -> dict[str, Camera]:
 
 
 def visual_elements(robot: Robot, link: int, origin: Array, path: Path) -> Iterable[ET.Element]:
-    """Yield the <visual> and <camera> tags of a link whose start is at `origin` (3,) m; `path`: of the file that will hold them."""
+    """Yield the <visual> and <camera> elements of a link.
+
+    `link`: its index. `origin`: (3,) m, root frame, the start of the link's element. `path`: of the file into which they are written.
+    """
     for visual in robot.visuals:
         if visual.link == link:
             what = _mesh(visual.mesh, path) if visual.mesh else {"shape": visual.kind, "size": numbers(visual.size)}

@@ -30,7 +30,11 @@ KINDS: dict[str, ShapeKind] = {"sphere": "sphere", "capsule": "capsule", "cylind
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Volume:
-    """A volume of a file: kind, size, vertices as in `Shape`; centre (3,) m and rotation (3, 3), relative to its parent point."""
+    """A volume as a file describes it.
+
+    `kind`, `size`, `vertices`: as in `mobee.robot.robot.Shape`. `centre` (3,) m and `rotation` (3, 3): along the axes of the root frame;
+    the centre is relative to the start of the link or joint that contains the volume.
+    """
 
     kind: ShapeKind
     size: tuple[float, ...]
@@ -40,7 +44,7 @@ class Volume:
 
 
 def read_volume(node: Node) -> Volume:
-    """Return the volume of a <sphere>, <capsule>, <cylinder> or <box>; raises RobotFileError."""
+    """Return the volume that a <sphere>, <capsule>, <cylinder> or <box> element describes; raises RobotFileError."""
     centre = node.vector(PLACE)
     kind = KINDS[node.tag]
     if kind == "sphere":
@@ -53,15 +57,19 @@ def read_volume(node: Node) -> Volume:
 
 
 def box_rotation(node: Node) -> Array:
-    """Return the rotation (3, 3) of a box: height along (hx, hy, hz), or y if these are absent, then turned by `angle` [deg] about it."""
+    """Return the rotation (3, 3) that a <box> or <convex> element describes.
+
+    The height of the box (its y axis) is along (hx, hy, hz), or along y if these are absent; then the box turns by `angle` [deg] about it.
+    """
     return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
 
 
 def height_along(axis: Array, angle: float) -> Array:
-    """Return the rotation (3, 3) of a box with its height along the unit vector `axis`, as computed by the program of 2014.
+    """Return the rotation (3, 3) of a box with its height (y axis) along the unit vector `axis` (3,), as computed by the program of 2014.
 
-    The box turns about y by the angle between x and the axis seen along y (0 to 180 deg), then about the common normal of y and the
-    axis until its height lies along the axis, then by `angle` [rad] about the axis. Along -y it turns half a turn about x.
+    The box first turns about y by the angle between x and the projection of the axis onto the xz plane (0 to 180 deg). Then it turns about
+    the common normal of y and the axis until its height is along the axis. Last it turns by `angle` [rad] about the axis. For an axis
+    along -y the first two rotations are replaced by half a turn about x.
     """
     sideways = float(np.hypot(axis[0], axis[2]))
     if sideways <= UPRIGHT:
@@ -72,7 +80,10 @@ def height_along(axis: Array, angle: float) -> Array:
 
 
 def height_and_angle(rotation: Array) -> tuple[Array, float]:
-    """Return the unit vector (3,) and the angle [rad] for which `height_along` returns the rotation of the same box."""
+    """Return the axis (unit vector (3,)) and the angle [rad] for which `height_along` places a box as `rotation` (3, 3) does.
+
+    The rotation may differ by half a turn that does not change the box.
+    """
     if rotation[1, 1] < HALFWAY:
         rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
     axis: Array = rotation[:, 1]
@@ -80,13 +91,16 @@ def height_and_angle(rotation: Array) -> tuple[Array, float]:
 
 
 def angle_about(axis: Array, rotation: Array) -> float:
-    """Return the angle [rad] about a unit vector (3,) for which `height_along` is nearest to `rotation` (3, 3)."""
+    """Return the angle [rad] for which the rotation `height_along(axis, angle)` is nearest to `rotation` (3, 3); `axis` (3,): unit."""
     rest = height_along(axis, 0.0).T @ rotation
     return float(np.arctan2(rest[0, 2] - rest[2, 0], rest[0, 0] + rest[2, 2]))
 
 
 def link_step(node: Node) -> tuple[Array, float]:
-    """Return the vector (3,) m from start to end of a <link>, and its length [m]: (x, y, z), or `length` along this direction."""
+    """Return the vector (3,) m from start to end of a <link> element, and its length [m].
+
+    The vector is (x, y, z) of the element; with the attribute `length` it is scaled to this length.
+    """
     step = node.vector(STEP)
     if "length" in node.attributes:
         length = node.positive("length")
@@ -95,7 +109,10 @@ def link_step(node: Node) -> tuple[Array, float]:
 
 
 def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-    """Return the unit vector along three attributes; raises RobotFileError if all are 0."""
+    """Return the unit vector (3,) along the vector in three attributes, or along `default` if all three are absent.
+
+    Raises RobotFileError if the vector is 0.
+    """
     vector = node.vector(names, default)
     length = float(np.linalg.norm(vector))
     if length < 1e-9:
@@ -104,7 +121,11 @@ def direction(node: Node, names: tuple[str, str, str], default: tuple[float, flo
 
 
 def align(source: Array, target: Array) -> Array:
-    """Return the smallest rotation (3, 3) of one unit vector to another; half a turn about x (or z) if they are opposite."""
+    """Return the smallest rotation (3, 3) that turns the unit vector `source` (3,) to the unit vector `target` (3,).
+
+    For opposite vectors it is half a turn about x, or about z if the x component of `source` is 0.5 or more. This is right only if `source`
+    is perpendicular to that axis.
+    """
     cosine = float(source @ target)
     if cosine < -0.9:  # the division below would lose all but the first digits
         axis = np.cross(source, target)
@@ -117,12 +138,12 @@ def align(source: Array, target: Array) -> Array:
 
 
 def turn_about(axis: Array, angle: float) -> Array:
-    """Return the rotation (3, 3) about a unit axis by an angle in [rad]."""
+    """Return the rotation (3, 3) about the unit vector `axis` (3,) by `angle` [rad]."""
     cross = skew(axis)
     turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return turn
 
 
 def skew(v: Array) -> Array:
-    """Return the matrix (3, 3) of the cross product with v."""
+    """Return the matrix (3, 3) whose product with a vector w is the cross product of v (3,) and w."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

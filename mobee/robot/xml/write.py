@@ -27,8 +27,8 @@ DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 def write_xml(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a zero-position XML file (robots/README.md) and return its path.
 
-    Reading it gives the same kinematics, motors, parts, shapes, pairs, markers, masses, clauses, visuals and cameras; meshes stay where
-    they are, and the file names them. The order of shapes may differ, and the axes of a convex shape are then those of the root frame.
+    Reading the file gives the same kinematics, motors, parts, shapes, pairs, markers, masses, clauses, visuals and cameras. The files of
+    meshes are not copied: the new file names them. The order of shapes may differ, and a convex shape gets the axes of the root frame.
     Raises InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
@@ -49,10 +49,10 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
 
 
 def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
-    """Write a robot or world file of an older version in today's form, element by element; return remarks on its interpretation.
+    """Write the robot or world file `source` of an older version in today's form to `target`; return remarks for the user on the changes.
 
-    Comments are left out, and files that it includes stay as they are. Returns None, and writes nothing, for a robot in today's form.
-    Raises RobotFileError.
+    Comments are left out, and files that `source` includes stay as they are. For a robot in today's form nothing is written, and None is
+    returned. Raises RobotFileError.
     """
     root = read_xml(source, repair=True)
     if root.tag in WORLD_TAGS:

@@ -22,10 +22,11 @@ def identified_robots() -> tuple[str, ...]:
 
 
 def load_identified(robot_name: str, motors: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return arguments of MotorParameters: lag, delay [s], backlash [rad], friction [rad/s], each (n,), and encoder_noise [rad].
+    """Return the identified parameters of a robot's motors, by the names of the arguments of `MotorParameters`.
 
-    `motors`: names of the robot's motors, which give the order; None: the order of the file.  Raises UnknownName for a robot that has
-    not been identified, InvalidValue for one that has other motors.
+    They are lag [s], delay [s], backlash [rad] and friction [rad/s], each (n,), and encoder_noise [rad]. `motors`: names of the robot's
+    motors, which give the order; None: the order of the file. Raises UnknownName for a robot that has not been identified, and InvalidValue
+    if the file has other motors.
     """
     if robot_name not in (known := identified_robots()):
         raise UnknownName("identified robot", robot_name, known)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration of cameras by looking at the own hand: postures, observations, prediction of pixels, least squares, and the result's file."""
+"""Calibration of cameras on the robot's own hand: postures, observations, prediction of pixels, least squares, and the file."""

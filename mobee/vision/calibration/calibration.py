@@ -26,7 +26,10 @@ FORMAT = "mobee calibration 1"
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How far the tag is from where parameters put it: corners in the pictures [px], and its middle in space [m], median and 95 %."""
+    """How far the observed tag is from its position according to parameters: the median and the 95 % quantile.
+
+    `pixels_*`: distances of corners in the pictures [px]. `metres_*`: distances of the middle of the tag in space [m].
+    """
 
     pixels_median: float
     pixels_95: float
@@ -35,16 +38,17 @@ class Quality:
 
     @classmethod
     def of(cls, pixels: Array, metres: Array) -> Quality:
-        """Return the quantiles of distances (K,) px and (N,) m; NaN if there are none."""
+        """Return the medians and 95 % quantiles of distances `pixels` (K,) px and `metres` (N,) m; NaN for an empty array."""
         found = [np.quantile(one, share) if len(one) else np.nan for one in (pixels, metres) for share in (0.5, 0.95)]
         return cls(*(float(value) for value in found))
 
 
 @dataclass(frozen=True, slots=True)
 class Unobservable:
-    """A direction of the parameters about which the pictures say almost nothing.
+    """A direction in the space of the parameters about which the pictures give almost no information.
 
-    `information`: its singular value, in prior deviations; 0: nothing at all.  `weights`: of the parameters in it, by name.
+    `information`: singular value of this direction, with the parameters scaled by their prior deviations; 0: no information at all.
+    `weights`: components of the direction, by name of the parameter; small ones are left out.
     """
 
     information: float
@@ -53,10 +57,22 @@ class Unobservable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """By how much cameras and encoders of a robot differ from its model, and how well this is known.
+    """The result of a calibration: by how much a robot's cameras and encoders differ from its model, and how uncertain this is.
 
-    `x`: the parameters (P,), in the order of `names`; m, rad and s.  `covariance` (P, P).  `before`: the standard deviations (P,) without a
-    calibration.  `misfit`: mean squared residual in standard deviations; 1 if noise and model are as assumed.
+    Attributes:
+        robot: name of the robot.
+        cameras: names of the cameras.
+        lens: of all cameras.
+        tag: the tag on the palm.
+        pictures: number of observations that were used.
+        names: names of the P parameters.
+        x: (P,) the parameters, m, rad and s.
+        covariance: (P, P) of the parameters.
+        prior: (P,) standard deviations of the parameters before the calibration.
+        misfit: mean squared residual, in standard deviations; 1 if noise and model are as assumed.
+        uncalibrated: errors of the predicted tag with all parameters 0.
+        calibrated: errors of the predicted tag with the parameters x.
+        unobservable: directions of the parameters that the pictures do not determine.
     """
 
     robot: str
@@ -75,11 +91,14 @@ class Calibration:
 
     @property
     def deviations(self) -> Array:
-        """The standard deviations (P,) of the parameters."""
+        """The standard deviations (P,) of the parameters after the calibration, in the order of `names`."""
         return np.sqrt(np.diag(self.covariance))
 
     def rig(self, robot: Robot, cameras: Mapping[str, Camera]) -> Rig:
-        """Return the rig to which the parameters belong; raises InvalidValue if robot or cameras are others than those calibrated."""
+        """Return the rig (robot, cameras, lens and tag) to which the parameters belong; `cameras`: those of the robot's model, by name.
+
+        Raises InvalidValue if the robot or the cameras are not those of the calibration.
+        """
         if robot.name != self.robot or not set(self.cameras) <= set(cameras):
             raise InvalidValue(
                 f"the calibration is of {self.robot!r} with the cameras {', '.join(self.cameras)}; this is {robot.name!r} with "
@@ -91,11 +110,14 @@ class Calibration:
         return rig
 
     def errors(self, robot: Robot, cameras: Mapping[str, Camera]) -> CameraErrors:
-        """Return the parameters as errors of cameras; raises InvalidValue as `rig` does."""
+        """Return the parameters in the form of CameraErrors; `cameras`: those of the robot's model, by name.
+
+        Raises InvalidValue if the robot or the cameras are not those of the calibration.
+        """
         return self.rig(robot, cameras).errors(self.x)
 
     def save(self, path: Path) -> Path:
-        """Write the calibration as JSON, and return its path; raises OSError."""
+        """Write the calibration to a JSON file, and return the file's path; raise OSError if it cannot be written."""
         plain = {
             "format": FORMAT,
             "units": "m, rad, s",
@@ -118,7 +140,7 @@ class Calibration:
 
 
 def load_calibration(path: Path | str) -> Calibration:
-    """Read the file of a calibration; raises InvalidValue for a file that is none."""
+    """Read a calibration from its file; raise InvalidValue if the file cannot be read or is no calibration."""
     try:
         plain: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot saw of the tag on its palm, and what its encoders said meanwhile."""
+"""Observations of the tag on a robot's palm, with the encoders at the same times."""
 
 from __future__ import annotations
 
@@ -14,13 +14,17 @@ from mobee.vision.encoders import Moment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """The tag in pictures of one stamp: the encoders then, and its corners (4, 2) px by camera."""
+    """The tag in the pictures of all cameras with the same stamp.
+
+    `moment`: the encoders at the stamp. `corners`: (4, 2) px, column and row, by name of the camera; a camera that does not see the tag is
+    missing.
+    """
 
     moment: Moment
     corners: Mapping[str, Array]
 
 
 def stacked(observations: Sequence[Observation]) -> tuple[Array, Array, Array]:
-    """Return q (N, n) rad, dq (N, n) rad/s and the variances (N, n) of all observations."""
+    """Return the encoders q (N, n) rad, their velocities dq (N, n) rad/s and the variances of q (N, n) rad^2 of N observations."""
     moments = [one.moment for one in observations]
     return np.array([one.q for one in moments]), np.array([one.dq for one in moments]), np.array([one.variance for one in moments])

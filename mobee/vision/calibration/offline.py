@@ -28,7 +28,10 @@ LONGEST = 6.0  # s for one motion
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A recorded motion: encoders at `times` (m,) s, and the true positions one tick later, both (m, n) rad."""
+    """A recorded motion of a simulated robot.
+
+    `encoders`: (m, n) rad at `times` (m,) s. `q`: (m, n) rad, the true positions one tick later. `dt`: duration of a tick [s].
+    """
 
     times: Array
     encoders: Array
@@ -36,7 +39,7 @@ class Motion:
     dt: float
 
     def true_at(self, t: float) -> Array:
-        """Return the true positions (n,) rad at time t [s]."""
+        """Return the true positions (n,) rad at time t [s], interpolated between ticks."""
         place = (t - self.times[0]) / self.dt - 1.0
         row = int(np.clip(np.floor(place), 0, len(self.q) - 2))
         share = place - row
@@ -45,10 +48,13 @@ class Motion:
 
 
 class Watcher:
-    """A simulated robot with imperfect cameras and a tag on its palm."""
+    """A simulated robot with imperfect cameras and a tag on its palm, which moves and takes pictures."""
 
     def __init__(self, rig: Rig, model: Model, settings: CameraSettings, errors: CameraErrors, seed: int, has_clutter: bool = True) -> None:
-        """`seed`: of the noise of encoders, stamps and pictures, of the room and, if it has any, of the clutter on its table."""
+        """Make the robot and its scene; `seed`: of the noise of encoders, stamps and pictures, of the room, and of the clutter.
+
+        `settings` and `errors`: of the cameras. `has_clutter`: whether small objects lie on the table.
+        """
         self.rig, self.settings, self.errors = rig, settings, errors
         self.plant = OfflinePlant(model, seed=seed)
         worn = [] if rig.tag is None else tag_solids(rig.tag, rig.robot, errors.tag)
@@ -58,7 +64,10 @@ class Watcher:
         self._rng = np.random.default_rng([seed, 0x7374616D70])
 
     def move(self, posture: Array, parts: Sequence[str], rest: float) -> tuple[Motion, float]:
-        """Move parts to a posture (n,) rad and rest there [s]; returns the motion, and the time [s] at which the robot arrived."""
+        """Move the parts to a posture (n,) rad and stay there for `rest` [s].
+
+        Returns the recorded motion, and the time [s] at which the robot arrived, or at which the time limit of 6 s ended.
+        """
         plant, start, traces = self.plant, self.plant.time, []
         for part in parts:
             plant.begin(part, posture[self.rig.robot.part(part).slice])
@@ -71,7 +80,10 @@ class Watcher:
         return Motion(times, encoders, q, plant.dt), arrived
 
     def look(self, motion: Motion, t: float) -> tuple[Moment, dict[str, Picture]]:
-        """Return the encoders at the stamp, and the pictures of all cameras, of an exposure whose middle is at time t [s]."""
+        """Take a picture with every camera; the middle of the exposure is at time t [s] of `motion`.
+
+        Returns the encoders at the stamp, which is wrong by the error of the latency and jitter, and the pictures by name of the camera.
+        """
         stamp = t + self.errors.latency + self.settings.jitter * self._rng.standard_normal()
         postures = [motion.true_at(t + moment) for moment in self._cameras.moments]
         pictures = {name: self._cameras.expose(name, postures) for name in self.rig.cameras}
@@ -80,14 +92,15 @@ class Watcher:
 
 
 def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
-    """Return the parts that move during a calibration: the head, if the robot has one, and the arm."""
+    """Return the parts that move during a calibration: the head, if the robot has one, and the arm `part`."""
     return (HEAD, part) if HEAD in rig.robot.parts else (part,)
 
 
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
-    """Move the head and one arm through postures (K, n) rad; return what the cameras saw of the tag.
+    """Move the head and the arm `part` through postures (K, n) rad; return the observations of the tag from the cameras.
 
-    The encoders of a real head differ from its true positions by offsets; here the cameras' head does, which is the same to the cameras.
+    `progress`: called with the share of postures that are done. On a real robot, the head's encoders differ from its true positions by
+    offsets; here the offsets are added to the head that carries the cameras, which looks the same to the cameras.
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):

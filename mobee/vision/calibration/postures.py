@@ -23,12 +23,22 @@ LIMIT = 0.04  # share of a motor's range that is left free at its limits
 
 
 def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str, count: int, seed: int) -> Array:
-    """Return postures (count, n) rad of head and one arm, the other motors at home, in an order in which neighbours are near.
+    """Return postures (count, n) rad of the head and one arm in which all cameras see the tag, without contacts.
 
-    They are drawn at random within the limits; of those that fit, each next one is the farthest from those already chosen, by its places
-    in the pictures, its distance, its angle and its head.
+    The other motors are at home. Postures are drawn at random within the limits. Of the suitable ones, each next posture is the one
+    farthest from those already chosen, by the tag's position in the pictures, its distance and angle, and the head's position. The result
+    is sorted such that successive postures are near each other.
 
-    Raises InvalidValue if too few are found.
+    Args:
+        rig: the robot, its cameras and the tag.
+        model: robot and world, for the contacts.
+        settings: of the cameras.
+        part: name of the arm.
+        count: number of postures.
+        seed: of the random draws.
+
+    Raises:
+        InvalidValue: too few suitable postures were found.
     """
     rng = np.random.default_rng([seed, 0x706F7365])
     free: Ints = np.array([*rig.head, *range(*rig.robot.part(part).slice.indices(len(rig.robot.motors)))], dtype=np.intp)

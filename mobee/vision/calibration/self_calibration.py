@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Offsets of encoders, found while a robot acts and sees its own hand: an extended Kalman filter, and a plant that is corrected by it."""
+"""Offsets of encoders, estimated while a robot acts and sees its own hand: an extended Kalman filter, and a plant that it corrects."""
 
 from __future__ import annotations
 
@@ -27,18 +27,20 @@ STEPS = 20  # of that prediction
 
 
 class JointOffsets:
-    """Estimates by how much encoders of a robot are wrong, from places where a marker is seen: true minus measured angle of each motor.
+    """Estimates the offsets (true minus measured angle) of a robot's encoders from positions at which a marker is seen.
 
-    An extended Kalman filter whose state is constant.  If two seen places in a row are improbable under the estimate, and changed offsets
-    explain both, the offsets have changed: the filter becomes uncertain, and both places count.  Other improbable places are taken for
-    wrong measurements, and ignored.  Old places keep their weight until a change is detected.  A change that displaces the marker by less
-    than about five times `noise` may not be detected; the estimate then follows slowly, and its covariance is too small.
+    It is an extended Kalman filter with a constant state. If two successive seen positions are improbable under the estimate, and changed
+    offsets explain both, the filter concludes that the offsets have changed: it becomes uncertain, and uses both positions. Other
+    improbable positions are treated as wrong measurements and ignored. Old positions keep their weight until a change is detected. A change
+    that displaces the marker by less than about five times `noise` may not be detected; then the estimate follows slowly, and its
+    covariance is too small.
 
     Args:
         model: the robot; its world does not matter.
-        marker: what is seen.
-        motors: names of the motors with unknown offsets, each of which must move the marker.  Offsets of all others are taken as 0.
-        noise: m, standard deviation of a seen place along each axis.
+        marker: name of the marker that is seen.
+        motors: names of the motors with unknown offsets, each of which must move the marker.  The offsets of all other motors are taken as
+            0.
+        noise: m, standard deviation of a seen position along each axis.
 
     Raises:
         UnknownName: no such marker or motor.
@@ -59,32 +61,32 @@ class JointOffsets:
         if not 0.0 < noise < np.inf:
             raise InvalidValue(f"noise {noise!r} m: must be a finite length above 0")
         self.offsets: Array = np.zeros(len(motors))
-        """The estimate, (d,) rad, in the order of `motors`; to be added to encoder values."""
+        """The estimated offsets, (d,) rad, in the order of `motors`; encoder value plus offset is the true angle."""
         self.covariance: Array = KNOWN**2 * np.eye(len(motors))
-        """Of the estimate, (d, d) rad^2."""
+        """Covariance of the estimated offsets, (d, d) rad^2."""
         self.observations = 0
-        """Number of seen places so far."""
+        """Number of seen positions so far, ignored ones included."""
         self.changes: list[int] = []
-        """Numbers of the observations at which a change of the offsets was detected."""
+        """Numbers (from 1) of the observations at which a change of the offsets was detected."""
         self._noise = noise**2 * np.eye(3)
         self._surprise: tuple[Array, Array] | None = None  # the last observation, if it was improbable
 
     @property
     def all_offsets(self) -> Array:
-        """The offsets (n,) rad of all motors of the robot: 0 where none is estimated."""
+        """The offsets (n,) rad of all motors of the robot: 0 for motors without an estimate."""
         found = np.zeros(len(self.model.robot.motors))
         found[self._where] = self.offsets
         return found
 
     def observe(self, q: Array, seen: Array) -> bool:
-        """Learn from where the marker is seen; return whether a change of the offsets was detected.
+        """Update the estimate with a position at which the marker is seen; return whether a change of the offsets was detected.
 
         Args:
             q: encoder values of all motors (n,) rad, uncorrected, while the robot rests.
-            seen: place (3,) m, root frame.
+            seen: position (3,) m of the marker, root frame.
 
         Raises:
-            InvalidValue: encoder values or a place that are not finite numbers of these shapes.
+            InvalidValue: `q` or `seen` has another shape or is not finite.
         """
         measured, place = checked("q", q, len(self.model.robot.motors)), checked("seen", seen, 3)
         self.observations += 1
@@ -136,20 +138,20 @@ class JointOffsets:
 
 
 class SelfCalibratingPlant:
-    """A ReachPlant whose encoders are corrected by where its hand is seen.
+    """A ReachPlant that corrects the encoders of another plant by positions at which the robot's hand is seen.
 
-    A state of an agent is then the same true posture as before the encoders became wrong.  After each action that leaves the robot at
-    rest, the marker is looked for once, also while an agent is evaluated.  Targets and results of actions are in corrected values.  For a
-    reach, the target is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted place.  Forces of
-    contacts and limits follow from uncorrected values.
+    So a state of an agent is the same true posture as before the encoders became wrong. After each action that leaves the robot at rest,
+    `see` is called once, also while an agent is evaluated. Targets and results of actions are in corrected values. For a reach, the target
+    is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted position. Forces of contacts and
+    limits are computed from uncorrected values.
 
     Args:
-        plant: whose encoders may be wrong, offline or live.
-        offsets: the estimated offsets of its encoders.
-        see: returns where the marker is seen at present, (3,) m in the root frame; None or NaN if it is not seen.
+        plant: the plant, offline or live, whose encoders may be wrong.
+        offsets: estimates the offsets of its encoders.
+        see: returns the position at which the marker is seen at present, (3,) m in the root frame; None or NaN if it is not seen.
 
     Raises:
-        InvalidValue: `offsets` of another robot.
+        InvalidValue: `offsets` belongs to another robot.
     """
 
     def __init__(self, plant: ReachPlant, offsets: JointOffsets, see: Callable[[], Array | None]) -> None:
@@ -160,22 +162,23 @@ class SelfCalibratingPlant:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the plant, if it has any; see Described."""
+        """The settings of the plant as plain JSON values; empty if the plant has none."""
         return self.plant.settings if isinstance(self.plant, Described) else {}
 
     @property
     def q(self) -> Array:
-        """See Plant; corrected."""
+        """The present corrected positions of all motors (encoder plus offset), (n,) rad."""
         return self.plant.q + self.offsets.all_offsets
 
     def measure(self, part: str) -> Array:
-        """See Plant; corrected."""
+        """Return the present corrected positions of the part's motors (encoder plus offset), (n_part,) rad."""
         return self.plant.measure(part) + self._of(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; `target` is in corrected values.  A motor whose uncorrected target is beyond its limits moves to the limit.
+        """Set the part's attractor and wait until the part settles or times out; return the corrected outcome.
 
-        Raises InvalidValue as the plant does, also for a corrected target beyond the limits.
+        `target`: (n_part,) rad in corrected values. A motor whose uncorrected target is beyond its limits moves to the limit. Raises
+        InvalidValue for a target that the plant refuses or that is beyond the limits, and ActionInterrupted on hold, fault or a new run.
         """
         offsets = self._of(part)
         if offsets.any():
@@ -189,12 +192,16 @@ class SelfCalibratingPlant:
         return self._corrected(part, outcome)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Show the plant the target of the next reach; None: remove the target."""
         self.plant.present(target)
         self._target = target
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant; for a target with a direction of the marker's normal, raises InvalidValue while offsets are not 0."""
+        """Reach with a marker of the part to the presented target; return the corrected outcome.
+
+        `stay`: True: the part stays in the pose in which the force ended; False: the attractor pulls it back. Raises InvalidValue if there
+        is no target, or if the target has a direction for the marker's normal while offsets are not 0.
+        """
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")
         offsets = self.offsets.all_offsets

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds what is wrong about a robot's cameras from what it saw of its own hand: nonlinear least squares with a robust loss."""
+"""Estimates the errors of a robot's cameras from observations of its own hand: nonlinear least squares with a robust loss."""
 
 from __future__ import annotations
 
@@ -85,19 +85,19 @@ class _Problem:
 
 
 def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSettings, corner_noise: float = CORNER_NOISE) -> Calibration:
-    """Find mounts of cameras and tag, offsets of encoders and latency from observations of the tag.
+    """Find the mounts of cameras and tag, the offsets of encoders, and the latency, from observations of the tag.
 
     The residuals of a picture are weighted by their covariance: noise of the corners, and noise of the encoders and of the stamp, which
     moves all corners of a picture together.  The tolerances in `settings` are the prior.  The loss is soft L1.
 
     Args:
-        rig: the robot, its cameras as the model has them, and the tag.
+        rig: the robot, its cameras at the positions of the model, and the tag.
         observations: pictures of the tag, with the encoders at their stamps.
         settings: the tolerances, and the jitter of the stamps.
         corner_noise: standard deviation of a measured corner along column and row, px.
 
     Raises:
-        InvalidValue: too few pictures.
+        InvalidValue: there are fewer than 8 pictures, or the rig has no tag.
     """
     if len(observations) < FEWEST:
         raise InvalidValue(f"{len(observations)} pictures show the tag: at least {FEWEST} are needed. Use more postures, or a larger tag.")
@@ -199,7 +199,10 @@ def _quality(rig: Rig, problem: _Problem, observations: Sequence[Observation], x
 
 
 def tag_centre(rig: Rig, x: Array, one: Observation) -> Array:
-    """Return the place (3,) m, root frame, at which the arm's encoders put the middle of the tag."""
+    """Return the position (3,) m, root frame, of the middle of the tag according to the encoders of an observation.
+
+    `x`: (P,) the calibration's parameters.
+    """
     assert rig.tag is not None
     link, position, rotation = rig.tag.frame(rig.robot)
     centre, _ = mounted(position, rotation, x[rig.where("tag")])

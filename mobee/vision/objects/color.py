@@ -20,7 +20,7 @@ LEAST = 30  # of 255: brightness of colour below which there is only noise
 
 
 def by_color(things: Sequence[Thing]) -> Detector:
-    """Return the detector that finds regions of the colours of things."""
+    """Return a detector that finds regions with the colours of the given things."""
 
     def detect(picture: Picture) -> list[Detection]:
         channels = np.ascontiguousarray(picture.reshape(-1, 3).T)

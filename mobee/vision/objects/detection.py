@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a detector finds in one picture."""
+"""Detections: the regions of one picture that look like a thing."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mobee.vision.objects.thing import Thing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
-    """What looks like a thing in one picture.
+    """A region of one picture that looks like a thing.
 
-    `name`: of the thing.  `outline` (m, 2): points on its outline, px, column and row, without those at the picture's border.  `area`: px.
-    `confidence`: 0 to 1.
+    `name`: name of the thing. `outline`: (m, 2) px, column and row, points on its outline, without those at the picture's border. `area`:
+    px. `confidence`: 0 to 1.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Detection:
 
 
 Detector = Callable[[Picture], Sequence[Detection]]
-"""A function of a picture (height, width, 3), bytes red, green, blue, that returns what looks like one of the things in it."""
+"""A function that takes a picture (height, width, 3), bytes red, green, blue, and returns the detections of its things."""
 
 DetectorOf = Callable[[Sequence[Thing]], Detector]
-"""A function that returns the detector of some things."""
+"""A function that takes things and returns a detector of these things."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The detectors that have a name; others are chosen as `module:name`, or by the file of a network."""
+"""The detectors by name; others are given as `module:name`, or as the file of a network."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ DETECTORS: dict[str, DetectorOf] = {"color": by_color}
 
 
 def detector_of(given: str | DetectorOf, things: Sequence[Thing]) -> Detector:
-    """Return the detector of some things.
+    """Return a detector of the given things.
 
     Args:
-        given: a name in the table, `module:name`, a function, or the path of a file of `mobee detector train`, which ends in .onnx.
-        things: what is to be found.
+        given: "color", `module:name`, a function that takes things and returns a detector, or the path of a file that `mobee detector
+            train` wrote; such a path ends in .onnx.
+        things: the things to be found.
 
     Raises:
-        UnknownName, InvalidValue: there is no such detector, or the file is damaged or of other things.
+        UnknownName, InvalidValue: there is no such detector, or the file is damaged or was made for other things.
         NotInstalled: the file needs a package that is not installed.
     """
     if isinstance(given, str) and given.endswith(SUFFIX):
@@ -34,7 +35,10 @@ def detector_of(given: str | DetectorOf, things: Sequence[Thing]) -> Detector:
 
 
 def require_detector(given: str, things: Sequence[Thing]) -> None:
-    """Raise what `detector_of` would raise for a name or a file; imports no module of the user."""
+    """Check the name or file of a detector without importing a module of the user.
+
+    Raises the errors of `detector_of`: UnknownName, InvalidValue or NotInstalled.
+    """
     if given.endswith(SUFFIX):
         detector_of(given, things)
     else:

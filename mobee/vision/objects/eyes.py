@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the cameras are at the stamp of a picture, and how uncertain that is, for both cameras together."""
+"""The positions of the cameras at the stamp of a picture, and their uncertainty, for all cameras together."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ NEGLIGIBLE = 1e-12  # share of the largest variance below which a direction is l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Eye:
-    """A camera in the root frame: optical centre (3,) m, rotation (3, 3) with the columns right, down, ahead, and lens."""
+    """A camera in the root frame.
+
+    `position`: (3,) m, of the optical centre. `rotation`: (3, 3) with the columns right, down, ahead. `lens`: of the camera.
+    """
 
     position: Array
     rotation: Array
@@ -28,10 +31,11 @@ class Eye:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Eyes:
-    """The cameras of a robot at one stamp, in the order of their names.
+    """The E cameras of a robot at one stamp, in the order of their names.
 
-    Their uncertainty is a factor F with the covariance F F' of the displacements [m] and turns [rad] of all cameras, about their centres in
-    the root frame, (6 E, r).  `noise` is new in each picture (encoders and stamp), `bias` the same in pictures of one gaze (calibration).
+    Uncertainty is given as a factor F (6 E, r); F F' is the covariance of the displacements [m] and rotations [rad] of all cameras, about
+    their optical centres, in the root frame. `noise`: F of errors that are new in each picture (encoders and stamp). `bias`: F of errors
+    that stay the same while the gaze does not change (calibration).
     """
 
     names: tuple[str, ...]
@@ -41,7 +45,7 @@ class Eyes:
 
 
 def eyes_at(rig: Rig, x: Array, moment: Moment, uncertainty: Array | None = None, jitter: float = 0.0) -> Eyes:
-    """Return the cameras of a rig at the stamp of a picture.
+    """Return the cameras of a rig, with their uncertainty, at the stamp of a picture.
 
     Args:
         rig: the robot and its cameras.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All things that two cameras see: which detections are of the same thing, and where it is."""
+"""All things that two cameras see: which detections belong to the same thing, and the position of the thing."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ APART = 0.5  # of the sum of two things' half diameters: nearer things are the s
 def locate_all(
     things: Sequence[Thing], detections: Mapping[str, Sequence[Detection]], eyes: Eyes, solids: Sequence[WorldObject] = ()
 ) -> list[Placed]:
-    """Return the places of all things that both cameras see, the best fits first.
+    """Return the positions of all things that both cameras see, the best fits first.
 
     Args:
-        things: what may be seen.
-        detections: by camera, in the order of the cameras of `eyes`.
-        eyes: the cameras at the stamp of the pictures.
-        solids: known boxes, into which no thing reaches: a flat picture of a thing would.
+        things: the things that may be seen.
+        detections: the detections in each picture, by name of the camera.
+        eyes: the two cameras at the stamp of the pictures.
+        solids: known boxes.  A result that reaches into a box is discarded, since it may be a flat picture of a thing.
     """
     found: list[tuple[Placed, Thing, int, int]] = []
     first, second = eyes.names

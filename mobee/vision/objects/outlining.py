@@ -17,10 +17,10 @@ SOLID = 0.6  # share of its convex hull that a region must fill: the things are 
 
 
 def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
-    """Return the regions of a thing as detections.
+    """Return the regions of a picture that look like the thing `name`, as detections.
 
-    `likeness` (H, W): linear in the share of the pixel that shows the thing, 0 for none.  The likeness of a whole pixel is the largest one
-    nearby, and at least 1: values up to 1 are shares.
+    `likeness`: (H, W), proportional to the share of a pixel that shows the thing; 0: none. The likeness of a whole pixel of the thing is
+    the largest value nearby, but at least 1; so an array of shares can be given too.
     """
     height, width = likeness.shape
     found = []

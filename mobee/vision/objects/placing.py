@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The place, size and orientation of a thing whose outlines are seen by two cameras, by robust least squares, with their covariance."""
+"""The position, size and orientation of a thing from its outlines in two pictures, by robust least squares, with their covariance."""
 
 from __future__ import annotations
 
@@ -37,11 +37,18 @@ MOST_SIZE = 3.5  # deviations of a length from its usual value
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A thing in the root frame.
+    """A thing that was located, in the root frame.
 
-    `position` (3,) m, `rotation` (3, 3), `size` (g,) m as of its kind of shape.  The covariance of the position (3, 3) m^2 is the sum of
-    `noise`, which is new in each picture, and `bias`, which stays as long as the gaze does.  `size_deviation` (g,) m.  `misfit`: rms of
-    the outlines' points from the silhouettes, px.  `share`: of these points that fit.
+    Attributes:
+        name: name of the thing.
+        position: (3,) m.
+        rotation: (3, 3), of the shape's axes.
+        size: (g,) m, the lengths of its kind of shape.
+        noise: (3, 3) m^2, covariance of the position from errors that are new in each picture.
+        bias: (3, 3) m^2, covariance of the position from errors that stay the same while the gaze does not change.
+        size_deviation: (g,) m, standard deviations of the size.
+        misfit: rms distance of the outlines' points from the silhouettes, px.
+        share: share of these points that fit, 0 to 1.
     """
 
     name: str
@@ -56,15 +63,16 @@ class Placed:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (3, 3) m^2 of the position."""
+        """The whole covariance of the position (3, 3) m^2: `noise` plus `bias`."""
         return self.noise + self.bias
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """An outline in one picture: flat points (m, 2) in the plane at distance 1, and the pixels of a step in it (m, 2, 2), inverted.
+    """An outline in one picture, without the distortion of the lens.
 
-    `ray` (3,): the unit vector through its middle, root frame.
+    `eye`: the camera. `flat`: (m, 2), points (x / z, y / z) in the camera's frame. `inverse`: (m, 2, 2), derivative of these by the pixel.
+    `ray`: (3,) unit vector through the middle of the outline, root frame.
     """
 
     eye: Eye
@@ -74,7 +82,7 @@ class Outline:
 
     @classmethod
     def all_of(cls, eye: Eye, detections: Sequence[Detection]) -> list[Outline]:
-        """Return the outlines of detections in one picture; without the points that the lens does not show."""
+        """Return the outline of each detection in a picture of the camera `eye`; points that have no ray in the lens are left out."""
         if not detections:
             return []
         lens = eye.lens
@@ -99,9 +107,9 @@ _NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 def place(thing: Thing, outlines: Sequence[Outline], eyes: Eyes) -> Placed | None:
-    """Return the place of a thing from its outlines; None if they do not fit it, or the thing is too near or too far.
+    """Return the position of a thing from its outlines; None if the outlines do not fit the thing, or it is too near or too far.
 
-    `outlines`: in the order of the cameras of `eyes`.
+    `outlines`: one for each camera, in the order of the cameras of `eyes`.
     """
     start = nearest_to_rays(np.array([eye.position for eye in eyes.eyes]), np.array([one.ray for one in outlines]))
     if np.isnan(start).any() or min(len(one.flat) for one in outlines) < FEWEST or not _in_range(eyes, start):

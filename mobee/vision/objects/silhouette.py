@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Silhouettes of spheres, upright cylinders and boxes: where lines in the picture's plane touch them."""
+"""Silhouettes of spheres, upright cylinders and boxes: the points at which lines in the picture's plane touch them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mobee.vision.objects.thing import Kind
 
 RIM = 48  # points of a circle
 SCALED: dict[Kind, tuple[tuple[int, ...], ...]] = {"sphere": ((0, 1, 2),), "cylinder": ((0, 1), (2,)), "box": ((0,), (1,), (2,))}
-"""The axes along which each length of a kind of shape scales it."""
+"""The axes (0, 1, 2) that each length of a shape scales: a cylinder has a radius (axes 0 and 1) and a height (axis 2)."""
 
 _ANGLES = 2.0 * np.pi * (np.arange(RIM) + 0.5) / RIM
 _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
@@ -18,13 +18,16 @@ _CORNERS = 0.5 * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) f
 
 
 def upright(yaw: float) -> Array:
-    """Return the rotation (3, 3) about the vertical by an angle [rad]."""
+    """Return the rotation (3, 3) about the vertical axis z by the angle `yaw` [rad]."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def surface(kind: Kind, size: Array) -> Array:
-    """Return points (m, 3) m of a shape in its own axes: the corners of a box, the rims of a cylinder, six points of a sphere."""
+    """Return points (m, 3) m on the surface of a shape, in its own axes.
+
+    They are the corners of a box, the rims of a cylinder, or six points of a sphere. `size`: lengths of the shape, m.
+    """
     if kind == "box":
         found: Array = _CORNERS * size
         return found
@@ -35,17 +38,18 @@ def surface(kind: Kind, size: Array) -> Array:
 
 
 def touching(kind: Kind, size: Array, position: Array, rotation: Array, directions: Array) -> tuple[Array, Array]:
-    """Return where the silhouette of a shape is farthest along directions in the plane at distance 1 of a camera.
+    """Return the points of a shape whose images are farthest along given directions; they lie on its silhouette.
 
     Args:
         kind: of the shape.
-        size: its lengths, m.
-        position: of its middle (3,) m in the camera's frame; the whole shape must be ahead.
-        rotation: (3, 3), of its axes into the camera's.
-        directions: unit vectors (K, 2).
+        size: the lengths of the shape, m.
+        position: (3,) m, middle of the shape in the camera's frame; the whole shape must be ahead of the camera.
+        rotation: (3, 3), from the shape's axes to the camera's frame.
+        directions: unit vectors (K, 2) in the plane at distance 1 of the camera.
 
     Returns:
-        Points (K, 3) m of the shape, from its middle in the camera's axes, and how far their images are along the directions (K,).
+        Points (K, 3) m of the shape, from its middle, in the camera's frame; and the coordinates of their images along the directions,
+        (K,).
     """
     if kind == "sphere":
         return _touching_sphere(float(size[0]), position, directions)

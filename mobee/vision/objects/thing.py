@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The things that a robot knows by sight: name, kind of shape, usual size and colour."""
+"""The things that a robot can recognise: name, kind of shape, usual size and colour."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ TOLERANCE = 0.1  # relative standard deviation of a size from the usual one
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """A thing that may be seen, alone or several times.
+    """A thing that may be seen; several objects may look like it.
 
-    `kind`, `size`: as of `mobee.Geometry`, m; a cylinder and a box stand upright.  `color`: red, green, blue, 0 to 1.  `tolerance`:
-    relative standard deviation of each length from `size`; 0: the size is known.
+    `kind`, `size`: kind of shape and its lengths in m, as in `mobee.Geometry`; cylinders and boxes stand upright. `color`: red, green,
+    blue, 0 to 1. `tolerance`: relative standard deviation of each length from `size`; 0: the size is known exactly.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Thing:
 
 
 def things_in(world: World) -> list[Thing]:
-    """Return the things that the targets of a world look like: spheres, cylinders and boxes with a colour, wherever they are."""
+    """Return the things that the targets of a world look like: spheres, cylinders and boxes that have a colour; positions are ignored."""
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
     return [
         Thing(item.name, kinds[item.kind], item.size, item.color[:3])

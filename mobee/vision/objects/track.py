@@ -22,22 +22,23 @@ LOOKS = 8  # over which size and orientation are averaged at least
 
 @dataclass(frozen=True, kw_only=True)
 class TrackSettings(Settings):
-    """Settings of tracks.
+    """Settings for tracking objects; a look is a pair of pictures at one time.
 
-    The place of an object at rest is a slow random walk; the velocity of one that moves is an Ornstein-Uhlenbeck process about 0.
+    The position of an object at rest is modelled as a slow random walk; the velocity of a moving object as an Ornstein-Uhlenbeck process
+    about 0.
 
     Args:
-        hits: looks that must show a new object before it counts.
-        of: looks within which these hits must be.
-        gate: squared Mahalanobis distance (3 dimensions) within which a place may belong to a track.
-        surprise: the same, above which an object at rest is taken to move.
-        wander: of an object at rest, standard deviation along each axis after a second, m: nothing stands quite still in the root frame.
-        speed: of an object that moves, standard deviation of the velocity along each axis, m/s.
+        hits: number of looks that must show a new object before it counts.
+        of: number of latest looks among which these hits must be.
+        gate: largest squared Mahalanobis distance (3 dimensions) at which a seen position may belong to a track.
+        surprise: squared Mahalanobis distance above which an object at rest is assumed to move.
+        wander: m, standard deviation of the drift of an object at rest along each axis after one second.
+        speed: m/s, standard deviation of the velocity of a moving object along each axis.
         persistence: time constant of velocities, s.
-        moves_for: s for which an object that moved counts as moving.
-        turn: rad by which the gaze must turn until the bias of the cameras is another one.
-        forget_after: s after which an object that was not seen again loses its name.
-        most: objects of each thing that get a name.
+        moves_for: s, time for which an object that has moved counts as moving.
+        turn: rad, rotation of the gaze after which the bias of the cameras has mostly changed.
+        forget_after: s, time after which an object that was not seen again loses its name.
+        most: largest number of objects of each thing that get a name.
     """
 
     hits: Annotated[int, Range(ge=1, le=100)] = 3
@@ -55,7 +56,11 @@ class TrackSettings(Settings):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Innovation:
-    """A place against the prediction of a track: difference (3,) m, its covariance (3, 3), and the predicted state with covariance."""
+    """A seen position compared with the prediction of a track.
+
+    `difference`: (3,) m, seen minus predicted position. `covariance`: (3, 3) m^2, of the difference. `mean`, `spread`: predicted state (9,)
+    and its covariance (9, 9); the state is position m, velocity m/s and bias m.
+    """
 
     difference: Array
     covariance: Array
@@ -64,19 +69,20 @@ class Innovation:
 
     @property
     def distance(self) -> float:
-        """The squared Mahalanobis distance."""
+        """The squared Mahalanobis distance of the seen position from the prediction."""
         return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
 
     @property
     def cost(self) -> float:
-        """Twice the negative logarithm of the likelihood, up to a constant."""
+        """Twice the negative logarithm of the likelihood of the seen position, up to a constant."""
         return self.distance + float(np.linalg.slogdet(self.covariance)[1])
 
 
 class Track:
-    """An object that is followed from look to look.
+    """An object that is followed from look to look; a look is a pair of pictures at one time.
 
-    `name`: unique; empty until the object counts.  `born`, `t`, `seen`: s, of the first look, the newest, and the newest that showed it.
+    `name`: unique; empty until the object counts. `born`, `t`, `seen`: times [s] of the first look, of the newest look, and of the newest
+    look that showed the object. `looks`: whether each of the latest looks showed the object.
     """
 
     def __init__(self, thing: Thing, first: Placed, t: float, settings: TrackSettings) -> None:
@@ -101,37 +107,45 @@ class Track:
 
     @property
     def velocity(self) -> Array:
-        """The velocity (3,) m/s at time `t`."""
+        """The velocity (3,) m/s at time `t`, root frame."""
         return self._mean[V].copy()
 
     @property
     def covariance(self) -> Array:
-        """The covariance (3, 3) m^2 of the position."""
+        """The covariance (3, 3) m^2 of the position at time `t`."""
         return self._spread[P, P].copy()
 
     @property
     def rotation(self) -> Array:
-        """The rotation (3, 3) of the shape's axes."""
+        """The rotation (3, 3) of the shape's axes in the root frame, averaged over looks."""
         return upright(self._yaw)
 
     @property
     def size(self) -> Array:
-        """The lengths (g,) m of the shape."""
+        """The lengths (g,) m of the shape, averaged over looks."""
         return self._size.copy()
 
     @property
     def is_moving(self) -> bool:
-        """Whether the object moved a moment ago."""
+        """Whether the object moves or moved a short time ago (`TrackSettings.moves_for`)."""
         return self.t <= self._moving_until
 
     def innovation(self, placed: Placed, t: float, turned: float, moving: bool) -> Innovation:
-        """Return a place at time t [s] against the prediction, for a gaze that has turned by an angle [rad] since the last look."""
+        """Compare a seen position at time t [s] with the prediction of the track.
+
+        `turned`: angle [rad] by which the gaze has rotated since the last look. `moving`: predict for a moving object, else for one at
+        rest.
+        """
         mean, spread = self._predicted(t, turned, moving)
         covariance = _SEEN @ spread @ _SEEN.T + placed.noise
         return Innovation(placed.position - _SEEN @ mean, covariance, mean, spread)
 
     def best(self, placed: Placed, t: float, turned: float) -> tuple[Innovation, bool] | None:
-        """Return the innovation at rest or, if that is unlikely or the object moves, in motion, and which; None outside the gate."""
+        """Return the better innovation of a seen position at time t [s], and whether it is that of a moving object.
+
+        The prediction at rest is used, unless the object moves or the position is improbable at rest; then the prediction in motion is
+        used. None if the position is outside the gate. `turned`: angle [rad] by which the gaze has rotated since the last look.
+        """
         if t > self._moving_until:
             rest = self.innovation(placed, t, turned, moving=False)
             if rest.distance <= self._settings.surprise:
@@ -140,7 +154,7 @@ class Track:
         return (moving, True) if moving.distance <= self._settings.gate else None
 
     def update(self, placed: Placed, t: float, found: Innovation, moved: bool) -> None:
-        """Take a place into the track, by its innovation from `best`."""
+        """Update the track with a seen position at time t [s]; `found` and `moved`: the two results of `best`."""
         gain = np.linalg.solve(found.covariance, _SEEN @ found.spread).T
         self._mean = found.mean + gain @ found.difference
         keep = np.eye(9) - gain @ _SEEN
@@ -155,7 +169,10 @@ class Track:
         self.looks.append(True)
 
     def miss(self, t: float, turned: float) -> None:
-        """Predict to a look at time t [s] that did not show the object."""
+        """Predict the track to a look at time t [s] that did not show the object.
+
+        `turned`: angle [rad] by which the gaze has rotated since the last look.
+        """
         self._mean, self._spread = self._predicted(t, turned, self.is_moving)
         self.t = t
         self.looks.append(False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Follows several objects: which place belongs to which track, when a new object counts, and which name it has."""
+"""Follows several objects: which seen position belongs to which track, when a new object counts, and which name it gets."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ IMPOSSIBLE = 1e6  # cost of a place outside a track's gate
 
 
 class Tracker:
-    """The tracks of all things, in the root frame at the time of the pictures.
+    """The tracks of all objects that look like given things, in the root frame at the time of the pictures.
 
-    A thing's first object has the thing's name, further ones `name_2`, `name_3`.  An object that was hidden, or put elsewhere, keeps its
-    name: a new track takes over the name of one that is not seen any more, if no other name is left.
+    The first object of a thing has the thing's name, further ones are `name_2`, `name_3`. An object that was hidden or moved elsewhere
+    keeps its name: if no other name is left, a new track takes the name of an object that is not seen any more.
     """
 
     def __init__(self, things: Sequence[Thing], settings: TrackSettings | None = None) -> None:
@@ -32,24 +32,24 @@ class Tracker:
 
     @property
     def tracks(self) -> list[Track]:
-        """The tracks of objects that count, sorted by name; compare `seen` with the time to know whether one is seen now."""
+        """The tracks of objects that count, sorted by name; an object is seen at present if its `seen` is the time of the last look."""
         return sorted((track for track in self._tracks if track.name), key=lambda track: track.name)
 
     def forget(self) -> None:
-        """Drop all tracks, at the start of a new run."""
+        """Remove all tracks; called at the start of a new run."""
         self._tracks.clear()
         self._t = -np.inf
 
     def update(self, t: float, places: Sequence[Placed], turned: float = 0.0) -> None:
-        """Take in all places of one look.
+        """Update all tracks with the positions seen in one look.
 
         Args:
             t: time of the pictures, s; later than that of the last look.
-            places: what was seen; nothing is a look, too.
-            turned: rad by which the gaze has turned since the last look.
+            places: the things that were seen; may be empty.
+            turned: rad by which the gaze has rotated since the last look.
 
         Raises:
-            InvalidValue: the time is not later.
+            InvalidValue: the time is not later than that of the last look.
         """
         if t <= self._t:
             raise InvalidValue(f"a look at {t:.3f} s after one at {self._t:.3f} s: looks must be in the order of their times")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras that fail: pictures that come too late, are dark, or are the same again and again."""
+"""Detects cameras that fail: pictures that arrive too late, are dark, or are always the same."""
 
 from __future__ import annotations
 
@@ -19,24 +19,27 @@ TURN = 0.02  # rad by which a motor moves while equal pictures come: no camera s
 
 
 class PictureWatch:
-    """Watches the pictures of one camera for signs that they do not show what is there now."""
+    """Checks the pictures of one camera for signs that they do not show the present scene."""
 
     def __init__(self, latest: float) -> None:
-        """`latest`: s, the largest age of a picture at its arrival."""
+        """Make a watch; `latest`: largest age of a picture at its arrival, s."""
         self._latest = latest
         self._stamp = -np.inf
         self._digest, self._same = b"", 0
         self._q: Array | None = None  # at the first of the equal pictures
 
     def trouble(self, picture: Picture, stamp: float, now: float, q: Array, has_noise: bool) -> Trouble | None:
-        """Return what is wrong with a picture; None if nothing is.
+        """Return what is wrong with a picture, or None if nothing is wrong.
+
+        "old": the stamp is not newer than the last one. "late": the picture is older than `latest` at its arrival. "dark": almost nothing
+        is bright. "frozen": the picture is equal to the pictures before, although the camera has noise or a motor has moved.
 
         Args:
             picture: (height, width, 3) bytes.
             stamp: of its exposure, s.
             now: time of its arrival by the same clock, s.
             q: encoders at the stamp (n,) rad.
-            has_noise: the camera is a real one, or drawn with noise, of which no two pictures are equal.
+            has_noise: whether the camera is a real one, or is drawn with noise, so that no two pictures are equal.
         """
         is_new, self._stamp = stamp > self._stamp, max(stamp, self._stamp)
         digest = hashlib.blake2b(picture.tobytes(), digest_size=16).digest()

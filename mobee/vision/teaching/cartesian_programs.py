@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cartesian genetic programming: formulas as a graph of functions, which an evolution strategy changes (Miller and Thomson 2000)."""
+"""Cartesian genetic programming: formulas as a graph of functions, which an evolution strategy optimises (Miller and Thomson 2000)."""
 
 from __future__ import annotations
 
@@ -25,21 +25,25 @@ PENALTY = 3e-3  # of squared coefficients, per row
 
 
 class CartesianPrograms:
-    """Regression by the weighted sum of formulas; the graph is evolved, and the weights of its TERMS outputs are least squares.
+    """Regression by a weighted sum of formulas (Cartesian genetic programming).
 
-    A graph has NODES nodes; each has a function and two arguments, which are inputs or nodes before it.  In each generation the parent has
-    CHILDREN mutated children, and the best of them replaces it unless it is worse, so that neutral changes accumulate.
+    The formulas are the 60 outputs of a graph of 120 nodes. Each node has a function and two arguments, which are inputs or earlier nodes.
+    The graph is evolved: in each generation the parent has 4 mutated children, and the best child replaces the parent unless it is worse,
+    so that neutral changes accumulate. The weights of the outputs are found by least squares.
     """
 
     def __init__(self, seed: int, generations: int = GENERATIONS) -> None:
-        """`seed`: of the evolution, whole and 0 or more."""
+        """Make a regression that is not fitted yet; `seed`: of the evolution, a whole number of at least 0.
+
+        `generations`: number of generations of the evolution.
+        """
         self._seed, self._generations = seed, generations
         self._genes: Ints = np.empty(0, dtype=np.intp)
         self._weights: Array = np.empty(0)
         self._inputs = 0
 
     def fit(self, x: Array, y: Array) -> CartesianPrograms:
-        """Learn targets y (N, t) from inputs x (N, d), both standardised."""
+        """Learn targets y (N, t) from inputs x (N, d), both standardised; return this object."""
         rng, self._inputs = np.random.default_rng([self._seed, 0x636770]), x.shape[1]
         ranges = self._ranges()
         best = rng.integers(ranges)
@@ -54,12 +58,12 @@ class CartesianPrograms:
         return self
 
     def predict(self, x: Array) -> Array:
-        """Return the targets (M, t) for inputs (M, d)."""
+        """Return the predicted targets (M, t) for standardised inputs x (M, d)."""
         found: Array = self._terms(self._genes, x) @ self._weights
         return found
 
     def formulas(self, names: Sequence[str]) -> list[str]:
-        """Return the terms as text, one for each output, the largest weights first; `names`: of the inputs."""
+        """Return the formulas of all outputs as text, those with the largest weights first; `names`: of the inputs."""
         nodes, outputs = self._parts(self._genes)
         texts = list(names)
         for name, first, second in self._steps(nodes):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot that learns to see has seen, with the places that its teacher has reported."""
+"""Lessons of a robot that learns to see: its observations of a ball, with the positions that the teacher has reported."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from mobee.robot.robot import Robot
 from mobee.vision.encoders import Moment
 
 PARTS = ("torso", "head")
-"""The parts whose encoders are inputs: those that move the cameras."""
+"""Names of the parts that move the cameras; their encoders are inputs of a localiser."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lesson:
-    """The ball in both pictures of one moment: pixels (2, 2), the encoders, where the teacher reports it, and where it is, (3,) m.
+    """One observation of the ball in the pictures of both cameras, with the position that the teacher reports.
 
-    `pose`: the number of the teacher's pose.
+    `pixels`: (2, 2) px, column and row of the ball in the left and in the right picture. `moment`: the encoders at the stamp. `reported`,
+    `true`: (3,) m, root frame, position of the ball as the teacher reports it, and as it is. `pose`: number of the teacher's pose.
     """
 
     pixels: Array
@@ -31,10 +32,10 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lessons:
-    """The lessons as arrays.
+    """N lessons as arrays.
 
-    `inputs` (N, d): columns and rows of the ball in the left and right picture [px], then encoders [rad]; `reported` (N, 3) and `true`
-    (N, 3) m, root frame; `poses` (N,): of the teacher.
+    `inputs`: (N, d), columns and rows of the ball in the left and right picture [px], then encoders [rad]. `reported`, `true`: (N, 3) m,
+    root frame, position of the ball as the teacher reports it, and as it is. `poses`: (N,), number of the teacher's pose.
     """
 
     inputs: Array
@@ -44,7 +45,7 @@ class Lessons:
 
     @classmethod
     def of(cls, robot: Robot, lessons: list[Lesson]) -> Lessons:
-        """Stack lessons; the encoders are those of PARTS."""
+        """Convert a list of lessons to arrays; the encoders in the inputs are those of the torso and the head."""
         seeing = seeing_motors(robot)
         rows = [np.concatenate([one.pixels.ravel(), one.moment.q[seeing]]) for one in lessons]
         reported, true = (np.array([getattr(one, name) for one in lessons]) for name in ("reported", "true"))
@@ -58,15 +59,16 @@ class Lessons:
 
 
 def seeing_motors(robot: Robot) -> Ints:
-    """Return the motors of PARTS, in their order."""
+    """Return the indices of the motors of torso and head, which move the cameras, in this order."""
     found: Ints = np.concatenate([np.arange(len(robot.motors))[robot.part(part).slice] for part in PARTS])
     return found
 
 
 def split_by_pose(poses: Ints, held_out: float, seed: int) -> tuple[Ints, Ints]:
-    """Return the rows to learn from, and the rows of a share `held_out` of the teacher's poses, which are never learned from.
+    """Return the rows to learn from, and the rows to test with; `poses`: (N,) number of the teacher's pose in each row.
 
-    The rows to learn from are in the order of shuffled poses, so that the first ones are of few poses as well.
+    All rows of a pose belong to the same set. `held_out`: share of the poses whose rows are for tests, at least one pose. The rows to learn
+    from are sorted by pose, in random order of the poses, so that the first rows belong to few poses.
     """
     each = np.random.default_rng([seed, 0x73706C69]).permutation(np.unique(poses))
     kept = len(each) - max(1, round(held_out * len(each)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Localisers: what learns the place of a thing from its pixels in two pictures and the encoders (thesis 4.1.2; Leitner et al. 2012).
+"""Localisers, which learn the position of a thing from its pixels in two pictures and the encoders (thesis 4.1.2; Leitner et al. 2012).
 
 The inputs (N, 13) are those of `mobee.vision.teaching.lessons`: columns and rows of the thing in the left and right picture [px], then the
 encoders of torso and head [rad], the last three of which are the eyes' tilt, version and vergence, as on the iCub.
@@ -34,20 +34,23 @@ NEAREST = 0.08  # rad: the smallest angle between the rays of both eyes, of a th
 
 
 class Localiser(Protocol):
-    """Learns places from inputs."""
+    """The interface of a localiser, which learns positions of a thing from pixels and encoders.
+
+    An input has 13 numbers: column and row of the thing in the left and right picture [px], then the encoders of torso and head [rad].
+    """
 
     def fit(self, inputs: Array, places: Array) -> None:
-        """Learn from inputs (N, d) and places (N, 3) m; forgets what it has learned before."""
+        """Learn from inputs (N, d) and positions `places` (N, 3) m, root frame; everything learned before is discarded."""
 
     def predict(self, inputs: Array) -> Array:
-        """Return the places (M, 3) m for inputs (M, d)."""
+        """Return the predicted positions (M, 3) m, root frame, for inputs (M, d)."""
 
 
 def eye_features(inputs: Array, lens: Lens) -> Array:
-    """Return the inputs (N, 13) and three numbers more (N, 16): the place relative to the head up to a factor, by the angles of the eyes.
+    """Return the inputs (N, 13) with three more columns, (N, 16): the approximate position relative to the head, up to a factor.
 
-    An eye that is turned by an angle and sees a thing at another angle has it at about their sum; the distance is about the inverse
-    of the angle between the rays of both eyes.  The kinematic model is not used.
+    The position follows from the angles of the eyes: the direction to the thing is about the angle of the eye plus the angle of the thing
+    in the picture, and the distance is about the inverse of the angle between the rays of both eyes. The kinematic model is not used.
     """
     flat = (inputs[:, :4].reshape(-1, 2, 2) - (lens.cx, lens.cy)) / (lens.fx, lens.fy)
     tilt, version, vergence = inputs[:, -3:].T
@@ -60,7 +63,7 @@ def eye_features(inputs: Array, lens: Lens) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scale:
-    """Mean and standard deviation (d,) of columns."""
+    """Mean and standard deviation (d,) of the columns of a table, for standardising."""
 
     mean: Array
     deviation: Array
@@ -72,27 +75,30 @@ class Scale:
         return cls(rows.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
     def standard(self, rows: Array) -> Array:
-        """Return rows (N, d) with the mean 0 and the deviation 1."""
+        """Return rows (N, d) standardised: minus the mean, divided by the standard deviation of each column."""
         found: Array = (rows - self.mean) / self.deviation
         return found
 
     def original(self, rows: Array) -> Array:
-        """Return rows (N, d) that were standardised."""
+        """Return standardised rows (N, d) in the original units; the inverse of `standard`."""
         found: Array = rows * self.deviation + self.mean
         return found
 
 
 class Regression:
-    """A localiser by a regression with the methods of scikit-learn, on standardised `eye_features` and places."""
+    """A localiser that learns by a regression with the interface of scikit-learn, on standardised `eye_features` and positions."""
 
     def __init__(self, lens: Lens, make: Callable[[], Any]) -> None:
-        """`make`: returns a new estimator, of all three coordinates."""
+        """Make a localiser that is not fitted yet; `make`: returns a new estimator, which must predict all three coordinates.
+
+        `lens`: of both cameras.
+        """
         self._lens, self._make = lens, make
         self._estimator: Any = None
         self._of_features = self._of_places = Scale(np.zeros(1), np.ones(1))
 
     def fit(self, inputs: Array, places: Array) -> None:
-        """See `Localiser`."""
+        """Learn from inputs (N, 13) and positions `places` (N, 3) m, root frame; everything learned before is discarded."""
         features = eye_features(inputs, self._lens)
         self._of_features, self._of_places = Scale.of(features), Scale.of(places)
         self._estimator = self._make()
@@ -101,21 +107,27 @@ class Regression:
             self._estimator.fit(self._of_features.standard(features), self._of_places.standard(places))
 
     def predict(self, inputs: Array) -> Array:
-        """See `Localiser`."""
+        """Return the predicted positions (M, 3) m, root frame, for inputs (M, 13)."""
         features = self._of_features.standard(eye_features(inputs, self._lens))
         found: Array = self._of_places.original(self._estimator.predict(features))
         return found
 
 
 class CorrectedStereo:
-    """Stereo by the kinematic model, whose camera mounts and encoder offsets are learned from places, by robust least squares."""
+    """A localiser that triangulates with the kinematic model; it learns corrections of camera mounts and encoder offsets.
+
+    The corrections are found by robust least squares on taught positions.
+    """
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._x: Array = np.zeros(len(rig.names))
 
     def fit(self, inputs: Array, places: Array) -> None:
-        """See `Localiser`; the tolerances of `CameraSettings` are the prior."""
+        """Learn the corrections from inputs (N, 13) and positions `places` (N, 3) m, root frame.
+
+        The prior deviations are the default tolerances of `CameraSettings`. Everything learned before is discarded.
+        """
         from scipy.optimize import least_squares
 
         rig = self._rig
@@ -135,14 +147,15 @@ class CorrectedStereo:
         self._x = parameters(least_squares(residuals, start, loss="soft_l1", max_nfev=ROUNDS).x)
 
     def predict(self, inputs: Array) -> Array:
-        """See `Localiser`."""
+        """Return the triangulated positions (M, 3) m, root frame, for inputs (M, 13); NaN where the rays are parallel."""
         return stereo_places(self._rig, self._x, inputs)
 
 
 def stereo_places(rig: Rig, x: Array, inputs: Array) -> Array:
-    """Return the places (N, 3) m nearest to both rays, by the kinematic model with parameters x (P,) of cameras and encoders.
+    """Return the positions (N, 3) m, root frame, that are nearest to the rays of both cameras; NaN where the rays are parallel.
 
-    NaN where the rays are parallel.
+    `x`: (P,) parameters of cameras and encoders, in the order of `Rig.names`. `inputs`: (N, 13), columns and rows of the thing in the left
+    and right picture [px], then the encoders of torso and head [rad].
     """
     q = np.repeat(rig.robot.home[None], len(inputs), axis=0)
     q[:, seeing_motors(rig.robot)] = inputs[:, 4:]
@@ -195,15 +208,16 @@ REGRESSIONS: Mapping[str, Callable[[int], Any]] = {
     "neural network": _network,
     "genetic programming": _programs,
 }
-"""Estimators by name, made from a seed, without the kinematic model."""
+"""Functions by name of a regression that make its estimator from a seed; these regressions do not use the kinematic model."""
 CORRECTED = "corrected stereo"
 NAMES = (*REGRESSIONS, CORRECTED)
 
 
 def localiser(name: str, rig: Rig, seed: int) -> Localiser:
-    """Return a new localiser by name, one of NAMES; `rig`: the robot and its cameras, of which a regression uses the lens alone.
+    """Return a new localiser by its name, one of NAMES: a regression of REGRESSIONS, or "corrected stereo".
 
-    Raises UnknownName.  Without scikit-learn `fit` raises NotInstalled for those that need it.
+    `rig`: the robot and its cameras; a regression uses only the lens. Raises UnknownName for another name. The method `fit` of a regression
+    that needs scikit-learn raises NotInstalled without it.
     """
     if name == CORRECTED:
         return CorrectedStereo(rig)

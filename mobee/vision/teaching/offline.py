@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated robot is taught: the teacher carries the ball from place to place, and the learner looks at it from random postures."""
+"""Teaches a simulated robot: the teacher carries the ball from place to place, and the learner looks at it from random postures."""
 
 from __future__ import annotations
 
@@ -30,18 +30,19 @@ def watch_teacher(
     share: float,
     seed: int,
 ) -> list[Lesson]:
-    """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures, and return what both cameras saw.
+    """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures of the learner; return the lessons.
 
-    All motions pass the controller, which keeps the robots apart.  The teacher reports where the ball is by its own encoders.  Of each
-    picture the largest ball counts; where there is none, or the sizes in both pictures differ, there is no lesson.
+    All motions are controlled by the control law, which keeps the robots apart. The teacher reports the position of the ball by its own
+    encoders. In each picture the largest ball counts. There is no lesson if a picture shows no ball, or if the sizes of the balls in both
+    pictures differ much.
 
     Args:
-        watcher: the robots, with a ball in their world.
-        carried: the ball.
-        parts: of the teacher.
-        postures: of the teacher.
-        looks: postures of the learner for each.
-        share: of the torso's range that is used.
+        watcher: the simulated robots, with an object "ball" in their world.
+        carried: the ball, as the teacher carries it.
+        parts: names of the teacher's parts.
+        postures: (K, n) rad, of the teacher.
+        looks: number of postures of the learner for each posture of the teacher.
+        share: share of the torso's range that the learner uses, about its home.
         seed: of the learner's postures.
     """
     rng, found = np.random.default_rng([seed, 0x6C6F6F6B]), list[Lesson]()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses postures: of the teacher, which put the ball at places in a volume, and of the learner, from which its cameras see the ball."""
+"""Chooses postures of the teacher, which bring the ball to places in a volume, and of the learner, whose cameras then see the ball."""
 
 from __future__ import annotations
 
@@ -25,32 +25,36 @@ LIMIT = 0.2  # rad, of the teacher from its limits, which push within 10 degrees
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """A ball that a robot carries: on a link of the joined robot, its middle at `position` (3,) m of the root frame at zero pose."""
+    """A ball that a robot carries.
+
+    `link`: name of the link, in the model of both robots together. `position`: (3,) m, middle of the ball in the root frame at the zero
+    pose.
+    """
 
     link: str
     position: Array
 
     def place(self, rig: Rig, transforms: Array) -> Array:
-        """Return its place (..., 3) m for transforms of the links (..., L, 4, 4)."""
+        """Return the position of the ball (..., 3) m, root frame, for transforms of all links (..., L, 4, 4)."""
         link = transforms[..., rig.robot.links.index(self.link), :3, :]
         found: Array = link[..., :3] @ self.position + link[..., 3]
         return found
 
 
 def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volume: tuple[Array, Array], count: int, seed: int) -> Array:
-    """Return postures (count, n) rad of the teacher, the others at `rest`, that put the ball into a volume without contact.
+    """Return postures (count, n) rad in which the teacher holds the ball within a volume, without contacts.
 
     Args:
-        rig: the robots, joined.
-        model: of them in their world.
+        rig: both robots as one model, with the cameras.
+        model: the robots in their world, for the contacts.
         carried: the ball.
-        rest: posture (n,) rad of all motors that do not move the ball.
-        volume: the lowest and the highest corner (3,) m.
-        count: of postures.
-        seed: of the draws.
+        rest: (n,) rad, positions of all motors that do not move the ball.
+        volume: the lowest and the highest corner of the volume, (3,) m each, root frame.
+        count: number of postures.
+        seed: of the random draws.
 
     Raises:
-        InvalidValue: too few are found.
+        InvalidValue: too few postures were found.
     """
     robot, rng = rig.robot, np.random.default_rng([seed, 0x74656163])
     moving = _moving(rig, carried.link)
@@ -74,9 +78,19 @@ def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volu
 def gaze_postures(
     rig: Rig, model: Model, carried: Carried, posture: Array, share: float, size: tuple[int, int], count: int, rng: np.random.Generator
 ) -> Array:
-    """Return postures (K, n) rad, K <= count, of torso and head at random from which the model's cameras have the ball in their pictures.
+    """Return postures (K, n) rad, K <= count, in which both cameras of the model see the ball, without contacts.
 
-    `posture` (n,) rad: of all other motors; `share`: of the torso's range, about home, within which it is drawn; `size`: of a picture.
+    Torso and head are drawn at random.
+
+    Args:
+        rig: both robots as one model, with the cameras.
+        model: the robots in their world, for the contacts.
+        carried: the ball.
+        posture: (n,) rad, positions of all other motors.
+        share: share of the torso's range, about its home, in which the torso is drawn.
+        size: width and height of a picture, px.
+        count: largest number of postures.
+        rng: draws the postures.
     """
     kept = np.empty((0, len(posture)))
     motors = seeing_motors(rig.robot)

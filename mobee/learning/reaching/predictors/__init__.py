@@ -27,4 +27,4 @@ PREDICTORS: dict[str, PredictorOf] = {
     "networks": Networks,
     "gp": GaussianProcess,
 }
-"""By name: the class or function that makes a predictor without any observed reach."""
+"""By name, the class or function that makes a predictor that has not observed any reach."""

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The covariance of the Gaussian process over reaches, and the parameters of highest evidence.
+"""The covariance function of the Gaussian process over reaches, and the fit of its parameters.
 
-Rewards are correlated for reaches from similar poses for near targets ("place"), from similar poses with similar vectors from hand to
-target ("approach"), with similar remaining errors in any pose ("distance"), and slightly for all reaches ("offset").
+The covariance of the mean rewards of two reaches has four parts: for similar poses and near targets ("place"), for similar poses and
+similar vectors from hand to target ("approach"), for similar remaining distances in any poses ("distance"), and a small part for all
+reaches ("offset").
 """
 
 from __future__ import annotations
@@ -35,9 +36,10 @@ _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTA
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Reaches: from `state` (n,) for `target` (n, 3) m.
+    """The features of n reaches that the covariance function needs.
 
-    `vector`: (n, 3) m, from the hand to the target.  `remaining`: (n,) m, error that a linear arm would leave.
+    `state`: (n,) where each reach starts. `target`: (n, 3) m, root frame. `vector`: (n, 3) m, from the hand to the target. `remaining`:
+    (n,) m, the distance that remains after the reach according to the `LinearArm`.
     """
 
     state: Ints
@@ -47,30 +49,34 @@ class Points:
 
 
 def points(arm: LinearArm, state: Ints, target: Array) -> Points:
-    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m]."""
+    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m], root frame."""
     targets = np.broadcast_to(target, (len(state), 3))
     vector = targets - arm.reaches.hands[state]
     return Points(state, targets, vector, arm.remaining(state, vector))
 
 
 def default_parameters(reaches: Reaches) -> Array:
-    """Return the logarithms of the parameters before the first fit, shape (8 + d,): `DEFAULTS` and one length for each joint."""
+    """Return the logarithms of the covariance parameters before the first fit, shape (8 + d,).
+
+    First come the parameters in `DEFAULTS` (variances of rewards, and lengths in m), then one length for each joint, in units of the spread
+    of its samples.
+    """
     return np.log([*DEFAULTS.values(), *[DEFAULT_JOINT] * reaches.samples.shape[1]])
 
 
 def joint_squares(reaches: Reaches) -> Array:
-    """Return squared differences of the samples, in units of their spread, shape (d, S, S)."""
+    """Return for each joint the squared differences between all states' samples, in units of their spread, shape (d, S, S)."""
     scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
     squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
     return squares
 
 
 class Covariance:
-    """The covariance function of given parameters.
+    """The covariance function of the mean rewards of reaches, for given parameters.
 
     Args:
-        squares: of the differences of the samples, see `joint_squares`.
-        logs: logarithms of the parameters, see `default_parameters`.
+        squares: (d, S, S) squared differences of the samples, from `joint_squares`.
+        logs: (8 + d,) logarithms of the parameters, in the order of `default_parameters`.
     """
 
     def __init__(self, squares: Array, logs: Array) -> None:
@@ -84,16 +90,16 @@ class Covariance:
 
     @property
     def noise(self) -> float:
-        """Variance of one reward around its mean."""
+        """The variance of one reward around the mean reward of its reach."""
         return float(self._value[_NOISE])
 
     @property
     def prior(self) -> float:
-        """The prior variance of the mean reward of a reach, before any reach was observed."""
+        """The variance of the mean reward of a reach before any reach was observed."""
         return float(OFFSET + self._value[[_PLACE, _APPROACH, _DISTANCE]].sum())
 
     def between(self, a: Points, b: Points) -> Array:
-        """Return the covariances of the mean rewards of reaches, shape (a, b)."""
+        """Return the covariances of the mean rewards of n reaches `a` and m reaches `b`, shape (n, m)."""
         pair = np.ix_(a.state, b.state)
         place = self._by_place[pair] * np.exp(_squared(a.target, b.target) * (-0.5 / self._value[_PLACE_L] ** 2))
         approach = self._by_approach[pair] * np.exp(_squared(a.vector, b.vector) * (-0.5 / self._value[_APPROACH_L] ** 2))
@@ -102,7 +108,11 @@ class Covariance:
         return total
 
     def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
-        """Return the covariance (n, n) of average rewards over `count` (n,) tries each, and a function that sums its derivatives."""
+        """Return the covariance (n, n) of the average rewards of n reaches, and a function that sums its derivatives.
+
+        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. The function takes weights (n, n)
+        and returns the derivatives, with respect to the logarithms of the parameters, of the sum of weights times covariance, (8 + d,).
+        """
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
         approach_far = _squared(a.vector, a.vector) / value[_APPROACH_L] ** 2
@@ -150,9 +160,17 @@ MAX_STEPS = 40  # of the search
 
 
 def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> tuple[float, Array]:
-    """Return the negative logarithm of evidence times prior of the parameters, up to a constant, and its derivatives (P,).
+    """Return the negative log posterior of the covariance parameters, up to a constant, and its derivatives (8 + d,).
 
-    `expected`: (n,), prior rewards of the pairs.  The rewards enter by their average and their scatter, which is equivalent to using each.
+    It is the negative logarithm of the evidence (marginal likelihood) of the rewards times the prior of the parameters. The average reward
+    of each pair and the scatter around it are used, which is equivalent to using every reward.
+
+    Args:
+        logs: (8 + d,) logarithms of the parameters.
+        arm: gives the features of the reaches.
+        squares: (d, S, S), from `joint_squares`.
+        reached: the n pairs of state and target that were tried, with their rewards.
+        expected: (n,) prior mean reward of each pair.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -174,7 +192,10 @@ def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached:
 
 
 def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
-    """Return the logarithms of the best parameters, searched from `logs` (P,)."""
+    """Return the logarithms of the parameters with the highest posterior, (8 + d,), by a local search from `logs`.
+
+    The arguments are as for `negative_log_posterior`.
+    """
     from scipy.optimize import minimize
 
     bounds = [(middle - 4.0 * PRIOR_DEVIATION, middle + 4.0 * PRIOR_DEVIATION) for middle in default_parameters(arm.reaches)]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussian process regression of the rewards over poses and targets: the best predictor here.
+"""Gaussian process regression of rewards over poses and targets: the best predictor of this package.
 
-The triangular factor of the covariance grows by a row for each reach.  For every queried target, the rows of its states are cached and
-continued at the next query, in whole blocks, so that predictions depend on the reaches alone and not on earlier queries.
+The triangular factor of the covariance gets one more row for each reach. For every queried target, the rows of its states are cached. At
+the next query they are continued in whole blocks, so that predictions depend only on the reaches and not on earlier queries.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one ta
 
 
 class Query:
-    """The cached rows (n, S) of a queried target, of which the first `done` are final, and their sums."""
+    """The cache of one queried target: its rows (n, S), of which the first `done` are final, and mean and covariance computed from them."""
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
         self.at, self.done, self.upto = at, 0, 0
@@ -33,13 +33,13 @@ class Query:
 
 
 class Posterior:
-    """Mean and covariance of the rewards of all states for a target.
+    """The posterior of a Gaussian process: mean and covariance of the rewards of reaches from all states for any target.
 
     Args:
         arm: gives the prior mean.
-        covariance: of the mean rewards.
-        state: (n,) of the first reaches, for `target` (n, 3) m.
-        residual: (n,) averages of `count` (n,) rewards, minus the prior mean.
+        covariance: the covariance function of the mean rewards.
+        state: (n,) states of the reaches observed so far, each for a `target` (n, 3) m.
+        residual: (n,) average of `count` (n,) rewards, minus the prior mean.
     """
 
     def __init__(self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
@@ -64,12 +64,12 @@ class Posterior:
         return self._used
 
     def about(self, target: Array) -> tuple[Array, Array]:
-        """Return mean (S,), less the prior mean, and covariance (S, S) of the mean rewards of all states for a target (3,) m."""
+        """Return the mean (S,), minus the prior mean, and the covariance (S, S) of the mean rewards of all states for a target (3,) m."""
         known = self._updated(target)
         return known.mean, known.covariance
 
     def append(self, state: int, target: Array, residual: float) -> None:
-        """Add one reach."""
+        """Add one reach. `residual`: its reward minus the prior mean."""
         known = self._updated(target)
         row = self._used
         if row == len(self._score):
@@ -136,14 +136,15 @@ JITTER = 1e-9  # of the prior variance, added to the diagonal against rounding e
 
 
 class GaussianProcess:
-    """Gaussian process regression, exact up to about 2500 pairs of a state and a target; beyond, near targets of a state are merged.
+    """Predicts rewards by Gaussian process regression.
 
-    For spaces of some hundred states: time and memory grow with their square.
-    A repeated query of a target takes less than a millisecond, the first query up to 30 ms after many reaches.
+    It is exact up to about 2500 pairs of state and target; with more pairs, near targets of a state are merged. Use it for spaces of some
+    hundred states: time and memory grow with the square of this number. A repeated query of a target takes less than a millisecond, the
+    first query up to 30 ms after many reaches.
 
     Args:
-        reaches: the reach actions.
-        refits: numbers of reaches after which the parameters are fitted to the evidence.
+        reaches: the reach actions: the marker's position in each state.
+        refits: numbers of reaches after which the parameters of the covariance are fitted again.
     """
 
     def __init__(self, reaches: Reaches, refits: tuple[int, ...] = REFITS) -> None:
@@ -156,11 +157,11 @@ class GaussianProcess:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name and settings, as plain JSON values."""
+        """The name of the predictor and its settings, as JSON values."""
         return {"name": "gp", "before": "linear arm", "refits": list(self._refits)}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
         if self._reached.pair(state, target) is not None:
             self._repeats += 1
         self._pending.append((state, target.copy(), reward - self._arm.rewards(np.array([state]), target).item()))
@@ -171,16 +172,16 @@ class GaussianProcess:
             self._rebuild()
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of reaching from each state, shape (S,)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
         return self._prior_mean(target) + self._about(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviations of the mean rewards, shape (S,)."""
+        """Return the standard deviation of the mean reward of a reach from each state for a target (3,) m, shape (S,)."""
         deviation: Array = np.sqrt(np.maximum(self._about(target)[1].diagonal(), 0.0))
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return one joint draw of the mean rewards of all states, shape (S,)."""
+        """Return a random sample of the mean rewards of all states for a target (3,) m, shape (S,), with their correlations."""
         mean, covariance = self._about(target)
         jitter = JITTER * self._covariance.prior * np.eye(len(mean))
         drawn: Array = self._prior_mean(target) + mean + np.linalg.cholesky(covariance + jitter) @ rng.standard_normal(len(mean))
@@ -214,9 +215,10 @@ class GaussianProcess:
 
 
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array]:
-    """Return state, target (n, 3), average reward and number of tries of pairs; near targets are merged if there are more than `most`.
+    """Return state (n,), target (n, 3) m, average reward (n,) and number of tries (n,) of the pairs of state and target.
 
-    At least one pair of each state remains.
+    If there are more than `most` pairs, near targets of the same state are merged: in larger and larger cells of a grid, until there are
+    few enough. At least one pair of each state remains.
     """
     state, raster, step = known.state, *RASTER
     which = np.arange(len(known))

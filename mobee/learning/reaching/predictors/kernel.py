@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nadaraya-Watson kernel regression of the rewards over poses and targets; scales by leave-one-out."""
+"""Nadaraya-Watson kernel regression of rewards over poses and targets; the widths of the kernels are chosen by leave-one-out errors."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ MAX_LEFT_OUT = 400  # pairs that are predicted from all others
 
 
 class Kernel(Independent):
-    """Averages rewards with Gaussian weights over poses and targets; where there are few reaches, shrinks towards the average or a prior.
+    """Predicts rewards by averages with Gaussian weights over poses and targets.
+
+    Where few reaches are near, the prediction is close to the prior mean.
 
     Args:
-        reaches: the reach actions.
-        prior: True: shrink towards the reward expected from the distance of hand and target; False: towards the average of all rewards.
+        reaches: the reach actions: the marker's position in each state.
+        prior: the prior mean: True: the reward expected from the distance between hand and target; False: the average of all rewards.
     """
 
     def __init__(self, reaches: Reaches, prior: bool = False) -> None:
@@ -39,16 +41,16 @@ class Kernel(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name, as plain JSON values."""
+        """The name of the predictor, as JSON values."""
         return {"name": "kernel_prior" if self._prior else "kernel"}
 
     @property
     def scales(self) -> tuple[float, float]:
-        """Kernel widths of the poses, in units of the spread of the samples, and of the targets, in m."""
+        """The widths of the kernels: of the poses, in units of the spread of the samples, and of the targets, in m."""
         return self._scales
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
         super().add(state, target, reward, expected)
         if self._reached.tries >= self._next:
             self._refit()

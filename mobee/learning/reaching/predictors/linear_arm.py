@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predicts the remaining error of a reach from a linear arm: springs at the joints, a force at the hand.
+"""Predicts the distance that remains after a reach with a linear arm: springs at the joints, and a force at the hand.
 
-In a state with the Jacobian J, a force proportional to the remaining error e turns the joints by g J^T e, against their springs.  So for
-the vector w from hand to target, e = (I + g J J^T)^-1 w.  The compliance g is one number for all states, fitted to the rewards.
+In a state with the Jacobian J, a force proportional to the remaining error e turns the joints by g J^T e, against their springs. So for the
+vector w from hand to target, e = (I + g J J^T)^-1 w. The compliance g is one number for all states, fitted to the rewards.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ PRIOR_WEIGHT = 1.0  # of slope 1 in the fit of the linear function, in reaches
 
 
 class LinearArm:
-    """An arm of given compliance, and a linear function from the arm's rewards to the expected rewards.
+    """Predicts rewards by a linear arm with springs: reward = offset + slope * the reward of the distance that this arm leaves.
 
     Args:
-        reaches: the reach actions; without Jacobians the arm does not move, and the whole distance remains.
-        compliance: g, in rad/m^2.
-        offset, slope: of the linear function.
+        reaches: the reach actions: the marker's position and Jacobian in each state. Without Jacobians the arm does not move, and the whole
+            distance remains.
+        compliance: g of the springs, in rad/m^2.
+        offset, slope: of the linear function from the arm's rewards to the expected rewards.
     """
 
     def __init__(self, reaches: Reaches, compliance: float = DEFAULT_COMPLIANCE, offset: float = 0.0, slope: float = 1.0) -> None:
@@ -34,18 +35,18 @@ class LinearArm:
         self._shares: Array = np.asarray(np.linalg.inv(np.eye(3) + compliance * squares), dtype=np.float64)
 
     def remaining(self, state: Ints, vector: Array) -> Array:
-        """Return the remaining errors of vectors (n, 3) m from hand to target in states (n,), shape (n,), in m."""
+        """Return the distances [m] that remain after reaches from states (n,), shape (n,). `vector`: (n, 3) m, from hand to target."""
         remaining = np.einsum("nij,nj->ni", self._shares[state], vector)
         length: Array = np.sqrt((remaining**2).sum(axis=1))
         return length
 
     def rewards(self, state: Ints, target: Array) -> Array:
-        """Return the expected rewards of reaching from states (n,) for targets (n, 3) m, or for one (3,) m, shape (n,)."""
+        """Return the expected rewards of reaches from states (n,) for targets (n, 3) m, or for one target (3,) m, shape (n,)."""
         expected: Array = self.offset + self.slope * self._own(state, target)
         return expected
 
     def fitted(self, known: Reached) -> LinearArm:
-        """Return the arm whose compliance and linear function fit the observed rewards with the least squared error."""
+        """Return a new arm whose compliance and linear function fit the average rewards of the pairs in `known` with least squares."""
         target = known.places[known.target]
         return min((self._with(compliance, known, target) for compliance in COMPLIANCES), key=lambda found: found[0])[1]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearest-neighbour regression: rewards of reaches from similar poses over similar vectors from hand to target."""
+"""Nearest-neighbour regression of rewards, over poses and vectors from hand to target."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ MAX_CACHED = 256  # targets whose neighbours are in memory
 
 
 class Nearest(Independent):
-    """Averages the five nearest reaches, weighted by inverse squared distance and shrunk towards the average of all; repeats are merged.
+    """Predicts a reward by a weighted average of the five nearest reaches: from similar poses, with similar vectors from hand to target.
+
+    The weights are inverse squared distances; the average of all rewards has a small weight too. Repeated reaches count as one.
 
     Args:
-        reaches: the reach actions.
+        reaches: the reach actions: the marker's position in each state.
     """
 
     def __init__(self, reaches: Reaches) -> None:
@@ -38,7 +40,7 @@ class Nearest(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name, as plain JSON values."""
+        """The name of the predictor, as JSON values."""
         return {"name": "nearest"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:

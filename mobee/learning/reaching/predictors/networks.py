@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small ensemble of neural networks; their disagreement is the uncertainty."""
+"""A small ensemble of neural networks that predict rewards; their disagreement is the uncertainty."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ LENGTH_SCALE = 0.1  # m, unit of vectors and positions in the inputs
 
 
 class Networks:
-    """Networks of two hidden layers; inputs are the joints, the target, and the vector from hand to target.
+    """Predicts rewards by five neural networks with two hidden layers of 32 units; their disagreement is the uncertainty.
 
-    Each reach has for each network a weight drawn from a Poisson distribution (online bootstrap).
-    Unlike with the other predictors, the order of the reaches matters.
+    The inputs are the joints, the target, and the vector from hand to target with its length. Each network counts each reach a random
+    number of times, drawn from a Poisson distribution (online bootstrap). Unlike with the other predictors, the order of the reaches
+    matters.
 
     Args:
-        reaches: the reach actions.
-        seed: of weights and draws.
+        reaches: the reach actions: the marker's position in each state.
+        seed: seed of the first weights and of all random choices during learning.
     """
 
     def __init__(self, reaches: Reaches, seed: int = 0) -> None:
@@ -47,11 +48,14 @@ class Networks:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name and seed, as plain JSON values."""
+        """The name of the predictor and its seed, as JSON values."""
         return {"name": "networks", "seed": self._seed}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach, and again from earlier ones."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m, and again from some earlier reaches.
+
+        `expected` is not used.
+        """
         if self._tries == len(self._rewards):
             self._inputs, self._rewards = (np.concatenate([one, one]) for one in (self._inputs, self._rewards))
             self._copies = np.concatenate([self._copies, self._copies], axis=1)
@@ -63,17 +67,17 @@ class Networks:
             self._descend()
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of reaching from each state, shape (S,): the average of the networks."""
+        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,): the average of the networks."""
         mean: Array = self._each(target).mean(axis=0)
         return mean
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation among the networks, shape (S,)."""
+        """Return the standard deviation of the networks' predictions of a reach from each state for a target (3,) m, shape (S,)."""
         deviation: Array = self._each(target).std(axis=0, ddof=1)
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the prediction of one network drawn at random, shape (S,)."""
+        """Return the predictions of one network, drawn at random, for a target (3,) m, shape (S,)."""
         drawn: Array = self._each(target)[rng.integers(NETWORKS)]
         return drawn
 
@@ -106,14 +110,22 @@ class Networks:
 
 
 def layers(weights: list[Array], biases: list[Array], inputs: Array) -> list[Array]:
-    """Return the activations of the three layers for inputs (n, inputs) or (networks, n, inputs), each (networks, n, size)."""
+    """Return the activations of the two hidden layers and of the output layer, each (networks, n, size of the layer).
+
+    `weights`: of the three layers, each (networks, inputs, outputs); `biases`: each (networks, 1, outputs). `inputs`: (n, features), or
+    (networks, n, features) with own inputs for each network.
+    """
     first = np.tanh(inputs @ weights[0] + biases[0])
     second = np.tanh(first @ weights[1] + biases[1])
     return [first, second, 1.0 / (1.0 + np.exp(-(second @ weights[2] + biases[2])))]
 
 
 def slopes(weights: list[Array], biases: list[Array], inputs: Array, rewards: Array, copies: Array) -> list[Array]:
-    """Return the derivatives of half the mean squared error, each reach counted `copies` (networks, n) times, by weights and by biases."""
+    """Return the derivatives of half the mean squared error of the networks: with respect to the weights of each layer, then to the biases.
+
+    `weights`, `biases`: as for `layers`. `inputs`: (networks, n, features). `rewards`: (networks, n). `copies`: (networks, n), how often
+    each reach counts.
+    """
     first, second, predicted = layers(weights, biases, inputs)
     out = ((predicted[..., 0] - rewards) * copies)[..., None] * predicted * (1.0 - predicted) / inputs.shape[1]
     back = (out @ weights[2].swapaxes(1, 2)) * (1.0 - second**2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reaches so far, repeats merged, and the base of predictors that treat states independently."""
+"""The reaches observed so far, with repeated ones merged, and the base of predictors that treat states as independent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ IMAGINED = 4.0  # weight of these two, in pairs
 
 
 class Reached:
-    """Pairs of a state and a target in the order of their first reaches, with the number, sum and squares of their rewards."""
+    """The reaches observed so far, by pair of state and target: the number, the sum and the sum of squares of the rewards of each pair.
+
+    The pairs are in the order of their first reaches.
+    """
 
     def __init__(self) -> None:
         self._target_of: dict[bytes, int] = {}
@@ -25,24 +28,24 @@ class Reached:
         self._state, self._target = np.empty(8, dtype=np.intp), np.empty(8, dtype=np.intp)
         self._count, self._total, self._squares = np.zeros(8), np.zeros(8), np.zeros(8)
         self.tries = 0
-        """Reaches so far, repeats included."""
+        """Number of reaches so far; repeated ones count each time."""
 
     def __len__(self) -> int:
         return len(self._pair_of)
 
     @property
     def places(self) -> Array:
-        """Distinct targets, shape (T, 3), in m."""
+        """The positions of the distinct targets, shape (T, 3), in [m], root frame."""
         return self._places[: len(self._target_of)]
 
     @property
     def state(self) -> Ints:
-        """State of each pair, shape (n,)."""
+        """The state of each pair of state and target, shape (n,)."""
         return self._state[: len(self)]
 
     @property
     def target(self) -> Ints:
-        """Index among the distinct targets of each pair, shape (n,)."""
+        """The target of each pair of state and target, as an index into `places`, shape (n,)."""
         return self._target[: len(self)]
 
     @property
@@ -52,27 +55,27 @@ class Reached:
 
     @property
     def mean(self) -> Array:
-        """Average reward of each pair, shape (n,)."""
+        """The average reward of each pair of state and target, shape (n,)."""
         average: Array = self._total[: len(self)] / self.count
         return average
 
     @property
     def scatter(self) -> float:
-        """Sum over all reaches of the squared difference from the average of their pair."""
+        """The sum over all reaches of the squared difference between the reward and the average reward of its state and target."""
         within = self._squares[: len(self)] - self._total[: len(self)] ** 2 / self.count
         return float(np.maximum(within, 0.0).sum())
 
     def find(self, target: Array) -> int | None:
-        """Return the index of a target among the distinct ones; None: never tried."""
+        """Return the index of a target (3,) m in `places`; None if it was never tried."""
         return self._target_of.get(target.tobytes())
 
     def pair(self, state: int, target: Array) -> int | None:
-        """Return the index of a pair of state and target; None: never tried."""
+        """Return the index of a pair of state and target (3,) m; None if the pair was never tried."""
         known = self.find(target)
         return None if known is None else self._pair_of.get((state, known))
 
     def add(self, state: int, target: Array, reward: float) -> int:
-        """Add one reach; return the index of its pair of state and target, which is new at the first try."""
+        """Record one reach; return the index of its pair of state and target. The first reach of a pair adds the pair."""
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
         self._places = grown(self._places, place)
@@ -89,14 +92,20 @@ class Reached:
 
 
 def around(known: Reached) -> tuple[float, float]:
-    """Return average and variance of the mean rewards; a few imagined rewards are included, so that both exist from the start."""
+    """Return the average and the variance of the average rewards of all pairs.
+
+    Four imagined pairs, with average 0.3 and standard deviation 0.25, are included, so that both results exist before the first reach.
+    """
     rewards, pairs = known.mean, len(known) + IMAGINED
     middle = (rewards.sum() + IMAGINED * EXPECTED) / pairs
     return float(middle), float((((rewards - middle) ** 2).sum() + IMAGINED * SPREAD**2) / pairs)
 
 
 class Independent(ABC):
-    """Base of predictors with independent normal distributions of the mean rewards, computed from the reaches in `_reached`."""
+    """Base of predictors for which the mean rewards of the states are independent normal variables.
+
+    A subclass computes their means and standard deviations, in `_posterior`, from the reaches in `_reached`.
+    """
 
     def __init__(self) -> None:
         self._reached = Reached()
@@ -104,22 +113,22 @@ class Independent(ABC):
     @property
     @abstractmethod
     def settings(self) -> dict[str, Any]:
-        """Settings that determine its predictions, as plain JSON values."""
+        """The name of the predictor and the settings that determine its predictions, as JSON values."""
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
         self._reached.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of reaching from each state, shape (S,)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
         return self._posterior(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviations of the mean rewards, shape (S,)."""
+        """Return the standard deviation of the mean reward of a reach from each state for a target (3,) m, shape (S,)."""
         return self._posterior(target)[1]
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return one independent draw of each mean reward, shape (S,)."""
+        """Return a random sample of the mean reward of a reach from each state for a target (3,) m, shape (S,), drawn independently."""
         drawn: Array = rng.normal(*self._posterior(target))
         return drawn
 

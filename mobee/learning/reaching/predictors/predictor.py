@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of reward predictors, and the prior from the distance between hand and target."""
+"""The interface of predictors of rewards, and a prior mean from the distance between hand and target."""
 
 from __future__ import annotations
 
@@ -14,31 +14,40 @@ from mobee.learning.reaching.reaches import Reaches
 
 @runtime_checkable
 class RewardPredictor(Protocol):
-    """Predicts rewards of reaching from each of S states.
+    """The interface of predictors: predicts the reward of a reach from each of S states for any target.
 
-    Predictions must follow from its settings and the sequence of `add` alone, so that they can be rebuilt from a record; the other
-    methods change nothing.  Targets are positions (3,) m, root frame, any number of distinct ones.
+    Predictions must depend only on the settings and the sequence of calls of `add`, so that they can be rebuilt from a record; all other
+    methods change nothing. Targets are positions (3,) m, root frame; there may be any number of different ones.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach from a state; `expected`: the value of `mean` just before."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m.
+
+        `expected`: the reward that `mean` predicted just before.
+        """
         ...
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of reaching from each state, shape (S,)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
         ...
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation of the expected rewards, shape (S,); raises InvalidValue if it has none."""
+        """Return the standard deviation of the expected reward of a reach from each state for a target (3,) m, shape (S,).
+
+        Raises InvalidValue if the predictor has no deviations.
+        """
         ...
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return one draw of the reward function, shape (S,); raises InvalidValue if it has no distribution."""
+        """Return a random sample of the rewards of a reach from each state for a target (3,) m, shape (S,).
+
+        Raises InvalidValue if the predictor has no distribution.
+        """
         ...
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings that determine its predictions, as plain JSON values."""
+        """The name of the predictor and the settings that determine its predictions, as JSON values."""
         ...
 
 
@@ -48,13 +57,16 @@ SHRINKAGE = 0.1  # weight of the average of all rewards at each knot, in reaches
 
 
 def lengths(reaches: Reaches, target: Array) -> Array:
-    """Return the distance from each state's hand to a target, shape (S,), or to targets (T, 3), shape (S, T), in m."""
+    """Return the distance [m] between the hand in each state and a target (3,) m, shape (S,); for targets (T, 3), shape (S, T)."""
     far: Array = np.sqrt(((target - reaches.hands.reshape(-1, *[1] * (target.ndim - 1), 3)) ** 2).sum(axis=-1))
     return far
 
 
 class DistancePrior:
-    """Expected reward by distance: linear between knots, fitted to all reaches so far, constant beyond the last knot."""
+    """The expected reward as a function of the distance between hand and target, fitted to all reaches in `known`.
+
+    It is linear between KNOTS (every 5 cm up to 0.6 m), and constant beyond the last of them.
+    """
 
     def __init__(self, reaches: Reaches, known: Reached) -> None:
         self._reaches = reaches
@@ -65,7 +77,7 @@ class DistancePrior:
         self._values = np.linalg.solve(square, (weights.T * known.count) @ known.mean + SHRINKAGE * middle)
 
     def mean(self, target: Array) -> Array:
-        """Return expected rewards, shape (S,), or (S, T) for targets (T, 3)."""
+        """Return the expected rewards of reaches from each state for a target (3,) m, shape (S,), or for targets (T, 3), shape (S, T)."""
         far = lengths(self._reaches, target)
         expected: Array = np.interp(far, KNOTS, self._values)
         return expected

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A table of mean rewards for each state and target, without generalisation."""
+"""A predictor without generalisation: a table with the mean reward of each state and target."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ NOISE = 0.05  # standard deviation of a reward around its mean, before there are
 
 
 class Table(Independent):
-    """Averages the rewards of each pair of state and target; where there are few, shrinks towards the average of all rewards.
+    """Predicts the average reward of each pair of state and target; if a pair has few rewards, the average of all has more weight.
 
     The model: mean rewards are normally distributed around the average of all, and the rewards of a pair around their mean.
 
-
     Args:
-        reaches: the reach actions.
+        reaches: the reach actions, one for each state.
     """
 
     def __init__(self, reaches: Reaches) -> None:
@@ -30,7 +29,7 @@ class Table(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name, as plain JSON values."""
+        """The name of the predictor, as JSON values."""
         return {"name": "table"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The published predictor: averages over a state's history weighted by the distance of targets (thesis eq. 8.5)."""
+"""The published predictor: the average of a state's rewards, weighted by the distance between targets (thesis eq. 8.5)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ _NO_DEVIATION = (
 
 
 class Weighted:
-    """Predicts optimistic weighted averages: 1 for a state that was never tried, and nearly 1 for targets far from those tried.
+    """The predictor of the thesis: for each state an average of its rewards, in which nearer targets have more weight.
+
+    It is optimistic, because each average includes an imagined reward of 1: the prediction is 1 for a state that was never tried, and
+    nearly 1 for targets far from those that were tried.
 
     Args:
-        reaches: the reach actions.
+        reaches: the reach actions: their number, and the unit of distances.
     """
 
     def __init__(self, reaches: Reaches) -> None:
@@ -30,21 +33,21 @@ class Weighted:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Its name and the unit of distances, as plain JSON values."""
+        """The name of the predictor, and the unit of distances `scale` in m, as JSON values."""
         return {"name": "weighted", "scale": self._scale}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append a reach to the history of its state (thesis eq. 8.2)."""
+        """Append the reward of a reach for a target (3,) m to the history of its state (thesis eq. 8.2). `expected` is not used."""
         self._rewards.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of reaching from each state, shape (S,) (thesis eq. 8.5)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,) (thesis eq. 8.5)."""
         return self._rewards.average(target, 1.0)
 
     def deviation(self, target: Array) -> NoReturn:
-        """Raise InvalidValue: an average has no deviation."""
+        """Raise InvalidValue: this predictor has no standard deviations."""
         raise InvalidValue(_NO_DEVIATION)
 
     def sample(self, target: Array, rng: np.random.Generator) -> NoReturn:
-        """Raise InvalidValue: there is no distribution to draw from."""
+        """Raise InvalidValue: this predictor has no distribution from which to draw a sample."""
         raise InvalidValue(_NO_DEVIATION)

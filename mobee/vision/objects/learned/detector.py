@@ -16,7 +16,7 @@ FAINT = 0.1  # share below which a pixel counts as without the thing
 
 
 def by_network(network: Network, things: Sequence[Thing]) -> Detector:
-    """Return the detector that finds the regions in which a network sees some of its things."""
+    """Return a detector that finds the given things with a network; the things must be among those of the network."""
     shares = network.shares()
     names = [one.name for one in network.things]
     numbers = [names.index(one.name) for one in things]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edges of regions to a fraction of a pixel: how much of a pixel is of the region, by the colours inside and outside nearby."""
+"""Edges of regions to a fraction of a pixel, from the colours inside and outside of the region."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ SQUARE = np.ones((3, 3), np.bool_)
 
 
 def sharpened(picture: Picture, shares: Floats) -> Floats:
-    """Return shares (H, W) of a thing in each pixel with edges by colour.
+    """Return the shares (H, W) of a thing in each pixel with sharper edges, from the shares that a network computed.
 
-    A network knows where a thing is, but its shares beside an edge are smooth.  There the colour of a pixel is mixed of two,
-    that inside and that outside, and its place on the line between them is the share.
+    The network's shares are smooth at an edge. There, the colour of a pixel is a mixture of the colours inside and outside, and the
+    proportion of the inside colour is the share. `picture`: (H, W, 3).
     """
     labels = label(shares >= 0.5, diagonal=True)
     found = shares.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How good a detector is on labelled pictures."""
+"""Measures the quality of a detector on labelled pictures."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ WHOLE = 0.99  # share of an outline within the picture, and of its hull that is 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How good a detector is.
+    """The quality of a detector on labelled pictures.
 
-    `pictures`: their number.  `found`: by thing, the share of those wholly visible that are found within `NEAR`; NaN if there were none.
-    `error`: of the middles of their outlines, median, px.  `false_regions`: detections a picture whose middle does not show the thing.
-    `seconds`: processor time a picture.
+    `pictures`: number of pictures. `found`: by thing, the share of its wholly visible outlines that were found within 2 px; NaN if there
+    were none. `error`: median error of the middles of the found outlines, px. `false_regions`: number of detections per picture whose
+    middle does not show the thing. `seconds`: processor time per picture.
     """
 
     pictures: int
@@ -34,7 +34,10 @@ class Quality:
 
 
 def judge(detect: Detector, names: Sequence[str], pictures: Sequence[Labelled]) -> Quality:
-    """Return how good a detector is on labelled pictures, whose shares are those of things with these names."""
+    """Measure the quality of a detector on labelled pictures.
+
+    `names`: names of the things, in the order of the pictures' `shares`.
+    """
     errors: dict[str, list[float]] = {name: [] for name in names}
     false, seconds = 0, 0.0
     for one in pictures:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The network of a learned detector: three convolutions, kept as ONNX with the things that it was trained for, and run by OpenCV.
+"""The network of a learned detector: three convolutions, stored as ONNX with the things it was trained for, and run by OpenCV.
 
 The first convolution has two inputs around each pixel: 5 x 5 adjacent pixels, which show the edge, and 5 x 5 pixels with a spacing of
-`APART`, which show what is around it.  The others combine its numbers in each pixel.
+`APART` (5 pixels), which show the surroundings. The other two convolutions combine the results within each pixel.
 """
 
 from __future__ import annotations
@@ -31,22 +31,28 @@ TRAIN = "mobee detector train"
 
 Layer = tuple[Floats, Floats]  # weights (inputs, outputs), bias (outputs,)
 Shares = Callable[[Picture], Floats]
-"""A function of a picture (H, W, 3) that returns the share of each thing in each pixel (N, H, W), 0 to 1."""
+"""A function that takes a picture (H, W, 3) and returns the share of each of N things in each pixel, (N, H, W), 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """The things for which a network was trained, in the order of its outputs, and the network as ONNX."""
+    """A trained network.
+
+    `things`: the things for which it was trained, in the order of its outputs. `model`: the network as the bytes of an ONNX file.
+    """
 
     things: tuple[Thing, ...]
     model: bytes
 
     def save(self, path: Path) -> Path:
-        """Write the file whole or not at all, and return its path; raises OSError."""
+        """Write the network to a file, completely or not at all, and return the path; raise OSError if the file cannot be written."""
         return write_whole(path, self.model)
 
     def require(self, things: Sequence[Thing], path: str) -> None:
-        """Raise InvalidValue unless the network was trained for these things: names, kinds, sizes and colours."""
+        """Raise InvalidValue unless the network was trained for exactly these things: names, kinds, sizes and colours.
+
+        `path`: the file, for the message.
+        """
         own, given = {_looks(one) for one in self.things}, {_looks(one) for one in things}
         if own != given:
             trained, asked = ("; ".join(sorted(_text(one) for one in some)) for some in (own - given, given - own))
@@ -56,7 +62,11 @@ class Network:
             )
 
     def shares(self) -> Shares:
-        """Return the network as a function of a picture; raises InvalidValue if OpenCV cannot run it, NotInstalled without OpenCV."""
+        """Return a function that runs the network on a picture.
+
+        Raises InvalidValue if OpenCV cannot read the network, and NotInstalled without OpenCV. The function raises InvalidValue if OpenCV
+        cannot run the network.
+        """
         cv2 = _imported("cv2")
         try:
             net = cv2.dnn.readNetFromONNX(np.frombuffer(self.model, np.uint8))
@@ -75,9 +85,10 @@ class Network:
 
 
 def network_of(things: Sequence[Thing], first: Layer, second: Layer, third: Layer) -> Network:
-    """Return the network with these layers.
+    """Return the network with these three layers; a layer is a pair of weights (inputs, outputs) and bias (outputs,).
 
-    The inputs of the first one are red, green and blue of the near pixels and then of the far ones, each 5 x 5, row by row: (2, 3, 5, 5).
+    The 150 inputs of the first layer are red, green and blue of the 5 x 5 near pixels and then of the 5 x 5 far pixels, row by row: (2, 3,
+    5, 5). Raises NotInstalled without ONNX.
     """
     onnx = _imported("onnx")
     helper, arrays = onnx.helper, onnx.numpy_helper
@@ -112,7 +123,7 @@ def network_of(things: Sequence[Thing], first: Layer, second: Layer, third: Laye
 
 
 def load_network(path: str | Path) -> Network:
-    """Read the file of a network; raises InvalidValue for one that is none, NotInstalled without ONNX."""
+    """Read a network from a file; raise InvalidValue if the file is not a valid network of MoBeE, NotInstalled without ONNX or OpenCV."""
     onnx = _imported("onnx")
     try:
         content = Path(path).read_bytes()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendered pictures of things at random places before a robot's cameras, with the share of each thing in each pixel."""
+"""Rendered pictures of things at random positions before a robot's cameras, with the share of each thing in each pixel."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ BRIGHTNESS = (0.6, 1.1)  # factor on the picture
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labelled:
-    """A picture (H, W, 3), and the share of each thing in each of its pixels (H, W, N)."""
+    """A labelled picture: `picture` (H, W, 3), and `shares` (H, W, N), the share of each of N things in each pixel."""
 
     picture: Picture
     shares: Floats
 
 
 def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count: int, seed: int) -> Iterator[Labelled]:
-    """Yield `count` pictures of imperfect cameras, of random postures, places of the things, rooms, clutter and brightness.
+    """Yield `count` pictures of imperfect cameras with random postures, positions of the things, rooms, clutter and brightness.
 
-    A quarter of what is in the room, and of the paper on the world's boxes, has the colours of the things.  Raises InvalidValue if the
+    A quarter of the objects in the room, and of the paper on the world's boxes, has the colours of the things. Raises InvalidValue if the
     robot has no camera.
     """
     cameras = cameras_of(robot)

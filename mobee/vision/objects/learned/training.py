@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains the network of a learned detector on rendered pictures.
 
-The network learns the share of each thing in a pixel by least squares: what minimises the squares is the mean share, given what the
-network sees of the surroundings.  Pixels are drawn from the edges and the inside of things and from everything else.  Half of the pictures
-are shown first; from all of them come then also pixels at which the network was wrong.
+The network learns the share of each thing in a pixel by least squares; the minimum is the mean share for the same surroundings of a pixel.
+Pixels are drawn from the edges and the inside of things and from the rest of the picture. The network first learns from half of the
+pictures. Then it learns from all of them, and also from pixels at which it was wrong.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ def train(
     seed: int = 0,
     report: Report = lambda share, text: None,
 ) -> Network:
-    """Train a network.
+    """Train a network that detects things.
 
     Args:
-        robot: whose cameras see the things.
-        world: that has the things, and the boxes on which they may stand.
-        things: to be found.
-        pictures: from which it learns.
+        robot: the robot whose cameras see the things.
+        world: contains the things, and the boxes on which they may stand.
+        things: the things to be found.
+        pictures: number of rendered pictures from which the network learns.
         seed: of pictures, pixels and weights.
-        report: takes the share of the work that is done, and what is done now.
+        report: called with the share of the work that is done (0 to 1) and a text about the present step.
 
     Raises:
         NotInstalled: scikit-learn, ONNX or OpenCV is not installed.
@@ -83,7 +83,7 @@ def train(
 
 
 def held_out(robot: Robot, world: World, things: Sequence[Thing], pictures: int, seed: int) -> Iterator[Labelled]:
-    """Yield pictures like those of `train` with the same arguments, but others: a fifth as many."""
+    """Yield test pictures for a network that `train` made with the same arguments: a fifth as many, and other ones than in the training."""
     return labelled_pictures(robot, world, things, max(1, pictures // 5), seed + OTHERS)
 
 
@@ -107,7 +107,10 @@ def _take(one: Labelled, pixels: Ints, inputs: list[Floats], outputs: list[Float
 
 
 def surroundings(picture: Picture, pixels: Ints) -> Floats:
-    """Return what the network sees around pixels, row * width + column: (M, 150), in the order of `network_of`."""
+    """Return the inputs of the network for M pixels of a picture, (M, 150), in the order that `network_of` describes.
+
+    `pixels`: (M,) numbers row * width + column. Brightness is scaled to -1 to 1.
+    """
     reach = SIDE // 2 * APART
     height, width = picture.shape[:2]
     padded = np.zeros((height + 2 * reach, width + 2 * reach, 3), np.float32)
