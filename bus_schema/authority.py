@@ -18,7 +18,7 @@ from bus_schema.stream import EVERYONE, READERS_OF_ALL, Party
 
 AGENT = "agent_"
 BEHAVIOURS = ("assist", "gaze")
-"""The behaviours by the names of their services, in ascending rank (services/controller/precedence.py)."""
+"""The names of the behaviours, in ascending rank: a behaviour may take a part from an earlier one (services/controller/precedence.py)."""
 HOST_LAUNCHER = "launcher_"  # prefix of the name of a launcher that has joined from another host
 TOKENS = "alive/{service}/*"
 ROUTER = "router"
@@ -29,19 +29,26 @@ _OWN = ("{service}", "{source}")  # variables that stand for the name of the wri
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What one identity may do, as key expressions without the namespace; what is not listed it may not."""
+    """What one identity may do on the bus, as key expressions without the namespace; everything else is denied.
+
+    `writes`, `reads`: keys of streams that it may publish and subscribe to. `calls`, `answers`: keys of calls that it may make and answer.
+    """
 
     writes: tuple[str, ...]
     reads: tuple[str, ...]
     calls: tuple[str, ...]
     answers: tuple[str, ...]
-    tokens: tuple[str, ...]  # liveliness tokens that it may declare; all may read all tokens
+    tokens: tuple[str, ...]  # liveliness tokens that it may declare; every identity may read all tokens
     keeps: tuple[str, ...]  # streams among `writes` whose past messages it sends to late readers
     catches_up: tuple[str, ...]  # streams among `reads` whose past messages it may request
 
 
 def party_of(name: str) -> Party:
-    """Return the party of a name: that of a service, or `agent`, `launcher` or `behaviour` by its form; `client` for any other program."""
+    """Return the party (role) of a process, from its name alone.
+
+    A name that is itself a party, such as `model` or `operator`, is that party. A name that begins with `agent_` is an agent, one that
+    begins with `launcher_` is the launcher of another host, and a name in BEHAVIOURS is a behaviour. Every other name is a `client`.
+    """
     if name.startswith(AGENT):
         return "agent"
     if name.startswith(HOST_LAUNCHER):
@@ -53,10 +60,10 @@ def party_of(name: str) -> Party:
 
 @lru_cache(1024)
 def may_call(who: str, key: str) -> bool:
-    """Return whether the table lists the caller `who` for `key`, a key of the contract.
+    """Return whether the table of calls (`bus_schema.rpc.CALLS`) lets the process `who` make the call `key`.
 
-    Programs that are no service choose their names themselves, and an agent its parts: only the router of a secured system, which knows the
-    identity of each, restricts these.
+    The result is always True for operators, clients, observers and drivers, because these programs choose their names themselves; and an
+    agent may name any part. In a secured system the router, which knows the identity of each process, restricts both.
     """
     party = party_of(who)
     allowed = _expressions(_patterns("callers", party), ("*",), "*")
@@ -70,9 +77,10 @@ def _matches(expression: str, key: str) -> bool:
 
 
 def rights_of(name: str, party: Party) -> Rights:
-    """Return what the identity `name` of a party may do.
+    """Return what the identity `name` of the party `party` may do on the bus.
 
-    A key with {service} or {source} is written and answered under the own name only, and the keys of an agent are those of its part.
+    A key that contains {service} or {source} may be written and answered only under the identity's own name. An agent may write and call
+    only the keys of its own part.
     """
     own, part = _own_names(name, party), name.removeprefix(AGENT) if party == "agent" else "*"
     written = [cls for cls in streams() if party in cls.stream.writers]

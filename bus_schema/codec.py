@@ -18,11 +18,16 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 UNDECODABLE = (msgspec.MsgspecError, ValueError, RecursionError)
-"""What msgspec raises for bytes that are no message: also UnicodeDecodeError, which is a ValueError, for text that is not UTF-8."""
+"""The exceptions that msgspec raises for bytes that it cannot decode. ValueError includes UnicodeDecodeError, for text that is not
+UTF-8."""
 
 
 class Refused(Exception):
-    """Raised for a message that must not be used; counters group these by `reason`: type, version, decode, length or value."""
+    """Raised for a message that must not be used.
+
+    `reason`: a short code, by which refused messages are counted. The codec uses type, version, decode, length and value; receivers have
+    further reasons (docs/bus.md).
+    """
 
     def __init__(self, reason: str, text: str) -> None:
         super().__init__(text)
@@ -31,12 +36,12 @@ class Refused(Exception):
 
 @cache
 def encoding_of(cls: type[Struct]) -> str:
-    """Return the encoding string that is sent with a message of this type."""
+    """Return the encoding string that is sent with each message of the type `cls`: application/msgpack;icub/TYPE/VERSION."""
     return f"{_PREFIX}{cls.__name__}/{VERSION}"
 
 
 def type_of(encoding: str) -> str:
-    """Return the name of the message's type in an encoding string; "" if it is not one of this contract."""
+    """Return the name of the message type in an encoding string, such as State; an empty text if the string is not one of this contract."""
     return encoding.removeprefix(_PREFIX).partition("/")[0] if encoding.startswith(_PREFIX) else ""
 
 
@@ -46,10 +51,11 @@ def encode(message: Struct) -> bytes:
 
 
 def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = None, robot: int | None = None) -> _S:
-    """Return the message in `payload`, after all checks.
+    """Return the message of the type `cls` that is encoded in `payload`, after all checks.
 
-    `part`, `robot`: number of motors that PartVector and RobotVector fields must have (None: not checked).
-    Raises Refused with the reason.
+    `encoding`: the encoding string that came with the payload. `part`, `robot`: number of motors that PartVector and RobotVector fields
+    must have (None: not checked). Raises Refused with the reason: type or version (the encoding string, or the field `v`), decode (the
+    payload does not match the struct), length (of a vector), or value (NaN or infinity).
     """
     if encoding != encoding_of(cls):
         _refuse_encoding(cls, encoding)

@@ -14,28 +14,31 @@ ALL_ALIVE = "alive/*/*"
 
 
 def meta(part: str) -> str:
-    """Return the key of the call to robot_sim for the motors and limits of a part."""
+    """Return the key of the call by which robot_sim returns the motors of a part and their limits."""
     return f"{chunk(part)}/meta"
 
 
 def drive(part: str, verb: str) -> str:
-    """Return the key of a call to robot_sim that owns a part's motors.
+    """Return the key of a call to robot_sim about the drive of a part, that is, the right to command its motors.
 
-    `verb`: take, arm, release or hold.  The part * means all parts.
+    `part`: name of the part; * means all parts. `verb`: take, arm, release or hold.
     """
     return f"{_part_or_all(part)}/rpc/drive/{chunk(verb)}"
 
 
 def goal(part: str, verb: str) -> str:
-    """Return the key of a call to the controller that owns or uses a part's attractor.
+    """Return the key of a call to the controller about the goal of a part, that is, the right to set its attractor.
 
-    `verb`: take, release, goal, force or reach.  The part * means all parts.
+    `part`: name of the part; * means all parts. `verb`: take, release, goal, force or reach.
     """
     return f"{_part_or_all(part)}/rpc/{chunk(verb)}"
 
 
 def waypoint(part: str) -> str:
-    """Return the key of the call to port_filter that marks the present pose as one to which it may move back."""
+    """Return the key of the call that marks the present pose as a waypoint, to which the port filter may later move the robot back.
+
+    `part`: name of the part; * means all parts.
+    """
     return f"{_part_or_all(part)}/rpc/waypoint"
 
 
@@ -50,12 +53,15 @@ def world_rpc(verb: str) -> str:
 
 
 def service_rpc(who: str, verb: str) -> str:
-    """Return the key of a call that every service answers; `verb`: stat, mark, config or shutdown; of an agent rest, resume or explore."""
+    """Return the key of a call to the service `who`.
+
+    `verb`: every service answers stat, pulse, mark, config and shutdown; an agent also answers rest, resume and explore.
+    """
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 
 
 def alive(who: str, instance: str) -> str:
-    """Return the key of the liveliness token of one process."""
+    """Return the key of the liveliness token of one process; `who`: name of its service; `instance`: id of the process."""
     return f"alive/{chunk(who)}/{chunk(instance)}"
 
 

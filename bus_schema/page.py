@@ -26,12 +26,15 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
 def main() -> None:
-    """Write the tables of the page anew."""
+    """Replace the generated tables in docs/bus.md by new ones."""
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def with_tables(page: str) -> str:
-    """Return the page with a new table between each pair of markers `begin NAME`, `end NAME`; raises KeyError for an unknown name."""
+    """Return `page`, the text of docs/bus.md, with a new table between each pair of the comments `begin NAME` and `end NAME`.
+
+    Raises KeyError if there is no table with this NAME.
+    """
     tables = {
         "deliveries": _deliveries,
         "streams": _streams,
@@ -44,13 +47,16 @@ def with_tables(page: str) -> str:
 
 
 def structs(module: ModuleType) -> list[type[Struct]]:
-    """Return the messages, or requests and replies, of a module, and the structs inside them, in the order of the source."""
+    """Return the structs that `module` defines, in the order of the source, without the three base classes in BASES.
+
+    `module`: `bus_schema.messages` (all messages, and the structs inside them) or `bus_schema.rpc` (all requests and replies, likewise).
+    """
     own = (cls for cls in vars(module).values() if isinstance(cls, type) and cls.__module__ == module.__name__)
     return [cls for cls in own if issubclass(cls, Struct) and cls not in BASES]
 
 
 def streams() -> list[type[Message]]:
-    """Return all messages that have a key of their own."""
+    """Return the classes of all messages that have a stream, that is, a key on the bus, in the order of the source."""
     return [cls for cls in structs(messages) if issubclass(cls, Message)]
 
 

@@ -13,11 +13,11 @@ from bus_schema.stream import EVERYONE, Party
 
 
 class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The header of every request."""
+    """The header of every request: the fields with which all requests begin."""
 
     v: int  # version of the contract
-    id: Name  # unique per call: a repeated request with the same id has no second effect
-    who: Name  # service that calls
+    id: Name  # unique for each call: a repeated request with the same id has no second effect
+    who: Name  # name of the process that calls
 
 
 class Empty(Request, frozen=True, kw_only=True):
@@ -25,51 +25,55 @@ class Empty(Request, frozen=True, kw_only=True):
 
 
 class Take(Request, frozen=True, kw_only=True):
-    """Take the ownership of a part's drive or goal; it ends with the caller's liveliness token."""
+    """Take the ownership of a part's drive or goal. The ownership ends when the caller's liveliness token disappears."""
 
-    instance: Name  # instance in the caller's token
+    instance: Name  # last chunk of the caller's liveliness token `alive/{service}/{instance}`
 
 
 class WithEpoch(Request, frozen=True, kw_only=True):
-    """A call that only the owner may make."""
+    """A call that only the owner of the part's drive or goal may make; the key says which call it is."""
 
-    epoch: Count  # as in `Taken`
+    epoch: Count  # epoch of the caller's ownership, as in `Taken`
 
 
 class Goal(Request, frozen=True, kw_only=True):
     """Set a part's attractor and start an action."""
 
-    epoch: Count
-    action_id: Name
-    q: PartVector  # rad
+    epoch: Count  # goal epoch of the caller, as in `Taken`
+    action_id: Name  # id that the caller chooses; `Motion` reports it
+    q: PartVector  # rad, attractor q*
 
 
 class Force(Request, frozen=True, kw_only=True):
-    """Apply a force in joint space (f) or at a marker (thesis eqs. 5.9, 5.10) until it is cleared; with neither, clear both."""
+    """Apply a client's force to a part until it is cleared.
 
-    epoch: Count
-    f: PartVector | None = None  # rad/s^2
-    marker: Name | None = None
+    The force acts in joint space (`f`, thesis eq. 5.9), at a marker (`marker` and `push`, eq. 5.10), or both. A request with neither clears
+    all forces of the part's client.
+    """
+
+    epoch: Count  # goal epoch of the caller, as in `Taken`
+    f: PartVector | None = None  # rad/s^2, force in joint space
+    marker: Name | None = None  # marker at which `push` acts
     push: Vector3 | None = None  # m/s^2 at the marker (force per unit mass)
 
 
 class ReachFor(Request, frozen=True, kw_only=True):
     """Start an action that pulls a marker to an object of the model's world until the part has settled (thesis 8.2)."""
 
-    epoch: Count
-    action_id: Name
-    marker: Name
-    object: Name
-    position: Vector3  # m, of the object now; later positions come from the model
-    radius: Annotated[float, Meta(gt=0)]  # m
-    aim: Aim
-    normal: Vector3 | None = None  # direction in which the marker's normal should point
-    faces: bool = False  # True: instead of a normal; the marker's normal should point to the target, also while it moves
-    stay: bool = False  # True: the part stays where the force ended, instead of being pulled back
+    epoch: Count  # goal epoch of the caller, as in `Taken`
+    action_id: Name  # id that the caller chooses; `Motion` and `Reach` report it
+    marker: Name  # marker that is pulled
+    object: Name  # name of the target in the model's world
+    position: Vector3  # m, present position of the target; later positions come from the model
+    radius: Annotated[float, Meta(gt=0)]  # m, radius of the target
+    aim: Aim  # whether the marker is to come to the centre or to the surface of the target
+    normal: Vector3 | None = None  # direction in which the marker's normal should point; None: any
+    faces: bool = False  # True: the marker's normal should point to the target, also while it moves; `normal` must then be None
+    stay: bool = False  # True: the part stays where the force ended; False: its attractor pulls it back
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Set the position of a simulated object."""
+    """Move a simulated object to a position."""
 
     name: Name
     position: Vector3  # m
@@ -82,9 +86,9 @@ class Pace(Request, frozen=True, kw_only=True):
 
 
 class Explore(Request, frozen=True, kw_only=True):
-    """Choose the next actions by another explorer."""
+    """Let an agent choose its next actions by another explorer."""
 
-    explorer: Name  # as in the settings of an agent
+    explorer: Name  # exploration strategy, such as curious or random, as in the settings of an agent
 
 
 class AddObject(Request, frozen=True, kw_only=True):
@@ -98,28 +102,28 @@ class AddObject(Request, frozen=True, kw_only=True):
 
 
 class MoveObject(Request, frozen=True, kw_only=True):
-    """Set the pose of an object."""
+    """Set the pose of an object of the model's world."""
 
     name: Name
     position: Vector3  # m
-    quaternion: Quaternion | None = None
+    quaternion: Quaternion | None = None  # None: the orientation stays the same
 
 
 class SetRole(Request, frozen=True, kw_only=True):
-    """Set the role of an object."""
+    """Set the role of an object of the model's world."""
 
     name: Name
     role: Role
 
 
 class OneName(Request, frozen=True, kw_only=True):
-    """Name of an object to remove or detach."""
+    """Remove an object from the model's world, or detach it from its link; the key says which."""
 
     name: Name
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """Attach an object to a link, with which it then moves."""
+    """Attach an object of the model's world to a link, with which it then moves."""
 
     name: Name
     link: Name
@@ -129,11 +133,11 @@ class JacobianAt(Request, frozen=True, kw_only=True):
     """Request the Jacobian of a marker at q [rad]; without q, at the newest pose."""
 
     marker: Name
-    q: RobotVector | None = None
+    q: RobotVector | None = None  # rad, of all motors; None: the newest pose
 
 
 class Reply(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The header of every reply."""
+    """The header of every reply: the fields with which all replies begin."""
 
     v: int  # version of the contract
 
@@ -149,7 +153,7 @@ class Taken(Reply, frozen=True, kw_only=True):
 
 
 class Driven(Reply, frozen=True, kw_only=True):
-    """State of the gate after the call."""
+    """State of the part's gate after the call."""
 
     gate: GateState
 
@@ -170,8 +174,8 @@ class PartMeta(Reply, frozen=True, kw_only=True):
     max_velocity: PartVector  # rad/s
     max_acceleration: PartVector  # rad/s^2
     max_torque: PartVector  # N m
-    robot: Name
-    robot_hash: Name
+    robot: Name  # name of the robot
+    robot_hash: Name  # hash of the robot's links, joints and motors, by which processes compare their robots
 
 
 class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
@@ -182,7 +186,7 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
     position: Vector3  # m
     quaternion: Quaternion
     role: Role
-    link: str  # link that the object is attached to; empty: none
+    link: str  # link to which the object is attached; empty: none
     margin: Annotated[float, Meta(ge=0)] = 0.0  # m by which the shape is larger than the object on each side, for an uncertain position
     t_capture: Count | None = None  # ns, time of the newest picture that shows a perceived object
 
@@ -191,7 +195,7 @@ class World(Reply, frozen=True, kw_only=True):
     """All objects of the model's world."""
 
     objects: list[ObjectState]
-    stale: dict[Name, float] = {}  # perceived objects that were removed since they are not seen any more: s since the last picture of each
+    stale: dict[Name, float] = {}  # perceived objects that were removed because they are not seen any more: s since the last picture
 
 
 class JacobianReply(Reply, frozen=True, kw_only=True):
@@ -205,17 +209,17 @@ class JacobianReply(Reply, frozen=True, kw_only=True):
 class Stat(Reply, frozen=True, kw_only=True):
     """Status of a service."""
 
-    who: Name
-    instance: Name
-    pid: int
-    uptime: float  # s
-    ready: bool
+    who: Name  # name of the service
+    instance: Name  # id of the process, as in its liveliness token
+    pid: int  # process id
+    uptime: float  # s since the start
+    ready: bool  # True: the service has declared its liveliness token
     text: Text  # one line for the status screen
-    numbers: dict[str, int | float | None]  # None: not measured
+    numbers: dict[str, int | float | None]  # measured numbers, by name; None: not measured
     rejected: dict[str, int]  # number of refused messages and calls, by reason
-    words: dict[str, Text] = {}  # values that are not numbers, such as a hash
-    health: dict[str, int | float | None] = {}  # of the process, as `mobee status` shows it; None: not measured
-    warnings: list[Name] = []  # numbers of `health` that are or were beyond their limits in the last 30 s
+    words: dict[str, Text] = {}  # values that are not numbers, such as a hash, by name
+    health: dict[str, int | float | None] = {}  # numbers of the process, as `mobee status` shows them; None: not measured
+    warnings: list[Name] = []  # names of the numbers in `health` that are, or were in the last 30 s, beyond their limits
 
 
 class Pulse(Reply, frozen=True, kw_only=True):
@@ -234,21 +238,21 @@ class Config(Reply, frozen=True, kw_only=True):
 class Failure(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The reply to a call that was refused."""
 
-    v: int
-    code: Name
-    text: Text
+    v: int  # version of the contract
+    code: Name  # short code of the reason, see docs/bus.md
+    text: Text  # text for the user
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Keys of calls with the same request and reply, who answers them and who may call; rows of the table in docs/bus.md."""
+    """Calls with the same request and reply: their keys, who answers them, and who may call. Each is a row of the table in docs/bus.md."""
 
-    pattern: str
-    verbs: tuple[str, ...]  # for {verb} in the pattern
+    pattern: str  # the key, with variables in braces
+    verbs: tuple[str, ...]  # words for {verb} in the pattern; empty if it has none
     request: type[Request]
     reply: type[Reply]
-    servers: tuple[Party, ...]
-    callers: tuple[Party, ...]
+    servers: tuple[Party, ...]  # who answers
+    callers: tuple[Party, ...]  # who may call
 
 
 _PERSONS: tuple[Party, ...] = ("operator", "monitor")  # a person at a terminal or at the page

@@ -28,10 +28,11 @@ def keys() -> list[str]:
 
 
 def schemas_of(key: str) -> dict[str, dict[str, Any]]:
-    """Return the JSON schemas of the messages on a key: "message" of a stream, or "request", "reply" and "failure" of a call.
+    """Return the JSON schemas of what is sent on a key; an empty dict if the contract does not have this key.
 
-    `key`: as on the bus, such as "left_arm/state" or "*/state", as `keys` lists it, or the name of a type, such as "State": then its
-    schema alone. Each schema has the encoding string that travels with the type. Empty for a key that the contract does not have.
+    The schema of a stream has the name "message"; a call has "request", "reply" and "failure". `key`: a key such as "left_arm/state" or
+    "*/state", or one of those that `keys` returns. It may also be the name of a type, such as "State"; the result is then the schema of
+    this type, as "message". Each schema also contains the encoding string of its type.
     """
     if key in _types():
         return {"message": _schema(_types()[key])}

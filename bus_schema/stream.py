@@ -13,11 +13,12 @@ Party = Literal[
     "robot_sim", "renderer", "model", "controller", "port_filter", "agent", "behaviour", "vision", "monitor", "recorder", "launcher",
     "operator", "observer", "client", "driver",
 ]  # fmt: skip
-"""A service, or a kind of program that connects to a running system; `agent` is the agent of each part (bus_schema/authority.py)."""
+"""The role of a process in the table of who may do what (bus_schema/authority.py): a service, or a kind of program that connects to a
+running system. `agent` stands for the agents of all parts, `behaviour` for all behaviours."""
 
 EVERYONE: tuple[Party, ...] = get_args(Party)
 READERS_OF_ALL: tuple[Party, ...] = ("recorder", "operator", "observer", "client", "driver")
-"""Those that may read every stream, beside the readers that the streams name."""
+"""The parties that may read every stream, in addition to the readers that each stream names."""
 
 DELIVERIES: dict[Delivery, str] = {
     "CONTROL": "LATEST in free mode, STEP in lockstep",
@@ -36,7 +37,10 @@ _VARIABLE = re.compile(r"\{(\w+)\}")
 
 
 def chunk(name: str) -> str:
-    """Return the name if it can be part of a key; raises ValueError for wildcards, blanks, slashes and capital letters."""
+    """Return `name` unchanged if it can be one part of a key, between two slashes.
+
+    Raises ValueError for an empty name, and for wildcards, blanks, slashes and capital letters.
+    """
     if not _CHUNK.fullmatch(name):
         raise ValueError(f"{name!r} cannot be part of a key: use a-z, 0-9 and _ only")
     return name
@@ -46,9 +50,9 @@ def chunk(name: str) -> str:
 class Stream:
     """The key and the delivery class of a message; the tables in docs/bus.md are written from these.
 
-    `pattern`: the key, with at most one variable in braces, such as "{part}/state".  `delivery`: its delivery class.  `writers`: the only
-    parties that may write it (bus_schema/authority.py).  `readers`: the parties that read it, beside READERS_OF_ALL.  `when`: when it is
-    written.
+    `pattern`: the key, with at most one variable in braces, such as "{part}/state". `delivery`: the delivery class, a key of DELIVERIES,
+    which describes how messages are queued and dropped. `writers`: the only parties that may write the stream (bus_schema/authority.py).
+    `readers`: the parties that read it, in addition to READERS_OF_ALL. `when`: text for docs/bus.md that says when a message is written.
     """
 
     pattern: str
@@ -59,14 +63,20 @@ class Stream:
 
     @property
     def variable(self) -> str:
-        """The name of the variable in the key; empty if the key is constant."""
+        """The name of the variable in the key, such as "part"; empty if the key is constant."""
         found = _VARIABLE.search(self.pattern)
         return found[1] if found else ""
 
     def key(self, name: str = "") -> str:
-        """Return the key to write, with `name` for its variable; raises ValueError for a name that cannot be part of a key."""
+        """Return the key under which a message is published, with `name` in place of the variable.
+
+        Raises ValueError for a name that cannot be part of a key.
+        """
         return _VARIABLE.sub(lambda _: chunk(name), self.pattern)
 
     def keys(self, name: str = "*") -> str:
-        """Return the key expression to read; by default it matches all values of the variable."""
+        """Return the key, or key expression, to subscribe to, with `name` in place of the variable.
+
+        By default the name is *, which matches all values of the variable.
+        """
         return self.pattern if not self.variable else _VARIABLE.sub("*", self.pattern) if name == "*" else self.key(name)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The processes of the system; each decodes a message, calls the library and encodes the answer."""
+"""The processes of the system (services). Each service decodes messages, calls the library `mobee` and encodes the results."""

@@ -60,40 +60,44 @@ else:  # a field for each setting of the library's agents; `seed` is one of ever
 
 
 class Config(LearningConfig, frozen=True, kw_only=True):
-    """An agent's configuration; the joints default to the published ones of its part (thesis 7.4)."""
+    """The configuration of an agent. The joints default to the published ones of the agent's part (thesis 7.4)."""
 
     part: str = "left_arm"
     """Part that the agent moves."""
     joints: tuple[str, ...] = ()
-    """Motors that span the state space; empty: those that `levels` names, else all of the part, or shoulder and elbow of a part that has
-    a motor called elbow."""
+    """Motors that span the state space. Empty: those that `levels` names; if it names none, all motors of the part, or shoulder and elbow
+    of a part that has a motor called elbow."""
     levels: tuple[float, ...] | Mapping[str, tuple[float, ...]] = (0.25, 0.5, 0.75)
-    """Fractions of each joint's range at which the samples lie; or those of each joint, as { l_elbow = [0.5, 0.8] }."""
+    """Fractions of each joint's range at which the samples lie; or the fractions for each joint, as { l_elbow = [0.5, 0.8] }."""
     neighbours: Annotated[int, Meta(ge=0)] | Literal["equidistant"] = 0
-    """Number of nearest states that each state has actions to, or "equidistant": those one step away along one joint; 0: the published 8
-    of the torso, 16 of an arm."""
+    """Number of nearest states to which each state has actions, or "equidistant": the states one step away along one joint. 0: the
+    published numbers, 8 for the torso and 16 for an arm."""
     tie_seed: int = 0
-    """Seed of the draw among equally near neighbours."""
+    """Seed of the random choice among neighbours at the same distance."""
     goal: tuple[Annotated[int, Meta(ge=0)], ...] = ()
-    """States whose actions are rewarded, instead of information gain; empty: curiosity alone."""
+    """States in which every action is rewarded; empty: there is no such reward, only the information gain."""
     goal_weight: float = 0.0
-    """Reward of an action in such a state, nats, added to the information gain; 0: it replaces the information gain."""
+    """Reward of an action in a state of `goal`, nats, which is added to the information gain; 0: the reward is 1 and replaces the
+    information gain."""
     run_dir: str = ""
     """Folder of the run, in which transitions are stored and from which a restarted agent reads them; empty: they are not stored."""
     continues: str = ""
-    """File of transitions, or folder of a run, with which it begins if it has none of its own, as those learned offline; it is recorded."""
+    """File of transitions, or folder of a run, such as one learned offline, from which the agent starts if it has no transitions of its
+    own."""
     rest: tuple[float, ...] = ()
-    """Fraction of its range at which each motor of its part stays while it is not one of `joints`; empty: the middle."""
+    """Fraction of its range at which each motor of the part stays if it is not one of `joints`; empty: the middle."""
     object: str = ""
-    """Object whose place is a part of each state, by its name in the model's world; empty: a state is a posture alone."""
+    """Name of an object in the model's world whose position is a part of each state; empty: a state is a posture alone."""
     area: tuple[tuple[float, float], ...] = ()
-    """Where the object may stand: lowest and highest x, and lowest and highest y of its centre, m, root frame."""
+    """Where the object may be: lowest and highest x, and lowest and highest y of its centre, m, root frame."""
     cells: tuple[int, int] = (3, 3)
-    """Number of cells along x and along y into which the area is divided; a state holds one of them."""
+    """Number of cells along x and along y into which the area is divided. A state contains the cell in which the object is."""
     aside: Annotated[int, Meta(ge=0)] = 0
-    """Posture, as a number, to which the part moves when the object is not seen: from there nothing hides it, and it has room to stand."""
+    """Number of the posture to which the part moves when the object is not seen. In this posture the robot must not hide the object, and
+    must leave room for it."""
     put_back: tuple[float, ...] = ()
-    """Position, m, at which the simulator sets the object down when it is not seen from `aside` either; empty: a person puts it back."""
+    """Position, m, root frame, at which the simulator sets the object down when it is not seen from `aside` either; empty: a person puts it
+    back."""
     transitions: Annotated[int, Meta(ge=0)] = 0
     """Number of transitions after which the agent ends; 0: no limit."""
     targets: tuple[tuple[float, float, float], ...] = ()
@@ -101,14 +105,18 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     target_radius: Annotated[float, Meta(gt=0)] = RADIUS
     """Radius of the sphere that is presented at a target position, m."""
     marker: str = ""
-    """Marker that reaches for the targets; empty: the palm of the part, or the marker that most motors of the part move."""
+    """Marker that reaches for the targets; empty: the palm of the part, otherwise the first marker at the end of its chain."""
     learned: str = ""
-    """Folder of a run whose transitions are used to plan paths to reaches; empty: most actions are assumed to reach their goals."""
+    """Folder of a run whose transitions are used to plan paths to reaches; empty: the agent assumes that most actions reach their goals."""
     tries: Annotated[int, Meta(ge=0)] = 0
     """Number of problem-tries after which the agent ends; 0: no limit."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if a name is unknown, the part spans no state space, or it has no marker for the targets."""
+        """Check the settings for the robot.
+
+        Raises MobeeError if a name is unknown, if the part spans no state space, or if the part does not move the marker that is to reach
+        for the targets.
+        """
         super().check_robot(robot)
         for kind, table in NAMED.items():
             require_name(kind, getattr(self, kind), table)
@@ -123,17 +131,18 @@ class Config(LearningConfig, frozen=True, kw_only=True):
             raise InvalidValue(f"{self.part} does not move the marker {marker!r} that is to reach. Valid: {valid or 'none'}.")
 
     def curious(self) -> CuriousSettings:
-        """Return the settings of a curious agent."""
+        """Return the settings of a curious agent, as the library takes them."""
         return CuriousSettings(goal=self.goal or None, goal_weight=self.goal_weight or None, **self._given(CuriousSettings))
 
     def reaching(self) -> ReachSettings:
-        """Return the settings of a reach agent."""
+        """Return the settings of an agent that learns to reach, as the library takes them."""
         return ReachSettings(**self._given(ReachSettings))
 
     def space(self, robot: Robot) -> Space:
-        """Make the space; raises MobeeError if the settings make none.
+        """Make the state space; raises MobeeError if the settings are not valid.
 
-        By default the lattice of thesis 7.4 for the part; with an object its postures, each with every cell.
+        By default it is the lattice of thesis 7.4 for the part. With an `object`, each state is a posture of the lattice and a cell of the
+        object's area.
         """
         postures = self._postures(robot)
         if not self.object:

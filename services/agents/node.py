@@ -32,9 +32,9 @@ from services.common.service import CallRefused, Service
 
 
 class Work:
-    """The main loop of an agent's process; counts the interruptions of the measurement under way.
+    """The main loop of an agent's process. It counts the interruptions of actions since the last measurement began.
 
-    On request the agent rests: it gives its goal away, so that another client can move its part, until it is asked to continue.
+    On request the agent rests: it releases the goal of its part, so that another client can move the part, until it is asked to continue.
     """
 
     def __init__(self, service: Service, plant: BusPlant, part: str) -> None:
@@ -44,7 +44,10 @@ class Work:
         service.on_request(keys.service_rpc(service.who, "resume"), Empty, self._resume)
 
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
-        """Run steps until `enough()` is true, and answer calls between steps; `resumed`: event of a continued run, else empty."""
+        """Call `step` until `enough()` returns True, and answer calls between the steps.
+
+        `resumed`: text of the event that a run continues; empty for a new run.
+        """
         self._service.ready()
         if resumed:
             self._service.bus.event("info", "resumed", resumed)
@@ -72,7 +75,7 @@ class Work:
 
 
 class AgentNode:
-    """Runs a curious agent on the live plant; every transition is on disk before the next action."""
+    """Runs a curious agent on the live plant. Every transition is on disk before the next action begins, if the run has a folder."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
@@ -96,7 +99,7 @@ class AgentNode:
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
-        """Act until the configured number of transitions is made."""
+        """Act until the configured number of transitions is made; 0: without end."""
         agent, wanted = self._agent, self._config.transitions
         resumed = f"{self._config.part} continues after {agent.transitions} transitions" if agent.transitions else ""
         self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
@@ -165,7 +168,7 @@ class AgentNode:
 
 
 class ReachNode:
-    """Runs a reach agent on the live plant; every action is on disk before the next."""
+    """Runs an agent that learns to reach on the live plant. Every step is on disk before the next one, if the run has a folder."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
@@ -192,7 +195,7 @@ class ReachNode:
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
-        """Make problem-tries until there are as many as configured."""
+        """Make problem-tries until the configured number is made; 0: without end."""
         agent, wanted = self._agent, self._config.tries
         resumed = f"{self._config.part} continues after {agent.tries} problem-tries" if agent.steps else ""
         self._work.run(resumed, lambda: 0 < wanted <= agent.tries, self._try)

@@ -26,17 +26,17 @@ PATIENCE = 10.0  # s of the robot's clock after which the simulator is asked aga
 
 
 class ObjectPlant(PerceivingPlant):
-    """A live plant that perceives one object, and completes each action by a look at it.
+    """A live plant that perceives one object, and completes each action by looking at this object.
 
-    Pictures that were taken before the end of the motion do not count.  If the object is not seen, the part moves to the posture `aside`,
-    and the action ends there.  If it is not seen in its area then, it has fallen or left: the simulator is asked to put it back, or a
-    person does, and the action ends when it is back.  So an outcome always holds what was seen after the action.
+    Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside`,
+    and the action ends there. If the object is not seen in its area from there either, it has fallen or left: the simulator, or a person,
+    puts it back, and the action ends when it is back. So an outcome always holds what was seen after the action.
 
     Args:
-        service: the agent's.
-        plant: on which the actions are performed.
-        config: names the object, its area, and what happens when it is not seen.
-        space: of the agent.
+        service: the service of the agent.
+        plant: the plant on which the actions are performed.
+        config: names the object, its area, and what happens when the object is not seen.
+        space: the state space of the agent.
     """
 
     def __init__(self, service: Service, plant: BusPlant, config: Config, space: ObjectSpace) -> None:
@@ -50,16 +50,23 @@ class ObjectPlant(PerceivingPlant):
         self.absences = 0
         """How often the object had fallen or left its area."""
         self.retreats = 0
-        """How often the part moved aside to see the object."""
+        """How often the part moved aside because the object was not seen."""
 
     def measure(self, part: str) -> Array:
-        """Return the posture as `Plant.measure` does, after the object is seen; the part may have moved aside to see it."""
+        """Return the part's motor positions (n_part,) rad, after the object was seen; the part may have moved aside so that it is seen.
+
+        Implements `mobee.plant.Plant.measure`.
+        """
         self.plant.measure(part)
         self._look()
         return self.plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; the outcome holds the place of the object after the action, and the posture from which it was seen."""
+        """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, then look at the object.
+
+        Implements `mobee.plant.Plant.act`. The outcome holds the position of the object after the action, and the posture from which it was
+        seen.
+        """
         outcome = self.plant.act(part, target)
         q = self.plant.measure(part) if self._look() else outcome.q
         return replace(outcome, q=q, perceived=self.perceive())

@@ -16,18 +16,24 @@ PREDECESSOR = 15.0  # s for which another process may write this agent's data: a
 
 
 class StoreWait:
-    """Repeats a call that the store refuses, and answers calls of other services between the tries; the part keeps its position."""
+    """Repeats a call that the store refuses, until the store accepts it. Between the tries it answers calls of other services.
+
+    The part keeps its position meanwhile.
+    """
 
     def __init__(self, service: Service) -> None:
         self._service = service
         self.waits_for = ""  # why this agent waits; empty: it does not
 
     def status_prefix(self) -> str:
-        """The beginning of the agent's line in `mobee status`."""
+        """Return the beginning of the agent's line in `mobee status`; empty if the agent does not wait."""
         return f"waits: {self.waits_for}; " if self.waits_for else ""
 
     def until_accepted(self, act: Callable[[], _T]) -> _T:
-        """Return the result of `act`, repeated while the disk is full or an earlier process still writes; raises its other errors."""
+        """Return the result of `act()`, which is repeated while the disk is full or an earlier process of this agent still writes.
+
+        Raises InUse if that process still writes after PREDECESSOR (15 s), and every other error of `act`.
+        """
         begun = time.monotonic()
         while True:
             try:
@@ -46,7 +52,7 @@ class StoreWait:
         return result
 
     def let_append_wait(self, store: Any) -> None:
-        """Make the method `append` of a store wait in the same manner."""
+        """Replace the method `append` of a store by one that waits as `until_accepted` does."""
         append = store.append
         store.append = lambda *data: self.until_accepted(lambda: append(*data))
 

@@ -32,7 +32,8 @@ def publish_transition(
 ) -> None:
     """Publish a transition, the n-th of its agent.
 
-    `value`: V(s) of the plan in which it was chosen.  `probability`: of its outcome, as it was believed before.
+    `space`: the state space of the agent. `value`: V(s), the value of the state before the action, by the plan that chose the action.
+    `probability`: that of the observed next state, as the agent believed before the action.
     """
     stream.put(
         agent=space.part,
@@ -51,7 +52,7 @@ def publish_transition(
 
 
 def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: int, action: int) -> None:
-    """Publish the action that an agent begins."""
+    """Publish that an agent begins `action` (its number) in `state`, with what the agent expects from the action."""
     beliefs, goal = agent.beliefs, int(agent.space.goal(state, action))
     expected, probability = _likeliest(beliefs, state, action)
     stream.put(
@@ -71,9 +72,9 @@ def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: in
 
 
 def planned_states(agent: CuriousAgent, state: int) -> list[int]:
-    """Return the states that an agent expects to pass by its plan, from `state` to the one with the largest reward.
+    """Return the states that an agent expects to pass by its plan, from `state` to the one in which it expects the largest reward.
 
-    The first is `state`; at most LONGEST_PLAN states.
+    The first element is `state`; there are at most LONGEST_PLAN (12) elements.
     """
     action_values, reward = agent.plan()[1], agent.model.reward
     passed, rewards = [state], []
@@ -92,7 +93,7 @@ def _likeliest(beliefs: OutcomeModel, s: int, a: int) -> tuple[int, float]:
 
 
 class LearnedStream:
-    """Publishes `Learned` after a transition, at most every 0.5 s."""
+    """Publishes a `Learned` message after a transition, at most every 0.5 s of real time."""
 
     def __init__(self, bus: Bus, model: TransitionModel) -> None:
         """`model`: the transition model of the agent."""
@@ -102,7 +103,11 @@ class LearnedStream:
         self._next = -np.inf  # s, monotonic clock
 
     def put(self, n: int, s: int, numbers: Callable[[], tuple[Array, Array]]) -> None:
-        """Publish, if the last message is old enough.  `n`, `s`: as in `Learned`; `numbers`: returns rewards and values (S, A)."""
+        """Publish a `Learned` message if the last one is old enough.
+
+        `n`: number of transitions that the agent has observed. `s`: its present state. `numbers`: called only for a message that is
+        published; returns rewards and values of all state-actions, (S, A) each.
+        """
         now = time.monotonic()
         if now < self._next:
             return
@@ -121,7 +126,10 @@ class LearnedStream:
 
 
 def surprises(model: TransitionModel) -> list[Surprise]:
-    """Return the observed outcomes that differ from the goals of their actions, with their shares of the tries; the 2000 most frequent."""
+    """Return the observed outcomes that differ from the goals of their actions, each with its share of the tries of the action.
+
+    Imagined (initial) outcomes do not count. There are at most MAX_SURPRISES (2000), those with the largest shares.
+    """
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
     share = real / np.maximum(real.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
@@ -132,7 +140,10 @@ def surprises(model: TransitionModel) -> list[Surprise]:
 
 
 class ReachStream:
-    """Publishes each transition, and `Learned` from their counts; the controller publishes the reaches (`Reach`)."""
+    """Publishes the transitions of an agent that learns to reach, and `Learned` messages from their counts.
+
+    The controller publishes the reaches themselves (`Reach`).
+    """
 
     def __init__(self, bus: Bus, agent: ReachAgent) -> None:
         self._agent, self._seen, self._count = agent, TransitionModel(agent.space), 0
@@ -142,7 +153,11 @@ class ReachStream:
         self._learned = LearnedStream(bus, self._seen)
 
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
-        """Publish a step towards a target; `plan`: values V (S,) and Q (S, A + 1) of the plan in which the step was chosen."""
+        """Publish a step towards a target.
+
+        `plan`: values V (S,) and Q (S, A + 1) of the plan that chose the step; the last column of Q is the action of reaching. A step that
+        is a reach is not a transition, and is not published as one.
+        """
         values, action_values = plan
         believed = probability_of(self._seen, step.s, step.a, step.s_next) if step.a != REACH else 0.0
         self._note(step)

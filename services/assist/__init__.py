@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torso assist as a process: moves the torso so that an object that vision finds, or a marker, is where an arm reaches well.
+"""Torso assist as a process: moves the torso so that an arm can reach an object or a marker well.
 
 Reads: tick, {part}/motion, world/{target}.
 Writes: {part}/follow.

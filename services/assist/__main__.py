@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.assist`."""
+"""Starts the torso assist: `python -m services.assist`."""
 
 from __future__ import annotations
 

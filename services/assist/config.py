@@ -25,23 +25,30 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
     """The torso assist's settings."""
 
     part: str = "torso"
-    """Part that carries the arm."""
+    """Part that the assist moves; it carries the arm."""
     arm: str = "right_arm"
-    """Part that reaches."""
+    """Part that reaches for the target."""
     world: str = ""
-    """World whose objects the robot must not touch, as of the model: a shipped world, a file or none."""
+    """World with whose objects the robot must not collide: a shipped name, a file, or "none". Empty: the default world of the robot."""
     learned: str = ""
-    """Folder of a run in which the arm has learned to reach, with the torso at home; empty: the arm's manipulability counts."""
+    """Folder of a run in which the arm has learned to reach with the torso at home: postures are then chosen by the learned rewards.
+    Empty: they are chosen by the arm's manipulability."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.3
-    """Share of the motors' speed with which the part moves."""
+    """Speed of the part, as a share of the motors' highest speed (0 to 1)."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the part carries the arm, and that the run can be read; raises MobeeError."""
+        """Check the settings, and that the part carries the arm and the run `learned` can be read.
+
+        Raises MobeeError if they do not fit the robot.
+        """
         super().check_robot(robot)
         self.assist(robot)
 
     def assist(self, robot: Robot) -> Assist:
-        """Return the object that chooses the postures, with the map that the settings name; raises MobeeError."""
+        """Return the object that chooses the postures of the part, by a learned map or by manipulability.
+
+        Raises MobeeError if the settings do not fit the robot, or the run `learned` cannot be read.
+        """
         robot.part(self.arm)
         if self.learned:
             worth = learned_worth(load_reaches(Path(self.learned) / STORE, OfflinePlant(Model(robot)), self.arm).predictor)

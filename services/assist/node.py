@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the torso assist."""
+"""Runs the torso assist: chooses a posture of the torso for the target, and moves the torso there."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ MOVED = 0.03  # m by which the target must have moved for another choice
 
 
 class AssistNode:
-    """Moves the part slowly to where the arm reaches the target best; chooses again when the target rests in another place."""
+    """Moves the part slowly to the posture from which the arm reaches the target best.
+
+    A new posture is chosen when the target has moved by more than 3 cm and rests again.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config, self._robot, self._assist = config, robot, config.assist(robot)

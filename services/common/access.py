@@ -20,10 +20,12 @@ _SOCKET = "unixsock-stream"  # the protocol of a socket in the folder of keys, w
 
 
 def access_list(identities: Mapping[str, Party], namespace: str, clients: str = "") -> dict[str, object]:
-    """Return Zenoh's setting `access_control`; what it does not allow is denied, and so is every identity that is not listed.
+    """Return Zenoh's setting `access_control` for a secured router.
+
+    Everything that the setting does not allow is denied. An identity that is not listed may do nothing.
 
     Args:
-        identities: names in the certificates, with their parties.
+        identities: the party of each identity, by the name in its certificate.
         namespace: prefix of all keys of the robot.
         clients: prefix of the keys of the filtered robot; empty if there is none.
     """

@@ -28,42 +28,44 @@ LONGEST_STEP = 0.1  # s: after a longer gap between two ticks the motion continu
 
 
 class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings of every behaviour."""
+    """Settings that every behaviour has."""
 
     part: str = ""
-    """Part that it moves."""
+    """Part that the behaviour moves."""
     target: str = "ball"
-    """What it follows: an object that vision finds, or a marker of the robot."""
+    """What the behaviour follows: the name of an object that vision finds, or of a marker of the robot."""
     gains: Literal["default", "derived", "published_2014"] = "published_2014"
-    """Name of the controller's set of gains; motors that it never moves are left out."""
+    """Name of the controller's set of gains. Motors that this set never moves are not used."""
     rate: Annotated[float, Meta(ge=20, le=200)] = 50.0
-    """Times per second at which the goal of the part moves on."""
+    """Number of times per second at which the attractor of the part is moved."""
     patience: Annotated[float, Meta(ge=0.1, le=5)] = 0.6
-    """Time without a new place of the target after which the part stops and holds, in s of simulated time."""
+    """Time without a new position of the target after which the part stops and holds, in s of simulated time."""
     release_after: Annotated[float, Meta(ge=0.1, le=3600)] = 10.0
     """Time without a target after which the part is released, in s of simulated time."""
 
     def margin(self, robot: Robot) -> Array:
-        """Return the widths (n,) of the zones before the limits in which the control law pushes inward."""
+        """Return the width of the zone before the limits of each motor, (n,) rad, in which the control law pushes the motor inward."""
         zones: Array = limit_zones(robot, Gains.named(self.gains).of_robot("limit_width", robot)).max(axis=1)
         return zones
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a behaviour sees in one step; positions and velocities are those of the tick."""
+    """What a behaviour perceives in one step; positions and velocities are those at the tick, in the root frame."""
 
     q: Array  # (n,) rad, encoders
     velocity: Array  # (n,) rad/s, as commanded
-    place: Array  # (3,) m, of the target
-    place_velocity: Array  # (3,) m/s
+    place: Array  # (3,) m, position of the target
+    place_velocity: Array  # (3,) m/s, velocity of the target
     dt: float  # s since the last step
 
 
 class Behaviour:
-    """Runs a behaviour: `step` returns the attractor of the part and its velocity, (n_part,) each; `reset` ends the present motion.
+    """Runs a behaviour: in each step, moves the attractor of its part to what the function `step` returns.
 
-    While the target is stale, the part holds, or with `watches_last_place` continues as if the target were at rest in its last place.
+    `step(scene)`: returns the attractor (n_part,) rad and its velocity (n_part,) rad/s. `reset()`: ends the present motion. If the target
+    has no new position for the time `patience` of the settings, the part holds; with `watches_last_place`, the behaviour continues instead
+    as if the target were at rest at its last position.
     """
 
     def __init__(
@@ -93,16 +95,16 @@ class Behaviour:
 
     @property
     def status(self) -> str:
-        """What it does, or why it pauses, as a text."""
+        """What the behaviour does, or why it pauses, as a text."""
         return f"pauses: {self._pause}" if self._pause else f"follows {self._config.target}"
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the numbers of the measurement under way."""
+        """Return the numbers for `stat` since the last `mark`: steps, follows (1 or 0), and percentiles of the time of a step [ms]."""
         times = {f"step_ms_p{p}": self._times.at(p) if self._steps else NOT_MEASURED for p in (50, 99)}
         return {"steps": self._steps, "follows": not self._pause, **times}
 
     def mark(self) -> None:
-        """Start a measurement."""
+        """Begin a measurement: set the number of steps to 0 and drop the measured times."""
         self._steps = 0
         self._times.clear()
 

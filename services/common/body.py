@@ -12,7 +12,7 @@ from services.common.bus import Bus
 
 
 class Body:
-    """The newest state of each part."""
+    """Collects the newest `State` message of each part, and joins them to vectors over all motors of the robot."""
 
     def __init__(self, bus: Bus, robot: Robot) -> None:
         self._streams = {name: bus.latest(State, name) for name in robot.parts}
@@ -20,7 +20,7 @@ class Body:
         self.states: dict[str, State] = {}
 
     def update(self) -> bool:
-        """Read the newest states; returns True once every part has one."""
+        """Read the newest states; return True once every part has a state."""
         for name, stream in self._streams.items():
             state = stream.take()
             if state is not None:
@@ -28,7 +28,7 @@ class Body:
         return len(self.states) == len(self._streams)
 
     def forget(self) -> None:
-        """Drop all states, at the start of a new run."""
+        """Drop all states; call this at the start of a new run."""
         self.states.clear()
 
     def q(self) -> Array:
@@ -46,5 +46,5 @@ class Body:
         return dq
 
     def ages(self, t: int) -> dict[str, int]:
-        """Return the age [ns] of each part's sample at bus time t [ns]."""
+        """Return the age [ns] of each part's state at the bus time t [ns], by part."""
         return {name: t - state.t for name, state in self.states.items()}

@@ -52,7 +52,7 @@ NO_RUN = "-"  # before the first clock message
 
 
 class Publisher(Generic[_M]):
-    """Publishes the messages of one stream, with sequence numbers."""
+    """Publishes the messages of one stream, with a header and sequence numbers."""
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], delivery: Delivery) -> None:
         self._bus, self._cls, self._seq = bus, cls, 0
@@ -72,7 +72,10 @@ class Publisher(Generic[_M]):
             self._publisher = bus.session.declare_publisher(key, **settings)
 
     def put(self, *, k: int | None = None, t: int | None = None, **fields: Any) -> None:
-        """Publish one message; `k` and `t` are by default those of the bus clock."""
+        """Publish one message with the fields `fields`; the header is filled in.
+
+        `k`, `t`: tick and time [ns] of the message; None: those of the bus clock.
+        """
         bus = self._bus
         message = self._cls(
             v=VERSION,
@@ -114,14 +117,18 @@ class Latest(Generic[_M]):
 
 
 def part_of(cls: type[Message], name: str) -> str | None:
-    """Return the part to whose motors the vectors of a message refer; None if its key has no part."""
+    """Return the part whose number of motors the vectors of a message must have: `name`, if the key of `cls` has the variable {part}.
+
+    None if the key has no part, or if `name` is * (any part); the lengths are then not checked.
+    """
     return name if cls.stream.variable == "part" and name != "*" else None
 
 
 def other_key(received: zenoh.Sample | zenoh.Query) -> str:
-    """Return the key that the sender has attached, if it is not that under which a message or call has come; else nothing.
+    """Return the key under which a message or call was sent, if it has arrived under another key; otherwise an empty text.
 
-    Zenoh sends numbers in place of keys; when a connection ends and a new one begins, a number can stand for another key for a moment.
+    Each sender attaches the key. Zenoh sends numbers in place of keys; when a connection ends and a new one begins, a number can stand for
+    another key for a moment.
     """
     attached = received.attachment
     if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
@@ -130,13 +137,13 @@ def other_key(received: zenoh.Sample | zenoh.Query) -> str:
 
 
 def require_key(received: zenoh.Sample | zenoh.Query) -> None:
-    """Raise Refused if a message or call has come under another key than its sender has attached."""
+    """Raise Refused if a message or call has arrived under another key than the one that its sender has attached."""
     if sent := other_key(received):
         raise Refused("key", f"sent as {sent}")
 
 
 class Bus:
-    """A session, the newest bus clock, and the counts of refused messages."""
+    """The connection of a process with the bus: its session, the newest tick and time, and the counts of refused messages."""
 
     def __init__(self, session: zenoh.Session, who: str, log: logging.Logger) -> None:
         self.session, self.who, self.log = session, who, log
@@ -151,13 +158,17 @@ class Bus:
         self._events: Publisher[Event] = self.publisher(Event, who)
 
     def note_time(self, message: Clock | Turn) -> None:
-        """Take the bus clock from a message."""
+        """Set tick, time and tick length of the bus clock to those of a message."""
         self.k, self.t, self.dt = message.k, message.t, message.dt
         self._speed = message.rate if isinstance(message, Clock) and message.mode == "free" else 0.0
         self._ticked = time.monotonic()
 
     def now(self) -> int:
-        """Return the bus clock, ns, in free mode also in the middle of a tick or of a long computation; never behind `t`."""
+        """Return the present time of the bus clock, ns.
+
+        In free mode the time since the newest tick is added, so that the result is right also in the middle of a tick or of a long
+        computation. In lockstep it is the time of the newest tick.
+        """
         return self.t + round(1e9 * self._speed * (time.monotonic() - self._ticked))
 
     def publisher(self, cls: type[_M], name: str = "", delivery: Delivery | None = None) -> Publisher[_M]:
@@ -171,13 +182,14 @@ class Bus:
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
 
     def latest(self, cls: type[_M], name: str = "*") -> Latest[_M]:
-        """Return an object that holds the newest message of a stream; `name`: the variable in its key, by default any."""
+        """Return an object that holds the newest message of a stream; `name`: the variable in its key, such as the part; by default any."""
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """Return the message in a sample; None if it is refused, which is counted and reported.
+        """Return the message of the type `cls` in a sample of Zenoh; None if it is refused, which is counted and reported.
 
-        Before the first clock message the run is not known: the result is None then, and nothing is counted.
+        `part`: the part whose number of motors the vectors must have; None: not checked. `any_run`: accept also a message of another run of
+        robot_sim. Before the first clock message the run is not known: without `any_run` the result is then None, and nothing is counted.
         """
         if self.run == NO_RUN and not any_run:
             return None
@@ -195,7 +207,7 @@ class Bus:
         return message
 
     def reject(self, reason: str, text: str) -> None:
-        """Count a refused message or call, and report it at most once per second and reason."""
+        """Count a refused message or call under `reason`, and report `text` at most once per second and reason."""
         self.rejected[reason] += 1
         now = time.monotonic()
         if now - self._reported.get(reason, -1.0) >= 1.0:
@@ -203,9 +215,9 @@ class Bus:
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
 
     def guarded(self, what: str, handle: Callable[[], object]) -> None:
-        """Run a handler; if it raises an unexpected exception, this is counted, reported and logged, and the process continues.
+        """Run `handle`; if it raises an unexpected exception, count, report and log this, and let the process continue.
 
-        `what`: the stream or call, for the report.  Errors of the project that a handler does not handle end the process as before.
+        `what`: name of the stream or call, for the report. A MobeeError is not caught: it ends the process.
         """
         try:
             handle()
@@ -215,13 +227,19 @@ class Bus:
             self.report_defect(what, error)
 
     def report_defect(self, what: str, error: Exception) -> str:
-        """Count, report and log that the handler of a stream or call has failed; returns the text of the report."""
+        """Count, report and log that the handler of a stream or call has failed with `error`; return the text of the report.
+
+        `what`: name of the stream or call.
+        """
         text = f"the handler of {what} failed: {type(error).__name__}: {error}"
         self.log.error("%s", text, exc_info=error)
         self.reject("handler", text)
         return text
 
     def event(self, level: str, code: str, text: str, **values: float) -> None:
-        """Report an event to the user: on the bus and in the log."""
+        """Report an event to the user: on the bus and in the log.
+
+        `level`: info, warning or error. `code`: short name of the kind of event. `values`: numbers that belong to the event.
+        """
         self.log.log({"info": 20, "warning": 30, "error": 40}[level], "%s: %s", code, text)
         self._events.put(level=level, code=code, text=text[:2000], values=values)

@@ -29,7 +29,7 @@ REST_TIMEOUT = 60.0  # s until the parts rest after the motion; the controller e
 
 
 class BusFollower(BusPlant):
-    """A BusPlant whose parts move together; every wait has a time limit."""
+    """A BusPlant that moves several parts together along a path of attractors. Every wait has a time limit."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))
@@ -45,10 +45,11 @@ class BusFollower(BusPlant):
         return self._seen[-1][1]
 
     def come_to_rest(self, parts: Sequence[str], settle: Settle) -> None:
-        """Wait until these parts rest; raises MobeeError after TAKE_TIMEOUT.
+        """Wait until the parts `parts` rest; raises MobeeError if one still moves after TAKE_TIMEOUT (8 s).
 
-        They rest when they are commanded no more than speed and acceleration of `settle`, and their encoders do not drift: below the
-        published speed, 1 deg/s, a spring can still be half a degree from its goal.
+        A part rests if its commanded speed and acceleration are at most those of `settle`, and the mean of its encoder values changes by
+        less than DRIFT (0.001 rad) from one window of WINDOW (0.3 s) to the next. The encoders are tested too because a part that is slower
+        than the published settle speed, 1 deg/s, can still be half a degree from its goal.
         """
 
         def moving() -> list[str]:
@@ -59,7 +60,10 @@ class BusFollower(BusPlant):
             raise MobeeError(f"{', '.join(moving())}: still moving after {TAKE_TIMEOUT:g} s; `mobee status` shows which process moves it")
 
     def take(self, parts: Sequence[str]) -> None:
-        """Take the goals of parts; raises MobeeError if a part stays in hold or belongs to another service."""
+        """Take the ownership of the goals of `parts`, and wait until these parts are under control.
+
+        Raises MobeeError if a part is still in hold after TAKE_TIMEOUT (8 s), or if its goal belongs to another service.
+        """
         give_up = time.monotonic() + TAKE_TIMEOUT
         while not self._has(parts):
             if time.monotonic() > give_up:
@@ -72,12 +76,16 @@ class BusFollower(BusPlant):
     def follow(
         self, parts: Sequence[str], attractors: Sequence[Array], period: float, progress: Callable[[float], None] = lambda share: None
     ) -> dict[str, Outcome]:
-        """Set the attractors of taken parts to one row (n,) rad of `attractors` per period [s of the robot's clock]; wait until all rest.
+        """Move the attractors of taken parts along `attractors`, and wait until all these parts rest; return the outcome of each part.
 
-        A row that is too late is left out, except the last.  `progress` is called with the share of the rows that is over.
+        Args:
+            parts: names of parts whose goals were taken with `take`.
+            attractors: rows of motor positions (n,) rad of the whole robot, one for each period.
+            period: time from one row to the next, s of the robot's clock. If the process is late, rows are skipped, but never the last one.
+            progress: called with the share of the rows, 0 to 1, that have been set.
 
-        Raises ActionInterrupted if a part is in hold or was taken by another service, or if the robot's clock stands still; call `let_go`
-        afterwards.
+        Raises ActionInterrupted if a part is in hold or was taken by another service, if the controller ends, if robot_sim starts a new
+        run, or if the robot's clock stands still. Call `let_go` afterwards.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()
@@ -100,12 +108,12 @@ class BusFollower(BusPlant):
         return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:
-        """Return the encoder values (T, n) rad of all ticks since `follow` began, and their times (T,) s since the first."""
+        """Return the encoder values (T, n) rad of all ticks since `follow` began, and the times (T,) s of these ticks since the first."""
         times = np.array([time_ for time_, _ in self._seen])
         return times - times[:1], np.array([q for _, q in self._seen])
 
     def let_go(self) -> None:
-        """Release all goals; the parts then stay where they are. Goals that were lost before are ignored."""
+        """Release the goals of all taken parts; the parts then stay where they are. A goal that this service has lost is ignored."""
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller: then the part holds
                 self.release(part)

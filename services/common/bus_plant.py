@@ -29,7 +29,7 @@ UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 
 class ReachClient:
-    """The target that a process presents to the model, and the newest messages of its parts' reaches."""
+    """The client's side of reaches: presents a target to the model, and keeps the newest `Reach` message of each part."""
 
     def __init__(self, service: Service, parts: tuple[str, ...]) -> None:
         self._service = service
@@ -42,7 +42,11 @@ class ReachClient:
         service.on_alive(self._note_alive)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See mobee.reach.ReachPlant; raises ActionInterrupted while the model does not answer."""
+        """Put a target into the model's world as the object `reach_target`, or move it there; None removes it.
+
+        Implements `mobee.reach.ReachPlant.present`. Raises ActionInterrupted if the model does not answer, InvalidValue if it refuses the
+        target.
+        """
         if target is not None:
             self._put(target)
         elif self._is_there:
@@ -51,9 +55,11 @@ class ReachClient:
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
-        """Use an object of the model's world as target, also while it moves; return the target at its current position.
+        """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
 
-        Raises UnknownName; InvalidValue if it is stale, or if its role is not target, because it then repels hands.
+        `aim`, `normal`, `faces`: as in `mobee.reach.ReachTarget`. Raises UnknownName if there is no such object; InvalidValue if the object
+        is stale, that is, not seen any more, or if its role is not target, because it then repels hands; ActionInterrupted if the model
+        does not answer.
         """
         found = self._known(name)
         if found.role != "target":
@@ -67,7 +73,10 @@ class ReachClient:
         return self._target
 
     def asked(self) -> dict[str, object]:
-        """Return the fields of a ReachFor that describe the target; raises InvalidValue if none is presented."""
+        """Return the fields of a `ReachFor` request that describe the presented target; raises InvalidValue if none is presented.
+
+        If the model was started again, the target is put into its world again.
+        """
         target = self._target
         if target is None:
             raise InvalidValue("no target is presented: call present(ReachTarget(position)) first")
@@ -84,12 +93,16 @@ class ReachClient:
         }
 
     def has_ended(self, part: str, action_id: str) -> bool:
-        """Return whether the controller has reported the end of a reach's force."""
+        """Return whether the controller has reported that the force of the reach `action_id` of a part has ended."""
         reach = self._reaches.get(part)
         return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
 
     def outcome(self, part: str, motion: Motion, after: Outcome, tick: float) -> ReachOutcome:
-        """Return the outcome of a reach that has ended; `motion`: its last message; `after`: outcome of the second phase; `tick` [s]."""
+        """Return the outcome of a part's reach that has ended; raises ActionInterrupted if the reach was interrupted.
+
+        `motion`: the last `Motion` message of the part. `after`: outcome of the second phase, in which the attractor pulls the part back,
+        with the duration of both phases. `tick`: length of a tick, s.
+        """
         reach = self._reaches[part]
         if reach.phase == "interrupted":
             raise ActionInterrupted(f"{part}: the reach was interrupted")
@@ -105,7 +118,7 @@ class ReachClient:
         )
 
     def leave(self) -> None:
-        """Remove the target, if there is one; the model may have ended already."""
+        """Remove the target from the model's world, if there is one; it is no error if the model has already ended."""
         try:
             self.present(None)
         except ActionInterrupted as error:
@@ -116,7 +129,10 @@ class ReachClient:
         self._call("add", AddObject, name=TARGET, geometry=sphere, position=target.position.tolist(), quaternion=UPRIGHT, role="target")
 
     def objects(self) -> dict[str, ObjectState]:
-        """See `BusPlant.objects`."""
+        """Return the objects of the model's world that are not attached to a link, by name.
+
+        Raises ActionInterrupted if the model does not answer.
+        """
         return {one.name: one for one in self._listed().objects if not one.link}
 
     def _listed(self) -> World:
@@ -165,10 +181,10 @@ OWNED_PATIENCE = 3.0  # s for which a goal may belong to another service: the to
 
 
 class BusPlant:
-    """A ReachPlant on the bus for some parts.  While it waits, the service answers calls.
+    """The live robot as a plant (`mobee.reach.ReachPlant`): acts and reaches with some parts through controller and model on the bus.
 
-    In lockstep it answers ticks for its service: a tick that waits for a decision of this service is answered when the service waits
-    again, so that the decision is made within that tick however long it takes.
+    While it waits, the service answers calls. In lockstep it also answers ticks for its service: a tick that waits for a decision of this
+    service is answered when the service waits again, so that the decision is made within that tick however long it takes.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
@@ -206,7 +222,11 @@ class BusPlant:
         return self._q.copy()
 
     def measure(self, part: str) -> Array:
-        """Return the part's motor positions, (n_part,) rad, once the part is under control and its goal belongs to this service."""
+        """Return the part's motor positions, (n_part,) rad, by the encoders.
+
+        First takes the goal of the part, if this service does not own it, and waits until the part is under control. Raises
+        ActionInterrupted while this service rests, MobeeError if the goal belongs to another service for more than OWNED_PATIENCE (3 s).
+        """
         self._require_awake(part)
         self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
@@ -217,35 +237,54 @@ class BusPlant:
         return np.array(self._motion[part].q)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See mobee.plant.Plant."""
+        """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
+
+        Implements `mobee.plant.Plant.act`. Raises InvalidValue for a target beyond the limits; ActionInterrupted on a hold, a fault or a
+        new run, and if the controller ends or gives the goal to another service.
+        """
         action_id = self._perform(part, "goal", Goal, q=[float(x) for x in target])
         return self._outcome(part, action_id)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See mobee.reach.ReachPlant; raises ActionInterrupted while the model does not answer."""
+        """Put a target into the model's world as the object `reach_target`, or move it there; None removes it.
+
+        Implements `mobee.reach.ReachPlant.present`. Raises ActionInterrupted if the model does not answer, InvalidValue if it refuses the
+        target.
+        """
         self._reaches.present(target)
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
-        """Use an object of the model's world as target, also while it moves; return the target at its current position.
+        """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
 
-        Raises UnknownName; InvalidValue if its role is not target; ActionInterrupted while the model does not answer.
+        `aim`, `normal`, `faces`: as in `mobee.reach.ReachTarget`. Raises UnknownName if there is no such object; InvalidValue if it is
+        stale, that is, not seen any more, or if its role is not target; ActionInterrupted if the model does not answer.
         """
         return self._reaches.present_object(name, aim, normal, faces)
 
     def places(self) -> dict[str, Array]:
-        """Return the places (3,) m of the free objects in the model's world, by name: those of its file, and those that are perceived.
+        """Return the positions (3,) m, root frame, of the free objects in the model's world, by name.
 
-        A perceived object that is stale is left out.  For an agent whose states hold where an object is:
-        `PerceivingPlant(plant, plant.places)`.  Raises ActionInterrupted while the model does not answer.
+        These are the objects of the world's file and those that vision perceives. Objects that are attached to a link, and perceived
+        objects that are stale, are left out. An agent whose states hold the position of an object uses it as `PerceivingPlant(plant,
+        plant.places)`. Raises ActionInterrupted if the model does not answer.
         """
         return {name: np.array(one.position) for name, one in self.objects().items()}
 
     def objects(self) -> dict[str, ObjectState]:
-        """Return the free objects in the model's world, by name, with role and time of the newest picture; otherwise as `places`."""
+        """Return the free objects in the model's world, by name, with their roles and the time of the newest picture of each.
+
+        Objects that are attached to a link, and perceived objects that are stale, are left out. Raises ActionInterrupted if the model does
+        not answer.
+        """
         return self._reaches.objects()
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See mobee.reach.ReachPlant."""
+        """Pull the marker to the presented target by a force until the part settles or times out, then end the force; return the outcome.
+
+        Then the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Implements
+        `mobee.reach.ReachPlant.reach`. Raises InvalidValue if no target is presented or the part does not move the marker;
+        ActionInterrupted as `act`.
+        """
         self.robot.marker(marker)
         action_id = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
         after = self._outcome(part, action_id)
@@ -278,13 +317,13 @@ class BusPlant:
                 raise ActionInterrupted(f"{part}: the controller has ended, or gave its goal to another service")
 
     def release(self, part: str) -> None:
-        """Release the part's goal."""
+        """Release the goal of the part, if this service owns it; raises services.common.rpc.CallFailed."""
         epoch = self._epochs.pop(part, None)
         if epoch is not None:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
 
     def rest(self) -> None:
-        """Release all goals at once and take none until `resume`; an action under way raises ActionInterrupted."""
+        """Release all goals at once, and take none until `resume` is called; an action in progress raises ActionInterrupted."""
         self._is_resting = True
         self._wanted.clear()
         for part in list(self._epochs):
@@ -292,18 +331,21 @@ class BusPlant:
                 self.release(part)
 
     def resume(self) -> None:
-        """End the rest."""
+        """End the rest that `rest` has begun: goals may be taken again."""
         self._is_resting = False
 
     def idle(self) -> bool:
-        """Wait for a moment if this plant rests; returns whether it still does."""
+        """Return whether this plant rests, as after `rest`.
+
+        If it does, first wait until the rest ends, for at most 0.2 s (RETRY_PERIOD).
+        """
         if self._is_resting:
             self._service.check_router()
             self._wait(lambda: not self._is_resting)
         return self._is_resting
 
     def pause(self, seconds: float) -> None:
-        """Run handlers for some seconds of real time; raises ActionInterrupted at a request to rest, and at a new run of robot_sim."""
+        """Run handlers for `seconds` of real time; raises ActionInterrupted at a request to rest, and at a new run of robot_sim."""
         run = self._runs
         self._service.check_router()
         self._wait(lambda: self._is_resting, seconds)
@@ -313,7 +355,7 @@ class BusPlant:
             raise ActionInterrupted("robot_sim started a new run")
 
     def leave(self) -> None:
-        """Release all goals and, in lockstep, end the participation of this service."""
+        """Release all goals, remove the target and, in lockstep, end the participation of this service."""
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()

@@ -17,24 +17,25 @@ STEREO = 2  # cameras that locate a ball
 
 
 class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings of a service that makes, reads or shows pictures."""
+    """Settings of a service that makes, reads or shows pictures of cameras."""
 
     cameras: tuple[str, ...] = ()
-    """Cameras beside the first two of the robot's file, or the eyes at its markers left_eye and right_eye: names of others in the file,
-    or NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place in m and a direction of view in its frame."""
+    """Further cameras, beside the first two of the robot's file (without cameras in the file: the eyes at its markers left_eye and
+    right_eye). Each is the name of another camera in the file, or a new camera: NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz with the name of a
+    link or marker, a position in m and a direction of view in its frame."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the cameras can be made; raises MobeeError."""
+        """Check the robot as every service does, and that all cameras can be made; raises MobeeError."""
         super().check_robot(robot)
         self.cameras_on(robot)
 
     def cameras_on(self, robot: Robot) -> dict[str, Camera]:
-        """Return the cameras by name; raises MobeeError for one that cannot be made."""
+        """Return the cameras of the robot by name, with those in the settings; raises MobeeError for a camera that cannot be made."""
         return cameras_of(robot, self.cameras)
 
 
 def require_cameras(robot: Robot, cameras: dict[str, Camera], count: int) -> None:
-    """Raise InvalidValue if the robot has fewer cameras than that; the message names the remedies."""
+    """Raise InvalidValue if the robot has fewer than `count` cameras; the message names the remedies. `cameras`: its cameras by name."""
     if len(cameras) >= count:
         return
     has = f"it has {', '.join(cameras) or 'none'}"
@@ -46,9 +47,10 @@ def require_cameras(robot: Robot, cameras: dict[str, Camera], count: int) -> Non
 
 
 def frame_at_capture(robot: Robot, camera: Camera, q: Array) -> tuple[Array, Array]:
-    """Return optical centre (3,) m and rotation (3, 3) of a camera from the posture q (n,) [rad] that was sent with a picture.
+    """Return the optical centre (3,) m and the rotation (3, 3) of a camera, root frame, at the posture q (n,) rad of a picture.
 
-    The columns of the rotation are the picture's right, its down, and the direction of view, in the root frame.  Raises InvalidValue.
+    The columns of the rotation are the directions to the right and down in the picture, and the direction of view. Raises InvalidValue if q
+    does not have one number for each motor.
     """
     if np.shape(q) != (len(robot.motors),):
         raise InvalidValue(f"posture: {np.size(q)} numbers, expected {len(robot.motors)}")

@@ -34,26 +34,30 @@ _NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """The certificate of an identity."""
+    """What the certificate of an identity says."""
 
     name: str
     party: Party | None  # None: the router
     until: datetime.datetime  # the end of its validity
 
     def days_left(self, now: datetime.datetime | None = None) -> int:
-        """Whole days until it expires; negative when it has expired."""
+        """Return the number of whole days until the certificate expires; negative if it has expired. `now`: None: the present time."""
         return (self.until - (now or _now())).days
 
 
 class KeyFolder:
-    """A folder with the certificate of an authority, and keys and certificates of identities; the key of the authority may be elsewhere."""
+    """A folder with the certificate of an authority, and with keys and certificates of identities; the authority's key may be elsewhere."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     @classmethod
     def new(cls, path: Path, identities: Iterable[tuple[str, Party | None]], days: int = DAYS) -> KeyFolder:
-        """Make an authority and the identities in a new or empty folder; raises BadKeys if it holds files, OSError."""
+        """Make an authority, and a key and a certificate for each identity, in a new or empty folder; return the folder.
+
+        `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which their certificates are
+        valid. Raises BadKeys if the folder holds files; OSError.
+        """
         if path.exists() and any(path.iterdir()):
             raise BadKeys(
                 f"{path} holds files already, and keys in use must not be replaced: name another folder, or add to it with `keys add`"
@@ -75,7 +79,11 @@ class KeyFolder:
         return folder
 
     def add(self, identities: Iterable[tuple[str, Party | None]], days: int = DAYS) -> None:
-        """Make the key and certificate of each identity, or new ones in place of old ones; raises BadKeys, OSError."""
+        """Make a key and a certificate for each identity, or replace old ones.
+
+        `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which the certificates are
+        valid. Raises BadKeys if a name is not valid, or if the key of the authority is missing; OSError.
+        """
         authority, key = self._authority(), self._authority_key()
         for name, party in identities:
             if not _NAME.fullmatch(name) or name == AUTHORITY:
@@ -93,21 +101,27 @@ class KeyFolder:
             _write(identity.certificate, built.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM))
 
     def issued(self) -> list[Issued]:
-        """Return the certificates of all identities, by name; raises BadKeys for one that cannot be read or is of another authority."""
+        """Return what the certificates of all identities say, sorted by name.
+
+        Raises BadKeys for a certificate that cannot be read or is of another authority.
+        """
         require_private(self.path)
         authority = self._authority()
         paths = (path for path in sorted(self.path.glob("*.crt")) if path.stem != AUTHORITY)
         return [_checked(path, authority) for path in paths]
 
     def require(self, names: Iterable[str]) -> None:
-        """Raise BadKeys for the first of these identities that nothing could connect with now."""
+        """Raise BadKeys for the first of the identities `names` whose key or certificate is missing, not safe or expired."""
         known = {one.name: one for one in self.issued()}
         for name in names:
             Identity(self.path, name).require()
             self._require_valid(known[name])
 
     def require_certificates(self, names: Iterable[str]) -> None:
-        """Raise BadKeys for the first of these identities, whose private keys may be elsewhere, that nothing could connect with now."""
+        """Raise BadKeys for the first of the identities `names` whose certificate is missing or expired.
+
+        Their private keys are not tested, because they may be on another host.
+        """
         known = {one.name: one for one in self.issued()}
         for name in names:
             if name not in known:

@@ -46,7 +46,7 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     endpoint: str = DEFAULT_ENDPOINT
     """Address of the router."""
     namespace: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
-    """Prefix of all keys: the robot, or the filter in front of it."""
+    """Prefix of all keys: icub for the robot, or that of the filter in front of the robot."""
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
     seed: int = 0
@@ -57,13 +57,17 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Lockstep: s of real time after which a participant without an answer is dropped; raise it on a busy machine."""
 
     def packages(self) -> Mapping[str, str]:
-        """The packages that these settings need beside those of the service, by import name, each with the extra that brings it."""
+        """Return the packages that these settings need in addition to those of the service.
+
+        Keys: import names of the packages. Values: the extra of this project that installs the package, such as "sim".
+        """
         return {}
 
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if the service cannot serve the robot with these settings; the message has the reason and a remedy.
 
-        The launcher calls this before it starts any service, and each service before it is ready. Services add their own conditions.
+        The launcher calls this before it starts any service, and each service calls it before it is ready. Subclasses add their own
+        conditions.
         """
         for part in robot.parts:
             if not _KEY.fullmatch(part):
@@ -74,7 +78,7 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings of a service that has a world of its own."""
+    """Settings of a service that loads a world of its own."""
 
     world: str = ""
     """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
@@ -85,7 +89,11 @@ class WorldConfig(ServiceConfig, frozen=True, kw_only=True):
 
 
 def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
-    """Return the settings: defaults, replaced by `--config FILE` (TOML), replaced by the other flags; exits with code 2 on an error."""
+    """Return the settings of a program: the defaults of `cls`, replaced by those in a TOML file (`--config FILE`), then by the other flags.
+
+    `argv`: command line without the program's name; None: that of this process. `prog`: name of the program, for messages. Exits with code
+    2 on an error.
+    """
     given = sys.argv[1:] if argv is None else argv
     arguments = [piece for word in given for piece in (word.split("=", 1) if word.startswith("--config=") else [word])]
     default = cls()
@@ -110,7 +118,7 @@ def load_config(cls: type[_C], argv: Sequence[str] | None, prog: str) -> _C:
 
 
 def read_toml(path: Path, cls: type[_C]) -> _C:
-    """Return the settings in a TOML file as a `cls`; raises ConfigError in one line."""
+    """Return the settings in a TOML file as a struct of the type `cls`; raises ConfigError with a message of one line."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -132,7 +140,11 @@ def read_toml(path: Path, cls: type[_C]) -> _C:
 
 
 def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], prefix: str = "") -> _C:
-    """Return data as a `cls`; raises ConfigError with the field; `where` returns the place of a field, such as "file:line"."""
+    """Return the settings in a dict as a struct of the type `cls`; raises ConfigError, whose message names the field.
+
+    `where(field)`: returns the place of a field for the message, such as "file:line". `prefix`: text before all names of fields in
+    messages, such as "shared.".
+    """
     check_names(data, cls, where, prefix)
     try:
         return msgspec.convert(data, cls)
@@ -144,7 +156,11 @@ def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], pr
 
 
 def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], str], prefix: str = "") -> None:
-    """Raise ConfigError for the first name in the data that is not a field of the struct or of a struct in it."""
+    """Raise ConfigError for the first name in `data` that is not a field of the struct `cls`, or of a struct inside it.
+
+    `where(field)`: returns the place of a field for the message, such as "file:line". `prefix`: text before all names of fields in
+    messages.
+    """
     hints = get_type_hints(cls)
     for name, value in data.items():
         if name not in hints:
@@ -161,7 +177,10 @@ def nearest(given: str, valid: Iterable[str]) -> str:
 
 
 def line_of(text: str, field: str) -> int | None:
-    """Return the line of a TOML text that sets a field, given as "table.field", or else that of the innermost table around it."""
+    """Return the number of the line in a TOML text that sets `field`, which is given as "table.field"; the first line is 1.
+
+    If no line sets the field, the result is the line of the innermost table around it, or None without such a table.
+    """
     field = field.partition("[")[0]  # msgspec does not say which entry of a table or list
     table, closest, found = "", -1, None
     for number, line in enumerate(text.splitlines(), start=1):

@@ -24,7 +24,7 @@ FOLDER = "mobee/emergency-stop"  # in the user's folder of states
 
 
 class Stop(Struct, frozen=True):
-    """An emergency stop that has not been released."""
+    """An emergency stop that has not been released. `source`: name of the process that stopped the robot."""
 
     source: str
     reason: str
@@ -36,14 +36,17 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether a stop's record replaces the old one: a launcher's stop ends with it, the stop of another client does not."""
+    """Return whether a new stop takes the place of the old one in the record: if there is none, or if only the old one is by the launcher.
+
+    A stop by the launcher ends with its launch; a stop by another process stays.
+    """
     return old is None or (old.source == BY_LAUNCHER and new.source != BY_LAUNCHER)
 
 
 class StopRecord:
-    """A file that says whether the robot is stopped, so that a stop outlives every process.
+    """A file that records whether the robot is stopped, so that a stop outlives every process.
 
-    A file that does not exist or cannot be read counts as a stop: only a record of a release lets the robot move.
+    A file that does not exist or cannot be read counts as a stop: the robot moves only if the file records a release.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,9 +55,9 @@ class StopRecord:
 
     @classmethod
     def of_endpoint(cls, endpoint: str, states: Path | None = None) -> StopRecord:
-        """The record of the robot that is reached at an endpoint of this machine; all its runs share it.
+        """Return the record of the robot that is reached at an endpoint of this machine; all runs of the robot share it.
 
-        `states`: the folder of states of the user who has launched it; None: of this process.
+        `states`: the folder of states of the user who has launched the robot; None: that of the user of this process.
         """
         endpoint = re.sub("^(tls|quic)/", "tcp/", endpoint)  # a stop stays in force with or without security
         states = states or Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
@@ -62,11 +65,11 @@ class StopRecord:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
         return self._path
 
     def create(self) -> None:
-        """Record that the robot is not stopped, unless there is a record; raises OSError."""
+        """Make the file, which then says that the robot is released, unless there is a file; raises OSError."""
         if not self._path.exists():
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self.release()
@@ -77,7 +80,7 @@ class StopRecord:
             self._path.unlink(missing_ok=True)
 
     def read(self) -> Stop | None:
-        """The stop in force; None if the robot is released."""
+        """Return the stop in force; None if the robot is released. A file that cannot be read gives a stop."""
         try:
             found = json.loads(self._path.read_bytes())
             if found["stopped"] is False:
@@ -87,7 +90,10 @@ class StopRecord:
             return Stop("robot_sim", f"the record of emergency stops {self._path} cannot be read ({type(error).__name__})")
 
     def new_stop(self) -> Stop | None:
-        """Return the stop in force if the file has changed since the last call; its removal, at the end of a launch, is no stop."""
+        """Return the stop in force if the file has changed since the last call; otherwise None.
+
+        A file that does not exist is no stop here, because a launch removes the file when it ends.
+        """
         try:
             found = self._path.stat()
         except OSError:
@@ -98,7 +104,10 @@ class StopRecord:
         return self.read() if self._path.exists() else None
 
     def stop(self, source: str, reason: str) -> bool:
-        """Record a stop, unless one is in force; returns False if there is no record, so that no robot watches it.  Raises OSError."""
+        """Record a stop, unless one is in force that it does not replace (`replaces`).
+
+        Returns False if there is no file, so that no robot watches it. Raises OSError.
+        """
         if not self._path.exists():
             return False
         new = Stop(source, reason, time.time())
@@ -107,7 +116,7 @@ class StopRecord:
         return True
 
     def latch(self, stop: Stop) -> None:
-        """Record a stop; raises OSError."""
+        """Record a stop in place of the present content of the file; raises OSError."""
         self._write({"stopped": True, "source": stop.source, "reason": stop.reason, "time": stop.time})
 
     def release(self) -> None:
@@ -115,7 +124,7 @@ class StopRecord:
         self._write({"stopped": False, "time": time.time(), "monotonic_ns": time.monotonic_ns()})
 
     def released_at(self) -> int:
-        """Time of the last release [ns, monotonic clock]; 0 if it is not known."""
+        """Return the time of the last release, ns of the monotonic clock; 0 if it is not known."""
         try:
             return int(json.loads(self._path.read_bytes()).get("monotonic_ns", 0))
         except (OSError, ValueError, AttributeError, TypeError, RecursionError):
@@ -142,18 +151,18 @@ _SETS = b"set\xc3"  # the field `set` = true in msgpack
 
 
 class StopLine:
-    """Receives emergency stops.
+    """Receives emergency stops from the bus, also during a flood of messages.
 
-    Zenoh keeps the newest messages without running any Python: a flood of them takes no time from the process, except a microsecond each
-    for those that set no stop.
+    Zenoh keeps the newest messages without running any Python. A flood takes no time from the process, except about a microsecond for each
+    message that sets no stop.
     """
 
     def __init__(self, session: zenoh.Session) -> None:
-        """Subscribe; a process that must receive a stop through every flood gives a session of its own."""
+        """Subscribe to emergency stops; a process that must receive a stop through every flood gives a session of its own."""
         self._subscriber = session.declare_subscriber(EStop.stream.key(), RingChannel(_WAITING))
 
     def take(self) -> list[EStop]:
-        """Return the stops that came since the last call; messages that set none, or cannot be decoded, are dropped."""
+        """Return the stops that have arrived since the last call; messages that set no stop, or cannot be decoded, are dropped."""
         stops = []
         for _ in range(_WAITING):
             sample = self._subscriber.try_recv()

@@ -19,12 +19,17 @@ from services.common.session import BusUnreachable
 from services.common.text import printable
 
 HELD = "MOBEE_HELD"
-"""Environment variable of a process that a launcher has started: the instance of the router that it may join, and, if its launcher has
-joined from another host, the launcher's process id.  The launcher closes the process's standard input when it may join."""
+"""Environment variable of a process that a launcher has started. It holds the instance of the router that the process may join and, if the
+launcher has joined from another host, the process id of the launcher. The launcher closes the standard input of the process when it may
+join."""
 
 
 def wait_until_released() -> tuple[str, ...]:
-    """Wait until the services on which this one depends are ready, if a launcher has started it; return the words of HELD, or ()."""
+    """Wait until the services on which this one depends are ready, if a launcher has started it.
+
+    Returns the words of the environment variable MOBEE_HELD: the instance of the router and, if the launcher has joined from another host,
+    the launcher's process id; () without a launcher.
+    """
     held = os.environ.pop(HELD, "").split()
     if held:
         os.read(sys.stdin.fileno(), 1)  # returns at the end of the file, also when the launcher has died
@@ -40,7 +45,10 @@ def robot_of(config: ServiceConfig) -> Robot:
 
 @contextmanager
 def explained(prog: str) -> Iterator[None]:
-    """Report errors of the project in one line on standard error; exit code 2 if a setting is wrong, else 1."""
+    """If the `with` block raises an error of the project, print it as one line on standard error and exit.
+
+    The exit code is 2 if a setting is wrong, otherwise 1. `prog`: name of the program, for the line.
+    """
     try:
         yield
     except (MobeeError, BusUnreachable) as error:

@@ -21,7 +21,10 @@ RETRY_PERIOD = 0.5  # s of real time between two attempts to take the part
 
 
 class FollowedPart:
-    """The goal of a part, and the state of all parts as the controller reports it."""
+    """Takes, moves and releases the goal of one part for a behaviour, and keeps the newest motion of all parts.
+
+    No method waits for an answer.
+    """
 
     def __init__(self, service: Service, robot: Robot, part: str) -> None:
         self._service, self._robot, self._part = service, robot, part
@@ -41,7 +44,7 @@ class FollowedPart:
         return self._epoch > 0 and motion is not None and motion.epoch == self._epoch
 
     def why_not(self) -> str:
-        """Return why the part cannot be moved now, as a text; empty if it can."""
+        """Return the reason why the part cannot be moved now, as a text; empty if the part can be moved."""
         motion = self._motions.get(self._part)
         if motion is None:
             return f"no message about {self._part}"
@@ -52,16 +55,17 @@ class FollowedPart:
         return f"the goal of {self._part} belongs to {motion.owner}" if motion.owner else f"the goal of {self._part} is not taken yet"
 
     def velocities(self) -> Array:
-        """Return the commanded velocities of all motors, (n,) rad/s."""
+        """Return the commanded velocities of all motors, (n,) rad/s, as the controller reports them; 0 for parts without a report."""
         found = np.zeros(len(self._robot.motors))
         for name, motion in self._motions.items():
             found[self._robot.part(name).slice] = motion.dq
         return found
 
     def take(self) -> None:
-        """Try to take the part if it is free, at most every RETRY_PERIOD; `is_owned` becomes true when the controller has agreed.
+        """Ask the controller for the goal of the part, if it is free or belongs to a behaviour; at most once per RETRY_PERIOD (0.5 s).
 
-        A behaviour that has it is asked too: the controller knows the ranks.
+        `is_owned` becomes True when the controller has given the goal to this service. If the goal belongs to another behaviour, the
+        controller decides by the ranks of the two.
         """
         now, motion = time.monotonic(), self._motions.get(self._part)
         if motion is None or motion.owner not in ("", self._service.who, *BEHAVIOURS):
@@ -72,16 +76,16 @@ class FollowedPart:
         self._service.ask(keys.goal(self._part, "take"), Taken, self._taken, request=Take, instance=self._service.instance)
 
     def release(self) -> None:
-        """Give the part back; it brakes, and moves to the posture of the controller's settings if there is one."""
+        """Release the goal of the part. The part brakes, and moves to the posture in the controller's settings if there is one."""
         epoch, self._epoch = self._epoch, 0
         self._service.ask(keys.goal(self._part, "release"), Done, self._released, request=WithEpoch, epoch=epoch)
 
     def move(self, q: Array, velocity: Array) -> None:
-        """Set the attractor of the part to q (n_part,) rad, which moves with `velocity` (n_part,) rad/s; it stays within the limits."""
+        """Set the attractor of the part to q (n_part,) rad, moving with `velocity` (n_part,) rad/s; q is clipped to the motors' limits."""
         self._stream.put(epoch=self._epoch, q=np.clip(q, self._low, self._high).tolist(), dq=velocity.tolist())
 
     def forget(self) -> None:
-        """Drop what is known of the motions, at the start of a run."""
+        """Drop the motions that the controller has reported; call this at the start of a run."""
         self._motions.clear()
 
     def _note_motion(self, part: str, motion: Motion) -> None:

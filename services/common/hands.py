@@ -16,14 +16,17 @@ EQUAL_DISTANCE = 1e-3  # m; palms whose distances differ by less count as equall
 
 
 def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
-    """Return the markers that a part moves, in the order of the file; raises UnknownName for a part that the robot does not have."""
+    """Return the names of the markers that a part moves, in the order of the robot's file.
+
+    Raises UnknownName for a part that the robot does not have.
+    """
     robot.part(part)
     moved = links_moved(robot)[part]
     return tuple(name for name, marker in robot.markers.items() if marker.link in moved)
 
 
 def hand_of(robot: Robot, part: str) -> str:
-    """Return the marker with which a part reaches: the palm on its side (the right one for a torso), else its first end marker.
+    """Return the name of the marker with which a part reaches: the palm on its side (the right one for a torso), else its first end marker.
 
     Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
     """
@@ -37,9 +40,9 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """Return the markers on moving links at the ends of the tree, or all moving markers if no end has one.
+    """Return the names of the markers on links at the ends of the tree, or of all markers that motors move if no end has a marker.
 
-    Markers that more motors move come first, so that a hand is before a wheel.
+    Only markers that a motor moves count. Markers that more motors move come first, so that a hand comes before a wheel.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -61,10 +64,11 @@ def part_of(robot: Robot, marker: str) -> str:
 
 
 def hand_for(robot: Robot, place: Array | None) -> str:
-    """Return the marker with which to reach for a place: the nearest, at home, of the palms or of the end markers with most motors.
+    """Return the name of the marker with which to reach for a place: the candidate that is nearest to the place when the robot is at home.
 
-    `place`: (3,) m, or None if it is not known. Among equally near ones, or without a place: the right palm, or the first end marker.
-    Raises InvalidValue if no motor of the robot moves a marker.
+    The candidates are the two palms, or, without palms, the end markers that the most motors move. `place`: (3,) m, root frame; None: not
+    known. If several are equally near, or the place is not known, the right palm or the first end marker is returned. Raises InvalidValue
+    if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:

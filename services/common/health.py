@@ -21,7 +21,7 @@ CROWD = 500  # waiting messages and calls
 
 
 class Beats:
-    """Counts events that should come at a fixed rate, by the monotonic clock."""
+    """Counts events that should come at a fixed rate; times are in s of the monotonic clock."""
 
     def __init__(self, now: float) -> None:
         self._begun, self._count, self._gap = now, 0, 0.0
@@ -30,25 +30,28 @@ class Beats:
         self.gap: float | None = None  # s, the longest in it
 
     def note(self, now: float) -> None:
-        """Note an event."""
+        """Record an event at the time `now` [s]."""
         if self._last is not None and now - self._last > self._gap:
             self._gap = now - self._last
         self._last = now
         self._count += 1
 
     def age(self, now: float) -> float | None:
-        """Time since the last event, s; None if there was none."""
+        """Return the time since the last event, s; None if there was none."""
         return None if self._last is None else now - self._last
 
     def end_window(self, now: float) -> None:
-        """Begin a new window."""
+        """End the present window at the time `now` [s]: set `rate` and `gap` to those of this window, and begin a new one."""
         if self._last is not None:
             self.rate, self.gap = self._count / (now - self._begun), max(self._gap, now - self._last)
         self._begun, self._count, self._gap = now, 0, 0.0
 
 
 class Health:
-    """Measures this process; call `check` once in WINDOW.  `files_limit`: of open files, None where it is not known."""
+    """Measures the health of this process, and reports numbers that are beyond their limits; call `check` every WINDOW (5 s).
+
+    `files_limit`: largest number of open files; None: that of the system, if it is known.
+    """
 
     def __init__(self, files_limit: int | None = None) -> None:
         now = time.monotonic()
@@ -60,7 +63,11 @@ class Health:
         self.bad: dict[str, float] = {}  # numbers beyond their limits: the time [s] of the last check that found each
 
     def numbers(self, waiting: int) -> dict[str, int | float | None]:
-        """Rate [Hz], age and longest gap [ms] of the ticks, refusals per second, memory [MB], open files, threads, waiting messages."""
+        """Return the present numbers, by name; None: not measured.
+
+        They are rate [Hz], age and longest gap [ms] of the ticks, refusals per second, memory [MB], open files, threads and waiting
+        messages. `waiting`: number of messages and calls in the inbox.
+        """
         age, gap = self.beats.age(time.monotonic()), self.beats.gap
         return {
             "rate": self.beats.rate,
@@ -76,8 +83,9 @@ class Health:
     def check(self, expected: float | None, refused: int, waiting: int, report: Callable[[str, str], None]) -> None:
         """Compare the numbers of the last window with their limits.
 
-        `expected`: rate of the ticks, Hz, None in lockstep or without a clock; `refused`: number of messages since the start; `report` is
-        called with level and text when something becomes bad, and when it is good again.
+        `expected`: rate of the ticks, Hz; None in lockstep or without a clock. `refused`: number of refused messages since the start.
+        `waiting`: number of messages and calls in the inbox. `report(level, text)`: called when a number becomes bad ("warning"), and when
+        it is good again ("info").
         """
         now = time.monotonic()
         self.beats.end_window(now)

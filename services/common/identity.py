@@ -11,7 +11,8 @@ from pathlib import Path
 from mobee.errors import MobeeError
 
 KEYS, IDENTITY = "MOBEE_KEYS", "MOBEE_IDENTITY"
-"""Environment variables: the folder of keys, and the name of the identity in it; without the first the connection is not secured."""
+"""Environment variables. MOBEE_KEYS: the folder of keys; if it is not set, the connection is not secured. MOBEE_IDENTITY: the name of the
+identity of this process in that folder."""
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"  # of the router
 OPERATOR = "operator"  # the identity of the commands at a terminal, unless another is named
@@ -27,14 +28,14 @@ class BadKeys(MobeeError):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """An identity in a folder of keys."""
+    """An identity in a secured system: the name of a private key and a certificate in a folder of keys."""
 
     folder: Path
     name: str
 
     @classmethod
     def of_environment(cls) -> Identity | None:
-        """Return the identity that the environment names; None if it names no folder of keys."""
+        """Return the identity that the environment names; None if MOBEE_KEYS is not set. Without MOBEE_IDENTITY its name is `operator`."""
         folder = os.environ.get(KEYS)
         return cls(Path(folder), os.environ.get(IDENTITY, OPERATOR)) if folder else None
 
@@ -44,35 +45,36 @@ class Identity:
 
     @property
     def certificate(self) -> Path:
-        """The certificate of this identity."""
+        """Path of the certificate of this identity."""
         return self.folder / f"{self.name}.crt"
 
     @property
     def key(self) -> Path:
-        """The private key of this identity."""
+        """Path of the private key of this identity."""
         return self.folder / f"{self.name}.key"
 
     @property
     def authority(self) -> Path:
-        """The certificate of the authority, by which others are checked."""
+        """Path of the certificate of the authority, with which the certificates of others are checked."""
         return self.folder / f"{AUTHORITY}.crt"
 
     def socket(self, endpoint: str) -> str:
-        """Return the address, besides `endpoint`, at which a secured router listens for the commands of its user; empty if it has none.
+        """Return the second address of the secured router at `endpoint`: a Unix socket in the folder of keys. Empty if it has none.
 
-        Only who may read the keys reaches it, and no connection of others is handled before theirs.
+        The router listens there for the commands of its user. Only users who may read the keys can connect, and their connections are
+        handled before those of others.
         """
         path = self.folder / f"{endpoint.rpartition(':')[2]}.sock"
         return f"unixsock-stream/{path}" if os.name == "posix" and len(os.fsencode(path)) <= LONGEST_SOCKET else ""
 
     def endpoints(self, endpoint: str) -> list[str]:
-        """Return the addresses at which this identity reaches the secured router that listens at `endpoint`, the best first."""
+        """Return the addresses at which this identity can connect to the secured router that listens at `endpoint`, the best one first."""
         socket = self.socket(endpoint) if self.name == OPERATOR and is_local(endpoint) else ""
         here = socket and Path(socket.partition("/")[2]).exists()
         return [socket, secured(endpoint)] if here else [secured(endpoint)]
 
     def require(self) -> None:
-        """Raise BadKeys if a file is missing, or if others may read the private key."""
+        """Raise BadKeys if a file of this identity is missing, or if other users may read the private key or the folder."""
         require_private(self.folder)
         for path in (self.authority, self.certificate, self.key):
             if not path.is_file():
@@ -83,9 +85,9 @@ class Identity:
         require_private(self.key)
 
     def settings(self) -> dict[str, object]:
-        """Return Zenoh's settings, by which this process shows its certificate and accepts only those of the same authority.
+        """Return the settings of Zenoh with which this process shows its certificate, and accepts only certificates of the same authority.
 
-        The name of the host is not compared: the authority signs one certificate only that may listen, the router's.
+        The name of the host is not compared, because only one certificate of the authority may listen: that of the router.
         """
         listens = self.name == ROUTER
         own = {"listen_certificate": str(self.certificate), "listen_private_key": str(self.key)}
@@ -96,7 +98,10 @@ class Identity:
 
 
 def assume(identity: Identity | None) -> None:
-    """Give this process an identity, or none: that of its user, which it has inherited, is not for the services of a launcher."""
+    """Give this process the identity `identity`, by its environment variables; None: no identity.
+
+    A launcher inherits the identity of its user, which its services must not have.
+    """
     for name in (KEYS, IDENTITY):
         os.environ.pop(name, None)
     if identity is not None:
@@ -104,7 +109,7 @@ def assume(identity: Identity | None) -> None:
 
 
 def require_private(path: Path) -> None:
-    """Raise BadKeys if a file or folder does not exist, belongs to another user, or can be read by others."""
+    """Raise BadKeys if a file or folder does not exist, belongs to another user, or can be read by other users."""
     try:
         found = path.stat()
     except OSError as error:
@@ -119,18 +124,18 @@ def require_private(path: Path) -> None:
 
 
 def default_folder() -> Path:
-    """Return the folder of keys of this user, unless a command names another."""
+    """Return the folder of keys of this user: MOBEE_KEYS if it is set, otherwise mobee/keys in the user's folder of settings."""
     given = os.environ.get(KEYS)
     return Path(given) if given else Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "mobee" / "keys"
 
 
 def secured(endpoint: str) -> str:
-    """Return the address at which a secured router listens: TLS in place of plain TCP."""
+    """Return the address at which a secured router listens: `endpoint` with TLS in place of plain TCP. Other addresses are not changed."""
     return _SECURED + endpoint.removeprefix(_PLAIN) if endpoint.startswith(_PLAIN) else endpoint
 
 
 def is_local(endpoint: str) -> bool:
-    """Return whether only processes of this host reach an address."""
+    """Return whether only processes of this host can connect to the address `endpoint`."""
     protocol, _, place = endpoint.partition("/")
     host = place.rpartition(":")[0].strip("[]")
     return protocol.startswith("unix") or host in ("localhost", "::1") or host.startswith("127.")

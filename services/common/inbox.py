@@ -20,14 +20,17 @@ GRACE = 0.002  # s for which `spin` handles waiting messages after its time is o
 
 
 class Newest:
-    """A slot for the newest sample of a stream; the inbox holds at most one handler of it."""
+    """A slot for the newest sample of a stream. A new sample replaces one that was not handled yet.
+
+    The inbox therefore holds at most one handler of the stream.
+    """
 
     def __init__(self, inbox: Inbox, handle: Callable[[Any], None]) -> None:
         self._inbox, self._handle, self._lock = inbox, handle, Lock()
         self._sample: Any = None
 
     def offer(self, sample: Any) -> None:
-        """Store a sample and queue the handler if it is not queued; Zenoh's thread calls this."""
+        """Store a sample, and queue its handler in the inbox if it is not queued yet; Zenoh's thread calls this."""
         with self._lock:
             waiting, self._sample = self._sample is not None, sample
         if not waiting:
@@ -46,14 +49,14 @@ class Timer:
         self.handle: Handler | None = handle
 
     def cancel(self) -> None:
-        """Cancel the call, so that it does not wake the process either; call this only from a handler."""
+        """Cancel the call of the handler; the process then does not wake up for it. Call this only from a handler."""
         self.handle = None
 
 
 class Inbox:
-    """Handlers in order of arrival, and timers.
+    """A queue of handlers, in the order of arrival, and timers; the main thread runs both.
 
-    Not a `queue.SimpleQueue`: its `get` can wait without limit if its time ends while it begins to wait (CPython 3.11).
+    A `queue.SimpleQueue` is not used, because its `get` can wait without limit if its time ends while it begins to wait (CPython 3.11).
     """
 
     def __init__(self) -> None:
@@ -97,7 +100,9 @@ class Inbox:
         return len(self._queue) + len(self._later)
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """Queue the handler as `put` does; while `crowd` handlers are waiting, drop and count it, and return False.
+        """Queue the handler as `put` does and return True.
+
+        If `crowd` handlers already wait, drop the handler, count it in `dropped` and return False.
 
         This limits the memory that a flood of messages takes.
         """
@@ -108,7 +113,7 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """Queue a handler as `offer` does, but without waking the main thread; it runs before the next handler that `put` queues."""
+        """Queue a handler as `offer` does, but without waking the main thread; it runs just before the next handler of `put`."""
         if len(self._later) >= crowd:
             self.dropped += 1
             return False
@@ -116,7 +121,10 @@ class Inbox:
         return True
 
     def at(self, when: float, handler: Handler) -> Timer:
-        """Schedule a handler at a time of the monotonic clock; call this only in the main thread or in a handler."""
+        """Schedule a handler at the time `when` [s] of the monotonic clock; return its timer, by which it can be cancelled.
+
+        Call this only in the main thread or in a handler.
+        """
         timer = Timer(handler)
         heapq.heappush(self._timers, (when, next(self._order), timer))
         if self._serves:
@@ -124,14 +132,14 @@ class Inbox:
         return timer
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
-        """Run handlers until that time of the monotonic clock, or until `enough` returns True.
+        """Run handlers until the time `until` [s] of the monotonic clock, or until `enough` returns True.
 
-        Handlers that are queued at that time still run, but for at most GRACE s, so that a flood does not block the caller.
+        Handlers that are still queued at that time run too, but for at most GRACE (2 ms), so that a flood does not block the caller.
         """
         self._spin(until, enough, self._take_waiting)
 
     def serve(self, until: float) -> None:
-        """Run handlers as `spin` does; while this thread waits, other threads may run handlers themselves (`handle`).
+        """Run handlers as `spin` does; while this thread waits, other threads may run their handlers themselves (`handle`).
 
         The thread that has received a message then also handles it, which saves two thread switches.
         """

@@ -25,10 +25,13 @@ _known = threading.local()  # lives as long as Python knows the thread
 
 
 class Listener:
-    """The streams that a process reads; all handlers run in its main thread."""
+    """Subscribes a process to streams, and handles their messages in the main thread of the process."""
 
     def __init__(self, bus: Bus, inbox: Inbox, locked: bool, direct: bool) -> None:
-        """`locked`: in lockstep.  `direct`: Zenoh's own thread puts messages into the inbox."""
+        """`locked`: in lockstep.
+
+        `direct`: Zenoh's own thread puts messages into the inbox, without a thread of Python for each subscription.
+        """
         self.bus, self.inbox, self.locked, self._direct = bus, inbox, locked, direct
         self.keeps_step = False  # set by a Participant in lockstep
         self.inject_test_delay: Callable[[], None] = lambda: None  # called before every tick, for tests of lockstep
@@ -41,9 +44,10 @@ class Listener:
         self._early: list[Callable[[], None]] = []  # handlers of past messages that came before the first clock message
 
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
-        """Handle the newest message of a stream; older ones that wait are overwritten.
+        """Call `handler` with the newest message of a stream; a message that still waits is replaced by a newer one.
 
-        `name`: the variable in the message's key, such as the part; by default any.
+        A participant in lockstep handles every message instead. `name`: the variable in the message's key, such as the part; by default
+        any.
         """
         part = part_of(cls, name)
         self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
@@ -59,16 +63,16 @@ class Listener:
         crowd: int = CROWDED,
         later: bool = False,
     ) -> None:
-        """Handle every message of a stream.
+        """Call `handler` with every message of a stream.
 
         Args:
-            cls: the message.
+            cls: type of the messages.
             handler: called in the main thread.
             name: the variable in the message's key, such as the part; by default any.
-            history: also messages from before this service joined; they are handled when the run is known.
-            any_run: also messages of another run of robot_sim.
-            crowd: number of waiting handlers at which messages of this stream are dropped.
-            later: do not wake the main thread; they are handled just before the next message of another stream.
+            history: also handle messages from before this service joined, as soon as the run is known.
+            any_run: also handle messages of another run of robot_sim.
+            crowd: number of waiting handlers at which further messages of this stream are dropped.
+            later: do not wake the main thread; the messages are handled just before the next message of another stream.
         """
         key, part = cls.stream.keys(name), part_of(cls, name)
 
@@ -105,15 +109,18 @@ class Listener:
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
-        """Handle the newest tick; at the first tick of a run, the handlers of `on_run` are called before."""
+        """Call `handler` with the newest `Clock` message; at the first one of a run, the handlers of `on_run` are called before."""
         self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:
-        """Call a handler at each tick of the clock, with the newest state of every part."""
+        """Call `handler` with the newest `Tick` message: the start of a tick, with the newest state of every part."""
         self._on_time(Tick, handler)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
-        """Handle only those ticks that wait for this service; in lockstep, instead of `on_clock`."""
+        """Call `handler` with the `Turn` messages for this service: only the ticks that wait for its answer.
+
+        For lockstep, instead of `on_clock`.
+        """
         self._on_time(Turn, handler, self.bus.who)
 
     def _note_beat(self, time: Clock | Tick | Turn) -> None:
@@ -149,7 +156,7 @@ class Listener:
         self._subscribe(cls.stream.keys(name), self._newest(handle))
 
     def on_run(self, handler: Callable[[], None]) -> None:
-        """Call the handler at the first tick of every run."""
+        """Call `handler` at the first tick of every run of robot_sim."""
         self._on_run.append(handler)
 
     def _deliver(self, cls: type[_M], sample: zenoh.Sample, handler: Callable[[_M], None], part: str | None, any_run: bool = False) -> None:
@@ -159,10 +166,10 @@ class Listener:
 
 
 def stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-    """Wrap a callback so that Python keeps its state for the calling thread of Zenoh.
+    """Return a callback that calls `offer`, and for which Python keeps its thread state in the calling thread of Zenoh.
 
-    Python allocates a state when a foreign thread calls it, and frees it when the call ends, which costs more than the callback.  A claim
-    on the state that is never released keeps it.
+    Otherwise Python allocates such a state each time a thread of Zenoh calls, and frees it when the call ends, which costs more than the
+    callback itself. The returned callback claims the state once and never releases it.
     """
 
     def call(sample: zenoh.Sample) -> None:

@@ -19,7 +19,7 @@ TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep
 
 
 class Participant:
-    """The side of a service that answers every tick, or every tick in which it has something to decide."""
+    """The side of a service in lockstep: reports that the service has answered a tick. In free mode it does nothing."""
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked
@@ -31,9 +31,11 @@ class Participant:
     def done(
         self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), implied: bool = False
     ) -> None:
-        """Report that this service has published all its messages for tick k; see StepDone for the other arguments.
+        """Report that this service has published all its messages for tick k. In free mode this does nothing.
 
-        `implied`: publish nothing, because the answer of another service will include this one.
+        `ok`: False if an input was missing, so that the run is not repeatable. `busy`: from the controller, services that have nothing to
+        decide. `last`: True if the service leaves lockstep. `including`: participants whose answers to this tick were used, so that they
+        need not answer. `implied`: publish nothing, because the answer of another service will include this one.
         """
         if not self._locked:
             return
@@ -42,18 +44,18 @@ class Participant:
             self._done.put(re_k=k, ok=ok, busy=list(busy), last=last, including=list(including))
 
     def inject_test_delay(self) -> None:
-        """Sleep for a random time if MOBEE_TEST_DELAY_MS is set, to test that delays change no result."""
+        """Sleep for a random time if the variable MOBEE_TEST_DELAY_MS is set, to test that delays change no result."""
         if self._delay:
             time.sleep(random.uniform(0.0, self._delay))  # not seeded, like a scheduler
 
 
 class Barrier:
-    """The participants that must answer a tick, and their answers.
+    """The participants that must answer a tick in lockstep, and their answers.
 
-    A tick waits only for participants that are present.  A participant is present from its first answer on.  It is absent when its
-    liveliness token has disappeared, when it was dropped because it was late, or when it has given its last answer; with another answer
-    it is present again.  The controller's answer to a tick lists participants that are busy with an action: these need not answer this
-    tick.  All others get a `Turn` message after the controller's answer, so that an agent need not read every tick.
+    A tick waits only for participants that are present. A participant is present from its first answer on. It is absent when its liveliness
+    token has disappeared, when it was dropped because it was late, or when it has given its last answer; after another answer it is present
+    again. The controller's answer to a tick lists participants that are busy with an action: these need not answer this tick. All others
+    get a `Turn` message after the controller's answer, so that an agent need not read every tick.
     """
 
     def __init__(
@@ -64,9 +66,11 @@ class Barrier:
         referee: str = "controller",
         patience: float = 2.0,
     ) -> None:
-        """`report`: called with (participant, reason) when the run is no longer repeatable; `referee`: its answers list busy participants.
+        """Subscribe to the answers.
 
-        `patience`: s of real time for one tick; a participant that has not answered by then is dropped.
+        `participants`: names of the services that are expected. `report`: called with (participant, reason) when the run is no longer
+        repeatable. `referee`: the service whose answers list busy participants. `patience`: s of real time for one tick; a participant that
+        has not answered by then is dropped.
         """
         self._service, self._report, self._referee, self._patience = service, report, referee, patience
         self._expected = set(participants)
@@ -87,14 +91,14 @@ class Barrier:
         return sorted(self._expected - self._present)
 
     def missing(self, k: int) -> list[str]:
-        """Return the names of the present participants whose answer to tick k is still to come."""
+        """Return the names of the present participants that have not answered tick k yet, and must do so."""
         waiting = {who for who in self._present if self._answered.get(who, -1) < k}
         if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
             waiting.difference_update(self._busy)
         return sorted(waiting)
 
     def wait(self, k: int) -> list[str]:
-        """Handle messages until all have answered tick k or the patience is over; drop the late participants and return their names."""
+        """Handle messages until all have answered tick k, or for `patience` s; drop the late participants and return their names."""
         if self._referee not in self._present:
             self._give_turns(())
         self._service.spin(time.monotonic() + self._patience, lambda: not self.missing(k))
@@ -117,7 +121,7 @@ class Barrier:
                 turn.put(dt=self._service.bus.dt)
 
     def note(self, who: str, re_k: int, answer: Answer) -> None:
-        """Note the answer of a participant to tick re_k, and of those whose answers it includes."""
+        """Record the answer of the participant `who` to tick re_k, and those of the participants that the answer includes."""
         for one in (who, *answer.including):
             self._answered[one] = re_k
             self._present.add(one)

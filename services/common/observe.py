@@ -20,7 +20,7 @@ from services.common.bus import other_key
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message of any type, not decoded."""
+    """A message of any type, not decoded. `at`: time at which it was received."""
 
     key: str
     encoding: str
@@ -41,11 +41,10 @@ class Received:
 
 
 def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None]) -> None:
-    """Handle every message on a key expression, on a thread of Zenoh, until the session is closed; `handle` must not wait.
+    """Call `handle` for every message on the key expression `key`, in a thread of Zenoh, until the session is closed.
 
-    Messages that come under another key than they were sent are dropped.
-
-    Raises ValueError if the key expression is not valid.
+    `handle` must not wait. A message that arrives under another key than the one under which it was sent is dropped. Raises ValueError if
+    the key expression is not valid.
     """
 
     def enqueue(sample: zenoh.Sample) -> None:
@@ -61,7 +60,7 @@ def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None])
 
 
 def alive(session: zenoh.Session) -> dict[str, list[str]]:
-    """Return the running instances of each service, from their liveliness tokens."""
+    """Return the ids of the running processes of each service, by name of the service, from their liveliness tokens."""
     found: dict[str, list[str]] = {}
     for answer in session.liveliness().get(keys.ALL_ALIVE, timeout=1.0):
         if answer.ok is not None:
@@ -71,7 +70,10 @@ def alive(session: zenoh.Session) -> dict[str, list[str]]:
 
 
 def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
-    """Return the status of services, all requested at once; services that do not answer within `timeout` s are left out."""
+    """Return the status of the services `names`, by name, all requested at once.
+
+    Services that do not answer within `timeout` [s] are left out.
+    """
     answers: dict[str, Stat | rpc.CallFailed] = {}
 
     def ask(who: str) -> None:

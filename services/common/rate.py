@@ -12,7 +12,10 @@ NOT_MEASURED = -1.0  # value of a number in the status of a service; on the bus 
 
 
 class Rate:
-    """Deadlines `period` seconds apart on the monotonic clock."""
+    """Deadlines that are `period` [s] apart, on the monotonic clock.
+
+    After a delay of more than a period, whole periods are skipped and counted in `missed`.
+    """
 
     def __init__(self, period: float) -> None:
         self.period = period
@@ -20,7 +23,7 @@ class Rate:
         self.missed = 0  # ticks that were skipped
 
     def next(self) -> float:
-        """Return the next deadline; call it once per tick, after the tick's work."""
+        """Return the next deadline, s on the monotonic clock; call this once per tick, after the work of the tick."""
         late = time.monotonic() - self.deadline
         if late > self.period:
             skipped = int(late / self.period)
@@ -32,7 +35,7 @@ class Rate:
 
 
 class Percentiles:
-    """Percentiles of the newest values of a quantity; takes the same memory however many there were."""
+    """Percentiles of the newest `keep` values of a quantity. The memory is constant."""
 
     def __init__(self, keep: int = 20_000) -> None:
         self._values, self._count = array("d", [0.0]) * keep, 0
@@ -47,5 +50,5 @@ class Percentiles:
         self._count = 0
 
     def at(self, percent: float) -> float:
-        """The percentile; NOT_MEASURED if there is no value yet."""
+        """Return the value below which `percent` % of the stored values lie; NOT_MEASURED (-1) if there is no value yet."""
         return float(np.percentile(np.frombuffer(self._values)[: self._count], percent)) if self._count else NOT_MEASURED

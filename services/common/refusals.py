@@ -56,19 +56,22 @@ _SAID = {
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Something that was refused; the same one is equal however often it happens."""
+    """A description of something that the router refused. Two refusals with the same text are equal, so that they can be counted."""
 
     text: str
 
     @classmethod
     def of_message(cls, name: str, action: str, key: str) -> Refusal:
-        """The refusal of a message."""
+        """Return the refusal of a message.
+
+        `name`: identity of the sender. `action`: what it tried, in Zenoh's words, such as "Put". `key`: the key of the message.
+        """
         return cls(f"{name} may not {_SAID.get(action, action.lower())} {key}")
 
 
 @dataclass
 class RefusalLog:
-    """Reads Zenoh's log of a router in this process."""
+    """Collects what the secured router in this process refuses, from the log of Zenoh."""
 
     _reader: int
     _rest: bytes = b""
@@ -79,7 +82,7 @@ class RefusalLog:
 
     @classmethod
     def open(cls) -> RefusalLog:
-        """Send Zenoh's log to a pipe; call it once in a process, before its first session."""
+        """Redirect the log of Zenoh to a pipe and return the object that reads it; call this once, before the process's first session."""
         import fcntl  # not on Windows
 
         reader, writer = os.pipe()
@@ -104,13 +107,13 @@ class RefusalLog:
         return log
 
     def take(self) -> Counter[Refusal]:
-        """Return what was refused since the last call, and how often."""
+        """Return what was refused since the last call, with the number of times of each."""
         with self._lock:
             found, self._found = self._found, Counter()
         return found
 
     def read(self) -> bool:
-        """Read what Zenoh has logged since the last call; return whether it is much, so that the next call should come soon."""
+        """Read what Zenoh has logged since the last call. Return True if this was much, so that the next call should come soon."""
         for chunks in range(_MOST_CHUNKS):
             try:
                 chunk = os.read(self._reader, _CHUNK)

@@ -27,7 +27,10 @@ LOCKED_TIMEOUT = 1.5  # s, in lockstep: shorter than its patience, so that the l
 
 
 class CallFailed(Exception):
-    """Raised for a call without a valid reply; `code`: that of the server, or no_answer or bad_answer."""
+    """Raised for a call without a valid reply.
+
+    `code`: that of the server's refusal, "no_answer" if no reply came in time, or "bad_answer" if the reply does not match its struct.
+    """
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -45,9 +48,17 @@ def call(
     tries: int = 1,
     **fields: object,
 ) -> _R:
-    """Call the service that answers `key` and wait for the reply; raises CallFailed.
+    """Call the service that answers `key`, wait for the reply and return it; raises CallFailed.
 
-    `tries`: how many times the call is sent while there is no answer; the id stays the same, so that it has its effect at most once.
+    Args:
+        session: session of the caller.
+        who: name of the caller.
+        key: key of the call.
+        request: type of the request.
+        reply: type of the reply.
+        timeout: time to wait for each try, s.
+        tries: how many times the call is sent while there is no answer; the id stays the same, so that it has its effect at most once.
+        fields: fields of the request.
     """
     payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
     for left in reversed(range(tries)):
@@ -61,10 +72,11 @@ def call(
 
 
 def flush(session: zenoh.Session, who: str) -> None:
-    """Wait until the router has received every message sent so far, for at most FLUSH_TIMEOUT; call it before the session is closed.
+    """Wait until the router has received every message sent so far, for at most 0.5 s (FLUSH_TIMEOUT).
 
-    Zenoh drops what it is sending when a session is closed, and a router what it has not read when it cannot write to a closed connection.
-    The question has the lowest priority, so the router answers it after all other messages; it does so even if no service has the key.
+    Call this before a session is closed. Zenoh drops messages that it is sending when a session is closed, and a router drops what it has
+    not read when it cannot write to a closed connection. The call to the router has the lowest priority, so the router answers it after all
+    other messages; it does so even if no service answers this key.
     """
     key, lowest = keys.service_rpc("router", "stat"), zenoh.Priority.BACKGROUND
     payload = encode(Empty(v=VERSION, id=uuid.uuid4().hex, who=who))
@@ -84,9 +96,10 @@ def ask(
     wanted: Callable[[_R], bool] | None = None,
     **fields: object,
 ) -> None:
-    """Call without waiting; a thread of Zenoh calls `done` once with the reply or the failure.
+    """Call the service that answers `key` without waiting; a thread of Zenoh calls `done` once with the reply, or with a CallFailed.
 
-    `wanted`: chooses among the replies if several processes may answer; if none is wanted, `done` gets the first.
+    `who`: name of the caller. `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: s. `wanted`: if
+    several processes may answer, a function that returns True for the reply to use; if it is True for none, `done` gets the first.
     """
     message = request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields)
     answers: list[zenoh.Reply] = []
@@ -147,7 +160,7 @@ _NOT_PUBLISHED = ("/rpc/stat", "/rpc/config")  # calls that the launcher and too
 
 
 class CallRefused(Exception):
-    """Raised by the handler of a request to refuse it; the caller receives code and text."""
+    """Raised by the handler of a request to refuse it; the caller receives `code` (short code of the reason) and `text`."""
 
     def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
@@ -155,7 +168,7 @@ class CallRefused(Exception):
 
 
 class Answering:
-    """Decodes requests, calls their handlers, replies, and publishes each call for the recorder."""
+    """The server's side of calls: decodes requests, calls their handlers, replies, and publishes each call for the recorder."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -163,7 +176,11 @@ class Answering:
         self._replies: OrderedDict[tuple[str, str], tuple[type[Reply], bytes]] = OrderedDict()
 
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
-        """Reply to a query on the `declared` key with the result of handler(request, key), or with the CallRefused that it raises."""
+        """Reply to a query with the result of handler(request, key), or with the refusal that the handler raises (CallRefused).
+
+        `declared`: the key, or key expression, under which the service answers. `cls`: type of the request. `part_of_key`: the key begins
+        with a part, and the part vectors of the request must have the length of that part.
+        """
         key = str(query.key_expr) if "*" in declared else declared  # answers to one call with a wildcard must differ by key
         with query:
             try:

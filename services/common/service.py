@@ -50,9 +50,10 @@ FRESH_STATS, STATS_PERIOD = 10, 0.2  # of so many answers to `stat` within so ma
 
 
 class Service(Listener):
-    """A process on the bus.  All handlers run one after the other, in the main thread, inside `spin` or `run`.
+    """A process on the bus. All handlers run one after the other, in the main thread, inside `spin` or `run`.
 
-    In lockstep, while a `prompt` service is in `run`, its handlers run in Zenoh's thread, which must not wait: they must not use `call`.
+    Exception: in lockstep, while a service that was made with `prompt` is in `run`, its handlers run in Zenoh's thread. That thread must
+    not wait, so these handlers must not use `call`.
     """
 
     def __init__(
@@ -69,11 +70,11 @@ class Service(Listener):
         Args:
             who: name of the service.
             config: its settings.
-            robot: gives the lengths of vectors in messages.
-            session: an open session instead of a new one.
-            inbox: that of another service in the same process.
-            prompt: every tick waits for this service, and no handler computes for long: Zenoh's own thread puts messages into the inbox
-                and, in lockstep, handles them.
+            robot: the robot, from which the lengths of vectors in messages are checked; None: they are not checked.
+            session: an open session to use; None: open a new one.
+            inbox: the inbox of another service in the same process, to share it; None: make a new one.
+            prompt: True for a service for which every tick waits, and whose handlers never compute for long: Zenoh's own thread puts
+                messages into the inbox and, in lockstep, handles them.
         """
         self.who, self.config, self.instance = who, config, f"i{os.getpid()}_{secrets.token_hex(3)}"
         self._signalled = False
@@ -99,7 +100,7 @@ class Service(Listener):
         return open_client(os.environ.get(LOCAL_ENDPOINT) or config.endpoint, namespace=config.namespace, lease=self._lease)
 
     def second_session(self) -> zenoh.Session:
-        """Open another session with the router, for a stream that must not wait behind the others; it is closed with the service."""
+        """Open another session with the router, for a stream that must not wait behind others; the session is closed with the service."""
         session = self._sessions.enter_context(self._open_session())
         self._sessions.callback(rpc.flush, session, self.who)
         return session
@@ -151,11 +152,15 @@ class Service(Listener):
         return type(error) is MobeeError or (isinstance(error, MobeeError) and not self._is_ready)
 
     def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
-        """Call the handler with (service, instance, up) when a process appears or disappears."""
+        """Call `handler(service, instance, up)` when the liveliness token of a process appears (up: True) or disappears (up: False)."""
         self._on_alive.append(handler)
 
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
-        """Answer calls with the result of handler(request, key), which may raise CallRefused; `part_of_key`: the key begins with a part."""
+        """Answer calls of `key` with the reply that handler(request, key) returns.
+
+        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: the key begins with a part, and the part vectors of a
+        request must have the length of that part.
+        """
 
         def enqueue(query: zenoh.Query) -> None:
             self.inbox.offer(lambda: self._answering.answer(query, key, cls, handler, part_of_key), CROWDED_WITH_CALLS)
@@ -165,7 +170,11 @@ class Service(Listener):
     def call(
         self, key: str, request: type[Request], reply: type[_R], *, timeout: float | None = None, tries: int = 1, **fields: object
     ) -> _R:
-        """Call another service, see rpc.call; raises rpc.CallFailed."""
+        """Call another service, wait for the reply and return it; raises services.common.rpc.CallFailed.
+
+        `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: time for each try, s; None: 0.5 s, in
+        lockstep 1.5 s. `tries`: how many times the call is sent while there is no answer; it has its effect at most once.
+        """
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout or self.patience, tries=tries, **fields)
 
     def ask(
@@ -179,7 +188,11 @@ class Service(Listener):
         wanted: Callable[[_R], bool] | None = None,
         **fields: object,
     ) -> None:
-        """Call without waiting; `done` is called with the answer or the failure in the main thread.  `wanted`: see rpc.ask."""
+        """Call another service without waiting; later, `done` is called in the main thread with the reply or with a CallFailed.
+
+        `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: s. `wanted`: if several processes may
+        answer, a function that returns True for the reply to use; if it is True for none, `done` gets the first.
+        """
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:
             self.inbox.put(lambda: self.bus.guarded(f"the answer to {key}", lambda: done(answer)))
@@ -187,9 +200,10 @@ class Service(Listener):
         rpc.ask(self.bus.session, self.who, key, reply, enqueue, request=request, timeout=timeout, wanted=wanted, **fields)
 
     def ready(self) -> None:
-        """Declare the liveliness token, after all subscriptions and calls are declared.
+        """Declare the liveliness token of this service; call this after all subscriptions and calls are declared.
 
-        A process of ONLY_ONE that the launcher has not started ends if another one of its name answers.
+        A robot_sim, model, controller or port_filter that no launcher has started ends (SystemExit) if another process of the same name
+        answers.
         """
         if self.who in ONLY_ONE and not self._launcher:
             self._require_no_other()
@@ -213,7 +227,7 @@ class Service(Listener):
             raise SystemExit(ENVIRONMENT)
 
     def spin(self, until: float, enough: Callable[[], bool] | None = None) -> None:
-        """Run handlers until that time of the monotonic clock, or until `enough` returns True."""
+        """Run handlers until the time `until` [s] of the monotonic clock, or until `enough` returns True."""
         self.inbox.spin(until, enough)
 
     def run(self) -> None:
@@ -229,7 +243,11 @@ class Service(Listener):
         raise SystemExit(OK)
 
     def check_router(self) -> None:
-        """End the process after ten seconds without a router or its own launcher, and after a signal whose exception was lost."""
+        """Raise SystemExit if this service has been without a router, or without its own launcher, for ORPHANED (10 s).
+
+        SystemExit is also raised after a signal whose exception was lost. `run` calls this every second; a loop that does not use `run`
+        must call it too.
+        """
         if self._signalled:
             raise SystemExit(OK)
         end_unreceived(self.config.endpoint, self._lease)  # also of a connection that has taken the place of another one
@@ -363,7 +381,7 @@ def _measured(value: float) -> int | float | None:
 
 
 def return_free_memory() -> None:
-    """Return memory that is free to the system, if the C library can: after the start 23 MB if meshes were read."""
+    """Return unused memory of this process to the system, if the C library can do so. After the start this is 23 MB if meshes were read."""
     trim = _malloc_trim()
     if trim is not None:
         trim(0)
@@ -402,7 +420,7 @@ def run_node(
         config_class: type of the settings.
         node: creates the object whose handlers the service runs.
         argv: command line without the program's name; None: that of this process.
-        prompt: see Service.
+        prompt: every tick waits for this service, and its handlers never compute for long, as in `Service`.
     """
     config = load_config(config_class, argv, module)
     with explained(module):

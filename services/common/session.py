@@ -56,7 +56,7 @@ A router with one thread would wait in vain until a full queue has room, because
 
 
 class BusUnreachable(Exception):
-    """Raised if there is no router at the endpoint; the message has the endpoint and the remedy."""
+    """Raised if there is no router at the endpoint, or if a router cannot listen there; the message has the endpoint and the remedy."""
 
 
 def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.Config:
@@ -67,28 +67,32 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 
 
 def end_unreceived(endpoint: str, lease: float) -> None:
-    """Let the system end this process's connections at an endpoint whose data is not received for `lease` seconds; only Linux can.
+    """Let the system end connections of this process at `endpoint` if the other side receives no data for `lease` [s].
 
-    Zenoh ends a silent connection after the lease, but with TLS not before the data that waits in its socket is sent: after a cut of the
-    network that is as long again as the cut.  A listener gives the limit to the connections that it accepts; a client that has connected
-    again must set it again.  On one host nothing is cut, and a process may be without a processor for longer than the lease.
+    Only Linux can do so; for an endpoint of this host nothing is changed. Zenoh ends a silent connection after the lease, but with TLS not
+    before the data in its socket is sent: after a cut of the network this takes as long again as the cut. A listener gives the limit to the
+    connections that it accepts. A client must set it again after each new connection. On one host nothing is cut, and a process may get no
+    processor for longer than the lease.
     """
     if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
         _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
 
 
 def receive_together(sockets: Iterable[int], count: int) -> None:
-    """Let the system wake this process for these connections (`sockets_at`) only when `count` bytes wait; only Linux can.
+    """Let the system wake this process for data of the connections `sockets` only when `count` bytes wait; only Linux can do so.
 
-    With 1, what waits is received at once.  The caller must do that several times in a lease: a connection counts as dead if nothing is
-    received for so long.
+    `sockets`: as `sockets_at` returns them. With `count` = 1, all waiting data is received at once. The caller must set 1 several times in
+    a lease, because a connection counts as dead if nothing is received for a whole lease.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
 
 
 def sockets_at(endpoint: str) -> list[int]:
-    """Return the descriptors of this process's TCP sockets that listen at the port of an endpoint or are connected to it."""
+    """Return the descriptors of this process's TCP sockets that listen at the port of `endpoint`, or are connected to this port.
+
+    Empty if the endpoint has no port, or the system has no folder /proc.
+    """
     port = endpoint.rpartition(":")[2]
     if not port.isdecimal() or not os.path.isdir("/proc/self/fd"):
         return []
@@ -126,26 +130,27 @@ def _ports(one: socket.socket) -> tuple[int, ...]:
 
 
 def spare_threads() -> None:
-    """Restrict Zenoh to one thread in this process; call it before the first session.
+    """Restrict Zenoh to one thread in this process; call this before the first session.
 
-    In lockstep services wait for one message after the other, and handing each from thread to thread takes a fifth of the time.
+    In lockstep the services wait for one message after another. To pass each message from thread to thread takes a fifth of the time.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 
 
 def spare_memory() -> None:
-    """Let Zenoh send and receive at most 8 kB at a time in this process; call it before the first session.
+    """Let Zenoh send and receive at most 8 kB at a time in this process; call this before the first session.
 
-    For each batch of messages that is received, Zenoh allocates and clears a buffer of the largest size, by default 64 kB.
+    For each batch of messages that it receives, Zenoh allocates and clears a buffer of the largest size, by default 64 kB.
     """
     _COMMON["transport/link/tx/batch_size"] = 8192
 
 
 @contextmanager
 def local_endpoint() -> Iterator[str]:
-    """Yield a second address of a router for processes on this machine: a Unix socket in a private folder; empty if that is not possible.
+    """Yield the address of a Unix socket in a private folder, at which a router can also listen for processes on this machine.
 
-    It is faster than TCP on the loopback interface.
+    It is faster than TCP on the loopback interface. Empty if such a socket is not possible. The folder is removed at the end of the `with`
+    block.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-") as folder:
         path = f"{folder}/bus"
@@ -155,8 +160,9 @@ def local_endpoint() -> Iterator[str]:
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
     """Open a session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: prefix of all keys, of the robot or of the filter in front of it.  `lease`: s without a message after which this process
-    counts as dead.  If the environment names an identity, the connection is secured by it; raises BadKeys if that is not possible.
+    `namespace`: prefix of all keys: that of the robot, or of the filter in front of it. `lease`: time [s] without a message after which
+    this process counts as dead. If the environment names an identity, the connection is secured with it; raises BadKeys if that is not
+    possible.
     """
     identity = Identity.of_environment()
     place = endpoint if identity is None else secured(endpoint)
@@ -187,10 +193,12 @@ def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPAC
 def open_router(
     endpoint: str, lease: float = LEASE, local_endpoint: str = "", identity: Identity | None = None, access: dict[str, object] | None = None
 ) -> zenoh.Session:
-    """Open the router, listening at `endpoint`, and at `local_endpoint` if given; raises BusUnreachable.
+    """Open a session that is the router and listens at `endpoint`; raises BusUnreachable if it cannot listen there.
 
-    `identity`, `access`: the certificate that a secured router shows, and its access list.  Silent connections are closed soon,
-    and many connections may wait, so that silent ones do not keep other processes out.
+    `lease`: time [s] without a message after which a connection counts as dead. `local_endpoint`: a second address, for processes on this
+    machine; empty: none. `identity`: that of a secured router, which listens at the socket of the identity instead of `local_endpoint`.
+    `access`: its access list, as `services.common.access.access_list` returns it. A connection that sends nothing is closed after 5 s, and
+    10 000 connections may wait, so that silent ones do not keep other processes out.
     """
     settings: dict[str, object] = {
         "mode": "router",

@@ -17,7 +17,11 @@ from services.common.listener import stay_known
 
 
 class Raw(Struct, frozen=True, gc=False):
-    """A message as it is on the bus, and in a recording; times in ns since 1970."""
+    """A message of any type as bytes, as it is on the bus and in a recording.
+
+    `encoding`: its encoding string. `received`: time at which this process received it, ns since 1970. `published`: time of publication by
+    the sender's clock, ns since 1970.
+    """
 
     key: str
     encoding: str
@@ -27,29 +31,32 @@ class Raw(Struct, frozen=True, gc=False):
 
     @property
     def type(self) -> str:
-        """The name of the message's type; "" for data that are no message of the contract, such as a recorded liveliness token."""
+        """The name of the message's type, such as State.
+
+        Empty for data that are no message of the contract, such as a recorded liveliness token.
+        """
         return type_of(self.encoding)
 
 
 class Tap:
-    """The messages of some keys.
+    """Receives the messages of some keys as bytes.
 
-    Zenoh's thread stores them without Python, so that this process, however slowly it runs, delays no sender; of more messages than may
-    wait the oldest are lost.
+    Zenoh's thread stores the messages without running Python. A slow process therefore delays no sender. If more messages wait than a queue
+    can hold, the oldest are lost.
     """
 
     def __init__(self, session: zenoh.Session, queues: Mapping[str, int], frequent: Iterable[str]) -> None:
-        """Subscribe.
+        """Subscribe to all key expressions in `queues`.
 
-        `queues`: how many messages of each key expression may wait.  `frequent`: keys with many messages that only expressions with
-        wildcards contain.  Zenoh stores the route of a key that is subscribed itself; for any other key each message is compared with all
-        subscriptions, which took a third of the receiving thread's time.
+        `queues`: number of messages that may wait, by key expression. `frequent`: keys with many messages that only match expressions with
+        wildcards in `queues`. Subscribing to such a key itself saves time: Zenoh stores its route, but compares a message with any other
+        key with all subscriptions, which took a third of the receiving thread's time.
         """
         self._streams = [(key, session.declare_subscriber(key, RingChannel(capacity))) for key, capacity in queues.items()]
         self._routes = [session.declare_subscriber(key, RingChannel(1)) for key in frequent]  # never read
 
     def drain(self) -> list[Raw]:
-        """Return the messages that have arrived since the last call, in the order of their times of publication."""
+        """Return the messages that have arrived since the last call, sorted by the time of publication."""
         arrived, now = [], time.time_ns()
         for key, stream in self._streams:
             while (sample := stream.try_recv()) is not None:
@@ -66,14 +73,14 @@ def _published(sample: zenoh.Sample, otherwise: int) -> int:
 
 
 class RawPublisher:
-    """Publishes messages as they were recorded, on any key: every one, in order."""
+    """Publishes messages unchanged, as they were recorded, on any key. All messages are sent, in order: a full queue blocks the caller."""
 
     def __init__(self, session: zenoh.Session) -> None:
         self._session = session
         self._publishers: dict[str, zenoh.Publisher] = {}
 
     def put(self, key: str, encoding: str, payload: bytes) -> None:
-        """Publish one message."""
+        """Publish the bytes `payload` on `key`, with their encoding string."""
         publisher = self._publishers.get(key)
         if publisher is None:
             publisher = self._publishers[key] = self._session.declare_publisher(
@@ -83,7 +90,10 @@ class RawPublisher:
 
 
 def receive_raw(session: zenoh.Session, key: str, handle: Callable[[Raw], None]) -> Any:
-    """Handle every message of other processes on a key expression, in the thread that has received it; returns the subscription."""
+    """Call `handle` for every message of other processes on the key expression `key`; return the subscription.
+
+    `handle` runs in the thread of Zenoh that has received the message.
+    """
 
     def read(sample: zenoh.Sample) -> None:
         now = time.time_ns()
@@ -93,9 +103,10 @@ def receive_raw(session: zenoh.Session, key: str, handle: Callable[[Raw], None])
 
 
 def answer_raw(session: zenoh.Session, key: str, answer: Callable[[str, bytes], tuple[str, bytes] | None]) -> Any:
-    """Answer calls on a key expression with an encoding and bytes, or not at all; returns the queryable.
+    """Answer calls on the key expression `key` with bytes; return Zenoh's queryable, which ends when it is deleted.
 
-    `answer`: called with the key and the request, in a thread of Zenoh.
+    `answer(key, request)`: called in a thread of Zenoh with the key and the bytes of the request; returns the encoding string and the bytes
+    of the reply, or None to send no reply.
     """
 
     def reply(query: zenoh.Query) -> None:
@@ -108,7 +119,10 @@ def answer_raw(session: zenoh.Session, key: str, answer: Callable[[str, bytes], 
 
 
 def call_raw(session: zenoh.Session, key: str, encoding: str, request: bytes, timeout: float) -> tuple[str, bytes] | None:
-    """Make a call with a request as it was recorded; return encoding and bytes of the answer, also of a refusal; None if there is none."""
+    """Call `key` with the bytes of a recorded request; return the encoding string and the bytes of the reply, or None if no reply comes.
+
+    A refusal (`Failure`) is returned like any other reply. `encoding`: encoding string of the request. `timeout`: s.
+    """
     for reply in session.get(key, payload=request, encoding=encoding, timeout=timeout):
         found = reply.ok or reply.err
         if found is not None:

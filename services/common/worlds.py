@@ -23,12 +23,13 @@ AT_TABLE = ("icub", "icub_2014", "icub_katana")  # shipped robots whose experime
 
 
 def effective_world(given: str | None, robot: str | Path) -> str:
-    """Return the name or path of the world to load, or NO_WORLD.
+    """Return the name or path of the world to load, or NO_WORLD ("none").
 
     Args:
-        given: a shipped world, a path, NO_WORLD, or nothing ("" or None).
-        robot: the shipped name or the path from which the robot is loaded. A path is a user's robot, even if the file has the
-            name icub: only the shipped names imply the table.
+        given: a shipped world, a path, or NO_WORLD; if it is empty or None, the world is the table for the shipped iCubs (AT_TABLE), and
+            NO_WORLD for every other robot.
+        robot: the shipped name or the path from which the robot is loaded. A path is a user's robot, even if the file has the name icub:
+            only the shipped names imply the table.
     """
     if given:
         return given
@@ -36,25 +37,33 @@ def effective_world(given: str | None, robot: str | Path) -> str:
 
 
 def is_path(name_or_path: object) -> bool:
-    """Return whether load_robot and load_world read a setting as the path of a file, not as a shipped name."""
+    """Return whether load_robot and load_world read `name_or_path` as the path of a file, not as a shipped name."""
     return isinstance(name_or_path, str) and (bool(Path(name_or_path).suffix) or Path(name_or_path).name != name_or_path)
 
 
 def world_around(given: str | None, robot: str | Path) -> World:
-    """Return a new world, see effective_world; raises MobeeError for a name or file that cannot be read."""
+    """Return a new world for a robot, loaded by the name or path that `effective_world` chooses; empty if that is "none".
+
+    `given`: a shipped world, a path, "none", or empty for the default of the robot. `robot`: shipped name or path of the robot. Raises
+    MobeeError for a name or file that cannot be read.
+    """
     name = effective_world(given, robot)
     return World() if name == NO_WORLD else load_world(name)
 
 
 def require_sizes(shape: Geometry) -> None:
-    """Raise InvalidValue for a shape of the bus with a wrong number of sizes."""
+    """Raise InvalidValue if a shape from a message has a wrong number of sizes: sphere 1, capsule and cylinder 2, box 3."""
     expected = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3}[shape.kind]
     if len(shape.size) != expected:
         raise InvalidValue(f"{shape.kind} of size {shape.size}: must be {expected} lengths in metres")
 
 
 def object_state(thing: WorldObject, link: str = "") -> ObjectState:
-    """Return an object as the model lists it on the bus; `link`: to which it is attached.  Raises InvalidValue for a convex volume."""
+    """Return a world object in the form in which the model lists it on the bus.
+
+    `link`: name of the link to which the object is attached; empty: none. Raises InvalidValue for a convex volume, for which the bus has no
+    message.
+    """
     if thing.kind == "convex":  # of links only: World.add takes none
         raise InvalidValue(f"{thing.name!r} is a convex volume, for which the bus has no message")
     return ObjectState(
@@ -68,7 +77,10 @@ def object_state(thing: WorldObject, link: str = "") -> ObjectState:
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return a hash of the robot's names, tree and motors; shapes are not included, since commands do not depend on them."""
+    """Return a hash of the robot's names, tree and motors, 16 characters, by which processes compare their robots.
+
+    Shapes are not included, because commands do not depend on them.
+    """
     digest = hashlib.sha256(repr((robot.name, robot.links, robot.motors)).encode())
     for joint in robot.joints:
         digest.update(repr((joint.name, joint.parent, joint.kind)).encode())

@@ -16,7 +16,10 @@ MOST_SUSPENSIONS = 5  # of one action: a part that is held again and again would
 
 @dataclass
 class Owner:
-    """The process that owns a part's goal while its liveliness token exists."""
+    """The process that owns a part's goal, as long as its liveliness token exists.
+
+    `who`: name of its service. `instance`: last chunk of its token. `epoch`: number of the ownership.
+    """
 
     who: str
     instance: str
@@ -24,7 +27,7 @@ class Owner:
 
 
 class Action:
-    """Goal ownership and action status of a part; times in s of the bus clock, ticks in k."""
+    """The owner of a part's goal, and the part's newest action with its status. Times are in s of the bus clock, ticks are numbers k."""
 
     def __init__(self, settle: Settle) -> None:
         self._settle = settle
@@ -37,25 +40,29 @@ class Action:
         self.since_k = self.start_k = 0
 
     def start(self, action_id: str, k: int, t: float, target: Array | None = None) -> None:
-        """Start an action whose goal was set at tick k, time t [s]; `target`: of an action that may be suspended."""
+        """Start an action whose goal was set at tick k, at the time t [s].
+
+        `target`: (n_part,) rad, the attractor to which the action may continue after a suspension; None: it cannot continue.
+        """
         self.id, self.start_k, self.target, self._suspensions = action_id, k, target, 0
         self.settle_again(k, t)
 
     @property
     def is_in_hold(self) -> bool:
-        """Whether the part is not under control."""
+        """Whether the part is not under control: its status is "held" or "suspended"."""
         return self.status in ("held", "suspended")
 
     @property
     def is_under_way(self) -> bool:
-        """Whether the action has not ended: the part moves, or will move again."""
+        """Whether the action has not ended: its status is "moving", or "suspended", after which the part will move again."""
         return self.status in ("moving", "suspended")
 
     def may_continue(self, t: float, gate: GateState) -> bool:
-        """Return whether the action of a part that is in hold at time t [s] may continue when the part is under control again.
+        """Return whether the action may continue when the part is under control again.
 
-        A short hold leaves the part at rest on the path to its goal.  After an emergency stop or a fault, and after a long hold, it must
-        not move to an old goal.
+        `t`: present time [s]. `gate`: state of the part's gate. A short hold leaves the part at rest on the path to its goal. After an
+        emergency stop or a fault, after a hold of more than 10 s, and at the sixth hold of the action, the part must not move to the old
+        goal.
         """
         if self.target is None or gate in ("estop", "fault"):
             return False
@@ -64,42 +71,44 @@ class Action:
         return self.status == "suspended" and t - self._suspended_at <= LONGEST_SUSPENSION
 
     def suspend(self, k: int, t: float) -> None:
-        """Let the part rest at tick k, time t [s], without ending the action."""
+        """Interrupt the action at tick k, at the time t [s], without ending it; its status is then "suspended"."""
         self._test, self._suspended_at = None, t
         self._suspensions += 1
         self._set_status("suspended", k)
 
     def settle_again(self, k: int, t: float) -> None:
-        """Continue the action at tick k with a new settle test; it ends when the part has settled again."""
+        """Begin a new settle test at tick k, at the time t [s]: the action is "moving", and ends when the part settles or times out."""
         self._test = SettleTest(self._settle, t)
         self._set_status("moving", k)
 
     def update(self, k: int, t: float, speeds: Array, accelerations: Array, continues: Callable[[], bool] = lambda: False) -> None:
-        """Test whether the motion has settled, and set the status.
+        """Run the settle test and set the status.
 
         Args:
             k: tick.
-            t: its time, s.
-            speeds: commanded speeds of the part's motors, (n_part,) rad/s; of motors that slide, in their fine units.
-            accelerations: likewise, (n_part,) rad/s^2.
-            continues: if it returns True, as for a reach that still comes nearer, a settled motion still counts as "moving".
+            t: time of the tick, s.
+            speeds: commanded speeds of the part's motors, (n_part,) rad/s; for motors that slide, 1 rad is their fine unit
+                (`mobee.robot.motor_units`).
+            accelerations: commanded accelerations, (n_part,) rad/s^2, in the same units.
+            continues: if it returns True, as for a reach that still comes nearer, the status stays "moving" although the motion has
+                settled.
         """
         if self._test is not None and self.status == "moving":
             verdict = self._test.update(t, speeds, accelerations)
             self._set_status("moving" if verdict == "settled" and continues() else verdict, k)
 
     def hold(self, k: int) -> None:
-        """End the action without an outcome, because the part is not under control."""
+        """End the action at tick k without an outcome, because the part is not under control; the status is then "held"."""
         self._test = None
         self._set_status("held", k)
 
     def resume(self, k: int) -> None:
-        """Set the status of a part that is under control again: at rest, without an action."""
+        """Set the status of a part that is under control again to "idle": at rest, without an action."""
         self.id = ""
         self._set_status("idle", k)
 
     def lose_owner(self, k: int) -> None:
-        """End the action and the ownership, because the owner has ended."""
+        """End the action and the ownership at tick k: the part has no owner then."""
         self.owner, self._test = None, None
         if self.status == "suspended":
             self.hold(k)
@@ -112,7 +121,7 @@ class Action:
 
 
 def busy_owners(actions: Iterable[Action]) -> list[str]:
-    """Return the names of the services that have nothing to decide in this tick, because all their parts are moving."""
+    """Return the sorted names of the services that have nothing to decide in this tick, because all their parts are moving."""
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:

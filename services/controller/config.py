@@ -17,20 +17,21 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The controller's settings."""
 
     gains: Literal["default", "derived", "published_2014"] = "published_2014"
-    """Name of the set of gains; the model must use the same."""
+    """Name of the set of gains of the control law; the model must use the same set."""
     modality: Literal["position", "velocity", "torque"] = "velocity"
-    """Kind of command to the motors."""
+    """Kind of command to the motors: positions, velocities or torques."""
     speed_scale: Annotated[float, Meta(gt=0, le=1)] = 1.0
-    """Share of the motors' largest speed that is used."""
+    """Share of the motors' largest speed that the controller uses."""
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Milliseconds without a command after which robot_sim holds a part."""
     terms: list[str] = []
-    """Further forces of the law, each an importable `module:name` of a Term or its function; the model needs the same setting."""
+    """User-defined forces of the law. Each is `module:name` of an importable Term, or of the function of a term. The model needs the same
+    setting."""
     posture: dict[str, list[float]] = {}
-    """Posture of a part without owner, rad, by part; a part that is not named stays where it is."""
+    """Posture of each part while it has no owner, rad, by name of the part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot can take the posture, and that the terms can be loaded; raises MobeeError."""
+        """Check the robot as every service does, that it can take the posture, and that the terms can be loaded; raises MobeeError."""
         super().check_robot(robot)
         if self.terms:
             load_terms(self.terms)

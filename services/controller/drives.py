@@ -20,10 +20,10 @@ CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was a
 
 
 class Drives:
-    """The drive epoch of each part, and whether robot_sim follows this controller's commands.
+    """Takes and arms the drives of all parts: holds the drive epoch of each part, and whether robot_sim follows this controller's commands.
 
-    No method waits for an answer: while one part is being armed, the others need their commands.  Times are of the monotonic clock, in
-    lockstep of the bus clock.
+    No method waits for an answer, because the other parts need their commands while one is being armed. Times are of the monotonic clock,
+    in lockstep of the bus clock.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -39,7 +39,7 @@ class Drives:
         self._on_attempt_end: list[Callable[[], None]] = []
 
     def on_attempt_end(self, handler: Callable[[], None]) -> None:
-        """Call the handler when an attempt to arm a part has succeeded or failed."""
+        """Call `handler` when an attempt to arm a part has succeeded or failed."""
         self._on_attempt_end.append(handler)
 
     @property
@@ -51,7 +51,7 @@ class Drives:
         return self._service.bus.t * 1e-9 if self._service.locked else time.monotonic()
 
     def is_armed(self, part: str, state: PartStatus) -> bool:
-        """Return whether the part follows this controller's commands, by its newest state, or because it was armed just now."""
+        """Return whether the part follows this controller's commands, by its newest state, or because it was armed in the last 0.1 s."""
         if self.epochs[part] == 0:
             return False
         if state.epoch == self.epochs[part] and state.gate == "armed":
@@ -60,16 +60,17 @@ class Drives:
         return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """Drop all epochs and pending answers, at the start of a new run of robot_sim."""
+        """Drop all epochs and attempts in progress; call this at the start of a new run of robot_sim."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()
         self._stop_is_latched = False
 
     def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
-        """Note emergency stops, after which nothing is armed until the gates show the reset.
+        """Read emergency stops from the bus; after a stop no part is armed until the gates show that the stop was reset.
 
-        A stop is repeated until robot_sim has latched it, and forgotten when robot_sim was reset.
+        A stop is repeated on the bus until robot_sim has latched it, and forgotten when it was reset at robot_sim. `parts`: the newest
+        status of each part.
         """
         now = time.monotonic()
         for message in self._line.take():
@@ -89,15 +90,18 @@ class Drives:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether an emergency stop is known."""
+        """Whether an emergency stop is in force, as far as this controller knows."""
         return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Whether a part in this state may be taken and armed."""
+        """Return whether a part in this state may be taken and armed: no stop is in force, and its gate is idle, in hold or armed."""
         return self._stop is None and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:
-        """Begin to take and arm a part that is idle or in hold; `is_armed` becomes true when the part is armed."""
+        """Begin to take and arm a part; `is_armed` returns True when the part is armed.
+
+        Nothing happens if the part cannot be armed (`can_arm`), if an attempt is in progress, or within 0.2 s of the last one.
+        """
         now = self._now()
         if not self.can_arm(state) or now < self._next_try[part] or part in self._attempts:
             return

@@ -25,16 +25,16 @@ MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under cont
 
 
 class ModelForces:
-    """The newest forces of the model, as the published message and as vectors."""
+    """The newest valid forces of the model: the message, and the forces as vectors."""
 
     def __init__(self, robot: Robot, needs_contacts: bool) -> None:
-        """`needs_contacts`: messages without contacts are refused, because the terms of the law may depend on them."""
+        """`needs_contacts`: True if messages without contacts must be refused, because terms of the law may depend on contacts."""
         self._robot, self._needs_contacts = robot, needs_contacts
         self.message: ForcesMessage | None = None
         self.vectors: Forces  # each term (n,) rad/s^2, of `message`
 
     def take(self, message: ForcesMessage) -> str:
-        """Replace the forces if the message is valid; return the reason why it was refused, else an empty text."""
+        """Store the forces of a message if it is valid; return the reason if it is refused, otherwise an empty text."""
         why = self._refusal(message)
         if not why:
             self.message, self.vectors = message, Forces(**{name: np.array(row) for name, row in message.terms.items()})
@@ -45,23 +45,27 @@ class ModelForces:
         self.message = None
 
     def answer(self, k: int) -> bool:
-        """Return whether the forces are of tick k or later."""
+        """Return whether the stored forces are those of tick k or of a later one."""
         return self.message is not None and self.message.re_k >= k
 
     def are_fresh(self, k: int) -> bool:
-        """Return whether the forces are of a tick near k and computed from recent states of all parts, since contacts involve several."""
+        """Return whether the stored forces may be used in tick k.
+
+        They must be of a tick at most MAX_TICKS (3) from k, and computed from states of all parts that were at most 100 ms old
+        (MAX_STATE_AGE). All parts count, because a contact can involve several.
+        """
         if self.message is None:
             return False
         ages = (self.message.part_age.get(part, MAX_STATE_AGE + 1) for part in self._robot.parts)
         return abs(k - self.message.re_k) <= MAX_TICKS and all(age <= MAX_STATE_AGE for age in ages)
 
     def touched(self, part: str) -> list[str]:
-        """Return the world objects in contact with a part."""
+        """Return the names of the world objects in contact with a part, by the stored message."""
         return self.message.touched.get(part, []) if self.message is not None else []
 
     @property
     def contacts(self) -> Sequence[ContactItem]:
-        """Return all contacts, if the model publishes them."""
+        """All contacts in the stored message; empty if the model does not publish them."""
         return self.message.contacts or () if self.message is not None else ()
 
     def _refusal(self, message: ForcesMessage) -> str:
@@ -82,7 +86,10 @@ def _unknown_link(contacts: Iterable[ContactItem], links: int) -> str:
 
 
 def load_terms(names: Sequence[str]) -> tuple[Term, ...]:
-    """Import terms given as `module:name`; a function becomes a term with its own name.  Raises InvalidValue."""
+    """Import user-defined terms, each given as `module:name`; a function becomes a term with its own name.
+
+    Raises InvalidValue for a name that cannot be imported or is no term.
+    """
     return valid_terms([_term(name) for name in names])
 
 
@@ -92,13 +99,17 @@ def _term(path: str) -> Term:
 
 
 class PublishedContacts:
-    """The contacts that the model published, in the form in which a pose takes them from outside (`Pose.compute_contacts`)."""
+    """The contacts that the model published, as a finder of contacts for `mobee.model.pose.Pose.compute_contacts`."""
 
     def __init__(self, pose: Pose, contacts: Sequence[ContactItem]) -> None:
         self._pose, self._contacts = pose, contacts
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return the contact table, and the projection of the contacts of fields, (1, n), see `Pose.projection`."""
+        """Return the contact table of one pose q (1, n) rad, and the projection of its field contacts to the motors, (1, n) m^2/rad.
+
+        The projection is the sum of J^T (depth * normal), as in `Pose.projection`. `snapshot` and `reaching` are not used: the model has
+        already applied them.
+        """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):
             numbers.append((0, KINDS.index(contact.kind), 2 * at, 2 * at + 1, contact.first_link, contact.second_link))

@@ -36,7 +36,7 @@ def _by_part(handler: Callable[[str, _Q], Reply]) -> Callable[[_Q, str], Reply]:
 
 
 class GoalServer:
-    """Serves the goals of all parts; an epoch belongs to one owner, and ends with its liveliness token."""
+    """Answers calls about the goals of all parts. An epoch belongs to one owner, and ends when the owner's liveliness token disappears."""
 
     def __init__(
         self, service: Service, robot: Robot, law: RobotLaw, actions: dict[str, Action], reaches: Reaches, commands: CommandPublisher

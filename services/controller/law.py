@@ -27,9 +27,9 @@ WARM_UP_TICK = 0.01  # s
 
 
 class RobotLaw:
-    """Holds the law's state and all its inputs: measured positions, forces of model and clients, attractors, reaches.
+    """Holds the state of the control law and all its inputs: measured positions, forces of model and clients, attractors, reaches.
 
-    The other objects of the controller change the law by these methods only.
+    The other objects of the controller change the law only by these methods.
     """
 
     def __init__(self, bus: Bus, config: Config, robot: Robot) -> None:
@@ -55,7 +55,7 @@ class RobotLaw:
     # Ticks
 
     def reset(self) -> None:
-        """Reset the law at the start of a run: at rest at home, without forces of the model."""
+        """Reset the law at the start of a run: at rest at home, and without forces of the model."""
         self.forces.forget()
         self._last_k, self._last_tick = -1, None
         self._law.reset(self._robot.home)
@@ -65,13 +65,13 @@ class RobotLaw:
         self.q, self._last_tick = q, None
 
     def count_ticks(self, k: int) -> int:
-        """Return the number of ticks since the last call in this run, at least 1."""
+        """Return the number of ticks from the tick of the last call in this run to tick k, at least 1."""
         ticks = max(k - self._last_k, 1) if self._last_k >= 0 else 1
         self._last_k = k
         return ticks
 
     def step(self, tick: Tick, ticks: int) -> Array:
-        """Advance the law over `ticks` ticks; return the reference (n,): rad, rad/s or N m by the modality."""
+        """Advance the law over `ticks` ticks; return the reference (n,): rad, rad/s or N m, by the modality in the settings."""
         for _ in range(ticks):
             self._state_before = self._law.state.copy()
             command = self._step(tick)
@@ -79,7 +79,10 @@ class RobotLaw:
         return self._reference(command)
 
     def repeat_step(self) -> Array | None:
-        """Compute the last step again, with the requests of clients since then; return the reference, None if it cannot be repeated."""
+        """Compute the last step again, with the requests that clients have made since then; return the new reference (n,).
+
+        The reference is in rad, rad/s or N m, by the modality in the settings. None: there is no step that can be repeated.
+        """
         if self._last_tick is None:
             return None
         self._law.state[:] = self._state_before
@@ -109,11 +112,14 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Set the state of a part that is not controlled: at rest at its measured position."""
+        """Set a part that is not under control to rest at its measured position."""
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:
-        """Stop a part without an owner: it brakes and stays, or moves to the posture in the settings."""
+        """Stop a part that has no owner: it brakes and stays, or moves to the posture in the settings, if there is one.
+
+        Nothing happens before the first step of a run.
+        """
         if self._last_k >= 0:
             self._law.hold(part, self.q[self._where[part]])
             self._last_tick = None
@@ -129,31 +135,37 @@ class RobotLaw:
         self._law.set_attractor(part, target)
 
     def follow(self, part: str, target: Array, velocity: Array) -> None:
-        """Set the attractor of the part to `target` (n_part,) rad, which moves with `velocity` (n_part,) rad/s."""
+        """Set the attractor of the part to `target` (n_part,) rad, which moves with `velocity` (n_part,) rad/s.
+
+        If it is not called again within 0.1 s, the attractor counts as at rest.
+        """
         self._law.follow(part, target, velocity)
 
     def motion(self, part: str) -> tuple[Array, Array, Array]:
-        """Return velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
+        """Return commanded velocity [rad/s], acceleration [rad/s^2] and attractor [rad] of the part's motors, each (n_part,)."""
         where = self._where[part]
         return self._law.velocity[where], self._law.acceleration[where], self._law.attractor[where]
 
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
-        """Return velocity and acceleration of the part's motors, (n_part,) each, in the fine unit of each motor, for the settle test."""
+        """Return commanded velocity and acceleration of the part's motors, (n_part,) each, for the settle test: in rad/s and rad/s^2.
+
+        For a motor that slides, 1 rad is its fine unit, a share of its range (`mobee.robot.motor_units`).
+        """
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
 
     # Reaches and forces of clients
 
     def reach(self, part: str, marker: str, target: ReachTarget) -> None:
-        """Pull a marker to a target by forces on the part; raises InvalidValue or UnknownName if it cannot reach."""
+        """Begin to pull a marker to a target by forces on the part; raises InvalidValue or UnknownName if the part cannot reach for it."""
         self._law.reach_toward(part, marker, target)
 
     def end_reach(self, part: str) -> None:
-        """End the force of the part's reach."""
+        """End the force of the part's reach; nothing happens if the part does not reach."""
         self._law.end_reach(part)
 
     def is_approaching(self, part: str) -> bool:
-        """Return whether the marker of the part's reach still comes nearer to its target."""
+        """Return whether the marker of the part's reach still comes nearer to its target; False without a reach."""
         return self._law.is_approaching(part)
 
     def marker_position(self, marker: str) -> Array:
@@ -166,12 +178,15 @@ class RobotLaw:
         self._apply_client_forces()
 
     def set_push(self, part: str, marker: str, push: Array) -> None:
-        """Set a client's force at a marker of a part, (3,) m/s^2 (thesis eq. 5.10); several clients may push at one marker."""
+        """Set a client's force at a marker of a part, (3,) m/s^2, root frame (thesis eq. 5.10).
+
+        The pushes of several clients at one marker are added.
+        """
         self._pushes.setdefault(part, {})[marker] = push
         self._apply_client_forces()
 
     def clear_client_forces(self, part: str) -> None:
-        """End the forces of the part's client, but not its reach; those on other parts continue."""
+        """End the joint-space force and all pushes of a part's client. The part's reach and forces on other parts continue."""
         self._client_forces[self._where[part]] = 0.0
         self._pushes.pop(part, None)
         self._apply_client_forces()
@@ -188,7 +203,10 @@ class RobotLaw:
 
 
 def warm_up(law: Controller, robot: Robot) -> None:
-    """Begin, step and end a reach of each part with each marker, and decode a request; afterwards the law is at rest at home."""
+    """Begin, step and end a reach of each part with each marker that it moves, and decode a request, so that later ones are quick.
+
+    Afterwards the law is at rest at home.
+    """
     asked = ReachFor(
         v=VERSION, id="0", who="warm", epoch=0, action_id="0", marker="none", object="none", position=[0.0] * 3, radius=1.0, aim="centre"
     )

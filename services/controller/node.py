@@ -31,10 +31,10 @@ from services.controller.reaches import Reaches
 
 
 class ControllerNode:
-    """Waits for the forces of a tick, steps the law, commands the parts that follow.
+    """Waits for the forces of a tick, steps the control law, and commands the parts that are under control.
 
-    Ownership: `RobotLaw` holds the law's state, `Action` the goal and status of one part, `Drives` the epochs at robot_sim, `Reaches`
-    the reaches in progress.  Each is changed by its own methods only.
+    Each object is changed only by its own methods: `RobotLaw` holds the law's state, `Action` the goal and status of one part, `Drives` the
+    epochs at robot_sim, `Reaches` the reaches in progress.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

@@ -12,10 +12,10 @@ from bus_schema.authority import BEHAVIOURS
 
 
 def rank_of(who: str) -> int:
-    """Return the rank of a service by its name: behaviours in the order of BEHAVIOURS, everyone else above them."""
+    """Return the rank of a service by its name: that of a behaviour is its place in BEHAVIOURS, and every other service is above them."""
     return BEHAVIOURS.index(who) if who in BEHAVIOURS else len(BEHAVIOURS)
 
 
 def may_take_from(who: str, owner: str) -> bool:
-    """Return whether a service may take the goal of a part from its owner."""
+    """Return whether the service `who` may take the goal of a part from its owner: only if its rank is higher."""
     return rank_of(who) > rank_of(owner)

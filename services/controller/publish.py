@@ -22,7 +22,7 @@ PUBLISH_PERIOD = 0.01  # s of real time between two motions of a part in free mo
 
 
 class Counters:
-    """Counts of one measurement."""
+    """The counts of one measurement, and the jitter of the steps."""
 
     def __init__(self) -> None:
         self.ticks = self.late_forces = self.held_ticks = self.long_gaps = 0
@@ -30,13 +30,13 @@ class Counters:
         self._jitter = Percentiles()  # ms, of the time between two steps
 
     def note_step(self, period: float) -> None:
-        """Record the difference between the time since the last step and `period` [s]; call it once per step."""
+        """Record by how much the time since the last step differs from `period` [s of real time]; call this once per step."""
         before, self._stepped_at = self._stepped_at, time.monotonic()
         if before > 0.0:
             self._jitter.add(abs(self._stepped_at - before - period) * 1e3)
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the counts for `stat`."""
+        """Return the counts of the measurement, and percentiles of the jitter [ms], by name, for the call `stat`."""
         return {
             "ticks": self.ticks,
             "late_forces": self.late_forces,
@@ -48,7 +48,7 @@ class Counters:
 
 
 class MotionPublisher:
-    """The motion streams of all parts."""
+    """Publishes the motion (`Motion`) of all parts."""
 
     def __init__(self, bus: Bus, robot: Robot, law: RobotLaw, actions: Mapping[str, Action]) -> None:
         self._law, self._actions = law, actions
@@ -57,7 +57,7 @@ class MotionPublisher:
         self._published: dict[str, tuple[str, Owner | None]] = {}  # action and owner in each part's last message
 
     def publish(self, tick: Tick) -> None:
-        """Publish the state of every action, except where it is redundant."""
+        """Publish the motion of every part for which a message is due: at once after a change, otherwise at regular intervals."""
         for part, action in self._actions.items():
             if self._is_redundant(part, tick):
                 continue
@@ -90,7 +90,7 @@ class MotionPublisher:
 
 
 class CommandPublisher:
-    """One message per tick to all parts that follow this controller's commands."""
+    """Publishes one message per tick with the commands to all parts that follow this controller, and in lockstep the answer to the tick."""
 
     def __init__(self, service: Service, ttl: int, law: RobotLaw, actions: Mapping[str, Action], drives: Drives) -> None:
         self._service, self._ttl, self._law, self._actions, self._drives = service, ttl, law, actions, drives
@@ -101,17 +101,21 @@ class CommandPublisher:
         drives.on_attempt_end(self._answer)
 
     def begin_tick(self) -> None:
-        """Discard the unsent messages of the last tick, at the start of a tick or a run."""
+        """Forget the orders and the answer of the last tick; call this at the start of a tick or a run."""
         self._sent = self._to_answer = None
 
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
-        """Publish tick k's orders, if there are any; reference (n,) in the unit of the modality."""
+        """Publish the commands of tick k, if there are any.
+
+        `orders`: drive epoch and kind of command, by part. `reference`: (n,) rad, rad/s or N m, by the modality in the settings. `answer`:
+        the answer to the tick in lockstep; None: not in this message.
+        """
         self._sent = k, orders
         if orders:
             self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._ttl, answer=answer)
 
     def send_again(self, part: str) -> None:
-        """In free mode, apply a request for a part before the next tick: compute and publish the last step again."""
+        """In free mode, make a request for a part act before the next tick: compute the last step again and publish its commands."""
         if self._service.locked or self._sent is None or part not in self._sent[1]:
             return
         reference = self._law.repeat_step()
@@ -119,7 +123,11 @@ class CommandPublisher:
             self.send(*self._sent, reference)
 
     def send_and_answer(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
-        """In lockstep, publish and answer the tick in one message, unless a part is being armed; tick 0 only when all parts are ready."""
+        """In lockstep, publish the commands of a tick, and answer the tick in the same message.
+
+        The answer is sent later if a part is being armed. Tick 0, which is repeated, is answered only when all parts are ready and the
+        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`, `reference`: as in `send`.
+        """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return
         forces = self._law.forces.message

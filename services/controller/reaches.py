@@ -26,7 +26,10 @@ ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 
 @dataclass
 class Reach:
-    """The last reach of a part.  `q` and the fields after it are those of the tick `end_k`, in which the force ended."""
+    """The last reach of a part.
+
+    The field `q` and those after it are of the tick `end_k`, in which the force ended or, until then, of the newest tick.
+    """
 
     action_id: str
     marker: str
@@ -50,7 +53,10 @@ class Reaches:
         self._streams = {part: bus.publisher(ReachMessage, part) for part in robot.parts}
 
     def begin(self, part: str, asked: ReachFor) -> None:
-        """Start to pull the part's marker to its target; raises InvalidValue or UnknownName if the part cannot reach for it."""
+        """Start to pull a part's marker to its target, as the request `asked` describes.
+
+        Raises InvalidValue or UnknownName if the part cannot reach for the target.
+        """
         normal = None if asked.normal is None else np.array(asked.normal)
         target = ReachTarget(np.array(asked.position), asked.radius, asked.aim, normal, asked.faces)
         others = {reach.marker for other, reach in self._last.items() if other != part and reach.phase == "reaching"} - {asked.marker}
@@ -62,7 +68,10 @@ class Reaches:
         self._publish(part)
 
     def follow_targets(self, targets: Targets) -> None:
-        """Set the targets to their new positions, and end the reaches for targets that are gone; an invalid position changes nothing."""
+        """Set the targets of all reaches to their new positions, and end the reaches whose targets are gone.
+
+        An invalid position is refused; it changes nothing.
+        """
         for part, reach in self._last.items():
             if reach.phase == "reaching" and reach.object in targets.gone:
                 self._bus.event(
@@ -80,7 +89,10 @@ class Reaches:
                 self._law.reach(part, reach.marker, reach.target)
 
     def update(self, part: str, tick: Tick) -> None:
-        """End the force when the part has settled or timed out; the part then returns and settles again, unless it is to stay."""
+        """End the force of a part's reach when the part has settled or timed out; the attractor then pulls the part back.
+
+        The reach is over when the part has settled again. With `stay` it is over at once, and the part stays where the force ended.
+        """
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):
             return
@@ -106,7 +118,7 @@ class Reaches:
             self._publish(part)
 
     def publish_regularly(self, tick: Tick) -> None:
-        """In free mode, publish all reaches again at regular intervals."""
+        """Publish all reaches again at regular intervals, for free mode, where messages may be lost."""
         period = max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt))
         for part, reach in self._last.items():
             if tick.k % (period if reach.phase in ("reaching", "returning") else ENDED_PERIODS * period) == 0:

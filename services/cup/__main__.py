@@ -13,7 +13,7 @@ from services.cup.node import CupNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the service until the cup was put down as often as asked, or until a signal or a shutdown call."""
+    """Run the service until the cup was put down as often as configured, or until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.cup")
     with explained("services.cup"):
         robot = robot_of(config)

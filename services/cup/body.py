@@ -27,11 +27,14 @@ STILL = 0.3  # s of the robot's clock in which nothing may be commanded to move
 
 
 class Bumped(Exception):
-    """Ends a motion in which the arm has bumped into something."""
+    """Raised to end a motion in which the arm has bumped into something."""
 
 
 class BusBody(BusFollower):
-    """The parts `parts` of the robot on the bus; `require_seen` is called before every step, and raises to end a motion."""
+    """The running robot as a `mobee.behaviours.pick.Body`: moves the parts `parts` along paths, by their attractors.
+
+    `gains`: those of the controller. `require_seen`: called before every step; it raises an error to end the motion.
+    """
 
     def __init__(self, service: Service, robot: Robot, parts: Sequence[str], gains: Gains, require_seen: Callable[[], None]) -> None:
         super().__init__(service, robot)
@@ -44,7 +47,12 @@ class BusBody(BusFollower):
             service.on_each(State, partial(self._note_state, part), part)
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """See Body; after a bump the robot moves back a little."""
+        """Move along a path (K, n) rad, and wait until the parts rest.
+
+        Returns whether the arm has bumped into something, and the posture at that time, or at the end. `speed`: share of the motors'
+        largest speed. `watch`: detects bumps; None: they are not detected. `forces`: the law's forces (n,) rad/s^2 at a posture, which the
+        attractors balance; None: none. After a bump the robot moves back along the path by 3 s of the motion (BACK).
+        """
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))
         if watch is not None:
@@ -67,12 +75,12 @@ class BusBody(BusFollower):
         return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float) -> None:
-        """See Body."""
+        """Set the attractors of the parts to the posture q (n,) rad at once, and wait for `seconds` of the robot's clock."""
         self._step(q)
         self._wait_until(self._now + seconds)
 
     def rest_at(self, q: Array) -> None:
-        """See Body."""
+        """Set the attractors of the parts to the posture q (n,) rad, and wait until no part is commanded to move, at most 1.5 s (CALM)."""
         self._step(q)
         self._calm()
 

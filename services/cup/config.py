@@ -19,27 +19,31 @@ LEVEL = 0.9999  # cosine of the largest slope of the top of a box
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The settings."""
+    """The settings of the service that fetches the cup."""
 
     target: str = "cup"
-    """The upright thing that it fetches, as vision names it."""
+    """Name of the upright thing to fetch, as vision names it."""
     marker: str = "right_palm"
-    """The palm that fetches."""
+    """Marker of the palm that fetches the thing."""
     gains: Literal["default"] = "default"
     """Name of the controller's set of gains."""
     times: Annotated[int, Meta(ge=1)] = 1
-    """How often it puts the thing elsewhere, before it ends."""
+    """How many times the service puts the thing down elsewhere before it ends."""
     fresh: Annotated[float, Meta(ge=0.1, le=5)] = 1.0
-    """Time without a new place of the thing after which it pauses, s of simulated time; not while the hand hides it."""
+    """Time without a new position of the thing after which the service pauses, s of simulated time. It does not pause while the hand hides
+    the thing."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has the hand, and that the thing stands on something; raises MobeeError."""
+        """Check the robot as every service does, that it has the hand, and that the thing stands on something; raises MobeeError."""
         super().check_robot(robot)
         Hand(robot, self.marker)
         self.ground()
 
     def ground(self) -> float:
-        """Return the height [m] of what the thing stands on in the world's file; raises UnknownName and InvalidValue."""
+        """Return the height [m], root frame, of the surface on which the thing stands in the world's file.
+
+        Raises UnknownName if the world has no such thing, InvalidValue if no level box is below it.
+        """
         objects = self.load_world().objects
         if self.target not in objects:
             raise UnknownName("target", self.target, [name for name, item in objects.items() if item.role == "target"])

@@ -40,11 +40,11 @@ LOOK = 8.0  # s of the robot's clock for which it looks for the cup at the end
 
 
 class Paused(MobeeError):
-    """Raised if the target is not seen any more, so that the hand must stop."""
+    """Raised if the thing to fetch is not seen any more, so that the hand must stop."""
 
 
 class CupNode:
-    """Fetches an upright thing; `run` ends when it has been put down as often as asked."""
+    """Fetches an upright thing and puts it down elsewhere, again and again, until this has succeeded as often as configured."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
@@ -62,7 +62,7 @@ class CupNode:
         self._map = pre_grasp_map(self._grasp, self._ground)
 
     def run(self) -> None:
-        """Fetch the thing until it was put down as often as asked."""
+        """Fetch the thing until it was put down as often as configured. After an error, pause for a moment and try again."""
         self._service.ready()
         while self._done < self._config.times:
             try:

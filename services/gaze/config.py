@@ -21,17 +21,17 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
     part: str = "head"
     """Part that turns the cameras."""
     cameras: tuple[str, ...] = ()
-    """Cameras to aim beside the robot's own, as for the renderer."""
+    """Further cameras to aim, beside the robot's own, as in the settings of the renderer."""
     lag: Annotated[float, Meta(ge=0, le=0.5)] = LAG
-    """Time by which the motors' velocity is later than the commanded one, in s."""
+    """Time by which the motors' velocity lags behind the commanded velocity, in s."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the part turns a camera; raises MobeeError."""
+        """Check the robot as every service does, and that the part turns a camera; raises MobeeError."""
         super().check_robot(robot)
         self.gaze(robot)
 
     def gaze(self, robot: Robot) -> Gaze:
-        """Return a gaze at rest; raises MobeeError."""
+        """Return a new gaze with these settings, at rest; raises MobeeError if the part turns no camera."""
         cameras = cameras_of(robot, self.cameras)
         require_cameras(robot, cameras, 1)
         return Gaze(robot, cameras, self.part, self.margin(robot), self.lag, Gains.named(self.gains).weight(robot.motors) > 0)

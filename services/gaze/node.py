@@ -16,7 +16,7 @@ from services.gaze.config import Config
 
 
 class GazeNode:
-    """Keeps the target in the middle of the pictures."""
+    """Runs the gaze: turns the cameras so that the target is in the middle of the pictures."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._gaze, self._errors = config.gaze(robot), Percentiles()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The services: their programs, start order and dependencies."""
+"""The catalogue of services: the program of each, the order of their start, and the services that each must wait for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ RECORDER = "recorder"
 
 @dataclass(frozen=True)
 class Entry:
-    """The fixed properties of a service, before its settings are read."""
+    """The fixed properties of a service, which do not depend on its settings.
+
+    `module`: program, run with `python -m mobee_system.run`. `config`: class of its settings, as "module:class". `stage`: place in the
+    order of the services; the last stage is stopped first. `after`: services that must be ready before it joins the system. `nice`:
+    niceness of its process. `vital`: whether the robot is stopped if the launcher gives the service up. `participates`: in lockstep,
+    whether every tick waits for its answer. `may_end`: whether it may end by itself without a failure. `real_time`: its results depend on
+    real time, so it does not run in lockstep. `needs`: Python packages that it imports, each with the extra of this project that installs
+    it. `given`: settings that follow from the name of the service.
+    """
 
     module: str  # run with `python -m mobee_system.run`
     config: str  # its configuration: module:class
@@ -88,7 +96,10 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 
 
 def entry_of(who: str, module: str | None) -> Entry | None:
-    """Return the entry of a service; None if it is unknown.  `module`: a program that replaces it, or one that is not shipped."""
+    """Return the catalogue's entry of the service `who`; None if the service is unknown and no `module` is given.
+
+    `module`: a program that replaces the shipped one, or the program of a service that is not shipped.
+    """
     entry = _ENTRIES.get(who)
     if who.startswith(AGENT):
         entry = Entry(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks before the start: installed packages, free ports, robot and world files."""
+"""Checks before the start of a scenario: installed packages, free ports, robot and world files, and settings that must agree."""
 
 from __future__ import annotations
 
@@ -28,19 +28,22 @@ _CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at
 
 
 class MissingExtra(Exception):
-    """Raised if a package that a service needs is not installed; the message holds the remedy."""
+    """Raised if a Python package that a service needs is not installed. The message names the command that installs it."""
 
 
 class PortInUse(Exception):
-    """Raised if a port on which a service should listen is in use; the message holds the remedy."""
+    """Raised if another program uses a port at which a service should listen. The message says how to choose another port."""
 
 
 class SystemRuns(Exception):
-    """Another system runs at the endpoint, or holds a port; the message describes it and holds the remedy."""
+    """Raised if another system runs at the router's endpoint, or may use one of the ports.
+
+    The message describes it and says how to end it.
+    """
 
 
 def check_extras(scenario: Scenario) -> None:
-    """Raise MissingExtra for the first service whose packages are not installed."""
+    """Raise MissingExtra for the first service that needs a Python package which is not installed."""
     for part in scenario.parts:
         for package, extra in {**part.entry.needs, **part.config.packages()}.items():
             if importlib.util.find_spec(package) is None:
@@ -55,7 +58,10 @@ def _remedy(package: str, extra: str) -> str:
 
 
 def check_endpoint(scenario: Scenario, endpoint: str) -> None:
-    """Raise SystemRuns if a system runs at the endpoint, or, at the default endpoint, one that may hold a port of this scenario."""
+    """Raise SystemRuns if a system already runs at `endpoint`, the address of the router.
+
+    If a port of this scenario is in use, the default endpoint is checked too, because the system there may use the port.
+    """
     ports = _ports(scenario)
     taken = any(not _is_free(port) for _, _, port in ports)
     for place in dict.fromkeys([endpoint, *([DEFAULT_ENDPOINT] if taken else [])]):
@@ -64,7 +70,7 @@ def check_endpoint(scenario: Scenario, endpoint: str) -> None:
 
 
 def check_ports(scenario: Scenario) -> None:
-    """Raise PortInUse for the first `..._port` setting whose loopback port is taken."""
+    """Raise PortInUse for the first port that is in use on the loopback interface, among all settings whose names end in `_port`."""
     for who, name, port in _ports(scenario):
         if _is_free(port):
             continue
@@ -81,7 +87,7 @@ def _ports(scenario: Scenario) -> list[tuple[str, str, int]]:
 
 
 def launcher_at(endpoint: str) -> Stat | None:
-    """Return the status of the launcher whose router listens at a TCP endpoint; None if none answers."""
+    """Return the status of the launcher whose router listens at a TCP endpoint; None if no launcher answers there."""
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_CONNECT_TIMEOUT).close()
@@ -126,7 +132,7 @@ def _is_free(port: int) -> bool:
 
 
 def check_gains(scenario: Scenario) -> None:
-    """Raise ConfigError if services would use different gains or terms of the law, since no later check would find this."""
+    """Raise ConfigError if two services have different values of the setting `gains` or `terms`, because all must use one control law."""
     for what in ("gains", "terms"):
         named = {part.who: str(getattr(part.config, what)) for part in scenario.parts if hasattr(part.config, what)}
         if len(set(named.values())) > 1:
@@ -137,9 +143,9 @@ def check_gains(scenario: Scenario) -> None:
 
 
 def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
-    """Raise ConfigError if the controller's gains are unstable at the robot's rate, so that it would answer no tick.
+    """Raise ConfigError if the controller's gains are unstable at the rate of robot_sim; the controller would then answer no tick.
 
-    `robots`: as check_robots returns them.
+    `robots`: the robots by name or path, as returned by `check_robots`.
     """
     from mobee.control.gains import Gains
     from mobee.control.stability import require_stable
@@ -156,7 +162,10 @@ def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 
 
 def check_lockstep(scenario: Scenario) -> None:
-    """Raise ConfigError if only some services run in lockstep, or a number of ticks is set in free mode, where it is not exact."""
+    """Raise ConfigError if only some services are set to lockstep, or if a number of ticks is set in free mode.
+
+    In free mode the number would not be exact.
+    """
     modes = {part.who: part.config.mode for part in scenario.parts}
     if len(set(modes.values())) > 1:
         listed = ", ".join(f"{who} {mode}" for who, mode in modes.items())
@@ -171,9 +180,10 @@ def check_lockstep(scenario: Scenario) -> None:
 
 
 def check_robots(scenario: Scenario) -> dict[str, Robot]:
-    """Return the robots, by the name or path in the settings of the services.
+    """Load and return the robots of all services, by the name or path in their settings.
 
-    Raises ConfigError in one line if a robot or world cannot be read, or its file has elements that would be ignored.
+    Raises ConfigError with a message of one line if a robot or world cannot be read, if its file has elements that the reader would ignore,
+    or if a service names a part or motor that its robot does not have.
     """
     from mobee.model.world_file import load_world
     from mobee.robot.load import load_robot
@@ -199,9 +209,9 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
 
 
 def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
-    """Raise ConfigError in one line for the first service that cannot serve its robot; `robots`: as check_robots returns them.
+    """Raise ConfigError, with a message of one line, for the first service whose settings do not fit its robot.
 
-    Such a service would end at its start; one that is not vital would be started again and again.
+    Without this check, such a service would fail only after the system has started. `robots`: as returned by `check_robots`.
     """
     for part in scenario.parts:
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A service as a child process: starts it, watches it, ends it."""
+"""A service as a child process of the launcher: starts it, measures how long it has been silent, and ends it."""
 
 from __future__ import annotations
 
@@ -25,44 +25,49 @@ _ONE_THREAD = {
 
 
 class Watched(Protocol):
-    """What a launcher reports of a service that runs on this host or on another one."""
+    """The state of a service that runs on this host or on another one, as the launcher reports it."""
 
     @property
     def who(self) -> str:
-        """The service's name."""
+        """The name of the service."""
 
     @property
     def host(self) -> str:
-        """The host that has started it; empty: this one, or not known."""
+        """The name of the other host that has started the service. Empty: this host has started it, or the host is not known."""
 
     @property
     def phase(self) -> Phase:
-        """The phase."""
+        """The phase of the service: waiting (for other services), starting, ready, failed (to be restarted), fault (given up), ended."""
 
     @property
     def pid(self) -> int:
-        """The process id on its host; 0 while no process runs."""
+        """The process id on the host of the service; 0 while no process runs."""
 
     @property
     def restarts(self) -> int:
-        """How often it was started again."""
+        """How many times the service was started again."""
 
     @property
     def stat(self) -> Stat | None:
-        """The last answer of the present process."""
+        """The last status (`stat` call) that the present process has answered; None before the first."""
 
     @property
     def reason(self) -> str:
-        """Why it failed last."""
+        """The reason of the last failure; empty: there was none."""
 
     @property
     def lets_others_start(self) -> bool:
-        """Whether services that come after it may start."""
+        """Whether the services that wait for this one may start."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """The command and settings of one service process."""
+    """The command of one service process, and the rules for its supervision.
+
+    `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`, `after`, `nice`, `vital`, `may_end`:
+    as in `services.launcher.catalogue.Entry`. `patience`: least time without an answer [s] after which it may count as frozen.
+    `environment`: variables that are added to the launcher's own.
+    """
 
     who: str
     argv: tuple[str, ...]
@@ -78,7 +83,13 @@ class Program:
 
 @dataclass
 class Child:
-    """A program and the process that runs it at present."""
+    """A service of this host: its program and the process that runs it at present.
+
+    Times are monotonic, in s. `phase`: as of `Watched.phase`. `since`: time of the last change of phase. `failures`: times of recent
+    failures. `again_at`: time of the next start. `has_token`: the process has its liveliness token on the bus. `asked_at`, `answered_at`:
+    times of the last `stat` call and the last answer. `asking`: a call is open. `unanswered`: calls in a row without an answer. `stat`:
+    last answer. `handled`, `advanced_at`, `starvation`: measurements while the service is silent.
+    """
 
     program: Program
     phase: Phase = "waiting"
@@ -101,7 +112,7 @@ class Child:
 
     @property
     def who(self) -> str:
-        """The service's name."""
+        """The name of the service."""
         return self.program.who
 
     @property
@@ -111,18 +122,19 @@ class Child:
 
     @property
     def lets_others_start(self) -> bool:
-        """Whether services that come after it may start: it is ready, or is not needed and has failed."""
+        """Whether the services that wait for this one may start: it is ready or has ended, or it has failed and is not vital."""
         return self.phase in ("ready", "ended") or (bool(self.failures) and not self.program.vital)
 
     def enter(self, phase: Phase) -> None:
-        """Change the phase."""
+        """Change the phase, and store the time of the change."""
         self.phase, self.since = phase, time.monotonic()
 
     def spawn(self, launcher: str) -> None:
-        """Start the process, in its own group, so that Ctrl-C in a terminal reaches the launcher only; `launcher`: the words of HELD.
+        """Start the process, which waits for `release` before it joins the system.
 
-        It stays in the same session, because with autogroup scheduling niceness counts only within one.  The service imports its
-        packages, reads its robot, and then waits for `release` before it joins the system.
+        Until then it imports its packages and reads its robot. `launcher`: value of the environment variable HELD, which names the router
+        that the process may join. The process has a process group of its own, so that Ctrl-C in a terminal reaches the launcher only. It
+        stays in the launcher's session, because with autogroup scheduling niceness counts only within a session.
         """
         with self.program.log.open("ab") as log:
             self.process = subprocess.Popen(
@@ -142,32 +154,41 @@ class Child:
         self.note_answer(0.0)
 
     def note_answer(self, when: float) -> None:
-        """Note that it answered, which ends its silence."""
+        """Record that the service answered at the monotonic time `when` [s]; this ends its silence."""
         self.answered_at, self.unanswered, self.handled, self.advanced_at, self.starvation = when, 0, None, 0.0, None
 
     def note_silence(self, now: float) -> None:
-        """Measure from now on how long it or the launcher has no processor, until it answers."""
+        """Record that the service is silent.
+
+        From the monotonic time `now` [s] until its next answer, the time in which it or the launcher waits for a processor is measured.
+        """
         self.starvation = Starvation((self.pid, os.getpid()), now)
 
     def note_pulse(self, handled: int, when: float) -> None:
-        """Note how many messages it has handled: more than at the last pulse of this silence means that it is alive."""
+        """Record how many messages the service has handled by the monotonic time `when` [s].
+
+        If the number has grown since the last pulse of this silence, the service is alive.
+        """
         if self.handled is not None and handled > self.handled:
             self.advanced_at = when
             self.note_silence(when)
         self.handled = handled
 
     def silence(self, now: float) -> float:
-        """Return the time [s] since it last answered or its inbox advanced, without the time that it or the launcher had no processor."""
+        """Return the time [s] since the service last answered or handled a message.
+
+        Time in which it or the launcher waited for a processor does not count. `now`: monotonic time [s].
+        """
         return now - max(self.answered_at, self.advanced_at) - (0.0 if self.starvation is None else self.starvation.total)
 
     def release(self) -> None:
-        """Let the service join the system."""
+        """Let the service join the system, by closing its standard input."""
         assert self.process is not None and self.process.stdin is not None
         self.process.stdin.close()
         self.enter("starting")
 
     def exit_code(self) -> int | None:
-        """Return the code with which the process ended; None while it runs."""
+        """Return the exit code of the process; None while it runs, or if there is none."""
         return None if self.process is None else self.process.poll()
 
     def running(self) -> bool:
@@ -175,12 +196,12 @@ class Child:
         return self.process is not None and self.process.poll() is None
 
     def terminate(self) -> None:
-        """Send SIGTERM to the process, if it runs."""
+        """Send SIGTERM to the process, if there is one."""
         if self.process is not None:
             self.process.terminate()
 
     def kill(self) -> None:
-        """Kill the process and its children, and wait until it has ended."""
+        """Kill the process and all processes of its group, and wait until it has ended."""
         if self.process is None:
             return
         try:
@@ -193,7 +214,7 @@ class Child:
         self.process = None  # its number may now name another process
 
     def last_log_line(self) -> str:
-        """Return the last line of the log of the process."""
+        """Return the last line of the process's log that is not empty, or a text that says why there is none."""
         try:
             with self.program.log.open("rb") as log:
                 log.seek(max(0, os.fstat(log.fileno()).st_size - 4000))

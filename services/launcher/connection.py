@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bus of a launch: the router that it opens, or a session with that of another host, which it joins."""
+"""The bus of a launch: either the router that this launcher opens, or a session with the router of another host."""
 
 from __future__ import annotations
 
@@ -31,7 +31,13 @@ JOIN_PATIENCE = 10.0  # s within which the router of another host must answer
 
 @dataclass(frozen=True)
 class Connection:
-    """How this launcher and its services reach the bus."""
+    """How this launcher and its services reach the bus.
+
+    `who`: name of this launcher on the bus. `endpoint`: address at which its services reach the router. `session`: the launcher's session.
+    `router`: session that is the router; None: the router is on another host. `local`: second address of the router, for services of this
+    host in lockstep; empty: none. `security`: keys; None: not secured. `refusals`: log of what the router refuses. `first`: agreement with
+    the first launcher, if this launcher has joined another host; None: this launcher is the first.
+    """
 
     who: str  # name of this launcher on the bus
     endpoint: str  # at which its services reach the router
@@ -46,16 +52,23 @@ class Connection:
 def open_bus(
     scenario: Scenario, here: Scenario, endpoint: str, keys: Path | None, insecure: bool, elsewhere: Sequence[str], stack: ExitStack
 ) -> Connection:
-    """Open the router and a session with it, which `stack` closes; raises ConfigError, SystemRuns, PortInUse, BusUnreachable, BadKeys.
+    """Open the router of a system, and a session with it; return both.
 
     Args:
         scenario: all services.
-        here: those that this host starts.
-        endpoint: at which the router listens.
-        keys: folder of keys; None: not secured.
-        insecure: other hosts may reach the endpoint without keys.
-        elsewhere: services that other hosts start.
-        stack: closes what was opened.
+        here: the services that this host starts.
+        endpoint: address at which the router listens.
+        keys: folder of keys; None: the system is not secured.
+        insecure: whether other hosts may reach the endpoint without keys.
+        elsewhere: names of the services that other hosts start.
+        stack: closes the router when it ends.
+
+    Raises:
+        ConfigError: other hosts can reach the endpoint, and neither `keys` nor `insecure` is given.
+        SystemRuns: a system already runs there.
+        PortInUse: a port of a service is in use.
+        BusUnreachable: the router cannot be opened or reached.
+        BadKeys: a key cannot be used.
     """
     place = endpoint if keys is None else secured(endpoint)
     security = None if keys is None else Security(keys, here, elsewhere=elsewhere)
@@ -84,9 +97,21 @@ def open_bus(
 
 
 def join_bus(scenario: Scenario, here: Scenario, endpoint: str, host: str, keys: Path | None) -> Connection:
-    """Open a session with the router of another host, if both agree; raises ConfigError, BusUnreachable, BadKeys, PortInUse, JoinRefused.
+    """Open a session with the router of another host, if the launchers of both hosts agree about the scenario.
 
-    `scenario`: all services; `here`: those that this host starts; `host`: its name; `keys`: folder of keys, None: not secured.
+    Args:
+        scenario: all services.
+        here: the services that this host starts.
+        endpoint: address of the router.
+        host: name of this host.
+        keys: folder of keys; None: the system is not secured.
+
+    Raises:
+        ConfigError: `host` is not a valid name.
+        PortInUse: a port of a service is in use.
+        BadKeys: a key cannot be used.
+        BusUnreachable: the connection fails.
+        JoinRefused: the router does not answer, or the launchers do not agree.
     """
     who, place = name_of(host), endpoint if keys is None else secured(endpoint)
     security = None if keys is None else Security(keys, here, launcher=who)
@@ -112,7 +137,7 @@ def join_bus(scenario: Scenario, here: Scenario, endpoint: str, host: str, keys:
 
 
 def default_endpoint(scenario: Scenario) -> str:
-    """Return the address at which a scenario's router listens unless another is given."""
+    """Return the address at which the scenario's router listens if the user gives no other address."""
     return str(scenario.shared.get("endpoint", DEFAULT_ENDPOINT))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One scenario on several hosts: which services start where, and what the launcher of a second host checks before it joins."""
+"""One scenario on several hosts: which host starts which services, and the checks of a second launcher before it joins the first."""
 
 from __future__ import annotations
 
@@ -32,11 +32,15 @@ _TRIES = 4  # of the first call, for a router that is at work
 
 
 class JoinRefused(Exception):
-    """Raised if a launcher cannot join the system of another host; the message holds the reason and the remedy."""
+    """Raised if a launcher cannot join the system of another host. The message gives the reason and the remedy."""
 
 
 class Agreement(Struct, frozen=True, kw_only=True):
-    """What two hosts agree on: the first one's launcher answers the call `config` with it."""
+    """What the launchers of two hosts must agree on. The first launcher returns it as the answer to the call `config`.
+
+    `version`: version of MoBeE. `instance`: instance of the first launcher, whose host runs the router. `elsewhere`: services that other
+    hosts start. `services`: settings of all services, by name, without settings that may differ between hosts, such as ports.
+    """
 
     version: str  # of MoBeE
     instance: str  # of the first launcher, which is the router
@@ -45,14 +49,20 @@ class Agreement(Struct, frozen=True, kw_only=True):
 
 
 def name_of(host: str) -> str:
-    """Return the name on the bus of a host's launcher; raises ConfigError for a name that no key can hold."""
+    """Return the name that the launcher of a host has on the bus.
+
+    Raises ConfigError if `host` contains other characters than a-z, 0-9 and _.
+    """
     if not re.fullmatch(r"[a-z0-9_]+", host):
         raise ConfigError(f"--host {host}: a name of a host consists of a-z, 0-9 and _")
     return f"{HOST_LAUNCHER}{host}"
 
 
 def check_names(option: str, names: Iterable[str], scenario: Scenario) -> None:
-    """Raise ConfigError for the first name of an option that is no service of the scenario."""
+    """Raise ConfigError for the first of the `names` that is not a service of the scenario.
+
+    `option`: the option that gave them, for the message.
+    """
     known = [part.who for part in scenario.parts]
     for name in names:
         if name not in known:
@@ -60,7 +70,10 @@ def check_names(option: str, names: Iterable[str], scenario: Scenario) -> None:
 
 
 def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
-    """Raise ConfigError if another host cannot start these services, or none would be left for this one."""
+    """Raise ConfigError if other hosts cannot start the services `elsewhere`.
+
+    A name may be unknown, no service may remain for this host, or lockstep may need the service on this host.
+    """
     check_names("--elsewhere", elsewhere, scenario)
     if all(part.who in elsewhere for part in scenario.parts):
         raise ConfigError("--elsewhere names all services: leave at least one for this host")
@@ -70,7 +83,10 @@ def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
 
 
 def agreement(scenario: Scenario, instance: str = "", elsewhere: Sequence[str] = ()) -> Agreement:
-    """Return the version and the settings of this host's scenario, which another host compares with its own."""
+    """Return the version and the settings of this host's scenario, which the launchers of two hosts compare.
+
+    `instance`: of this launcher. `elsewhere`: services that other hosts start.
+    """
     services = {part.who: _settings(part) for part in scenario.parts}
     return Agreement(version=mobee.__version__, instance=instance, elsewhere=tuple(elsewhere), services=services)
 
@@ -93,7 +109,10 @@ def _digest(path: Path) -> str:
 
 
 def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
-    """Ask the launcher at an endpoint what it starts; raises JoinRefused."""
+    """Ask the first launcher, at `endpoint`, for its agreement; `who`: name of this launcher.
+
+    Raises JoinRefused if it does not answer, or has another version.
+    """
     give_up = time.monotonic() + _PATIENCE
     while LAUNCHER not in alive(session) and time.monotonic() < give_up:
         time.sleep(0.1)
@@ -112,7 +131,11 @@ def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
 
 
 def check_agreement(first: Agreement, own: Agreement, only: Collection[str], endpoint: str) -> None:
-    """Raise JoinRefused if the first host has another version or scenario, or starts one of the services itself."""
+    """Raise JoinRefused if the agreement of the first host does not fit that of this host.
+
+    `first`, `own`: the two agreements. `only`: services that this host wants to start. The version or the settings may differ, or the first
+    host may not have one of the services, or starts it itself. `endpoint`: address of the first host, for the message.
+    """
     if first.version != own.version:
         raise JoinRefused(f"MoBeE is {own.version} here and {first.version} at {endpoint}: install the same version on both hosts")
     for who in only:
@@ -143,7 +166,10 @@ def _shown(value: Any) -> str:
 
 
 def check_free(session: Session, who: str, only: Collection[str], endpoint: str) -> None:
-    """Raise JoinRefused if a launcher of the same host's name, or one of the services, is at work already."""
+    """Raise JoinRefused if the name of this launcher (`who`) or one of the services `only` is already on the bus.
+
+    `endpoint`: address of the router, for the message.
+    """
     present = alive(session)
     for name in (who, *only):
         if name not in present:

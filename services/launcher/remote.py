@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Services that another host runs: whether they are there and answer.  No process is started or killed here."""
+"""Observes services that another host runs: whether they are present and answer. It starts and kills no process."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ SERVICES = "services"  # word in the status of the launcher of another host: the
 
 @dataclass
 class Remote:
-    """The state of a service that another host runs, as this launcher sees it by liveliness tokens and `stat` calls."""
+    """State of a service that another host runs, as this launcher observes it by liveliness tokens and `stat` calls.
+
+    Times are monotonic, in s. `who`: name. `phase`: as of `services.launcher.child.Watched`. `since`: time of the last change of phase.
+    `absent_since`: time at which it was last ready; None: it is ready now, or never was. `instance`: of the present process; empty: none.
+    `known`: instance of the last process. `asked_at`, `answered_at`: times of the last `stat` call and the last answer. `unanswered`: calls
+    in a row without an answer. `reason`: of the last failure.
+    """
 
     who: str
     vital: bool = True
@@ -44,16 +50,16 @@ class Remote:
 
     @property
     def pid(self) -> int:
-        """The process id on its host; 0 if it is not known."""
+        """The process id on the other host; 0 if it is not known."""
         return 0 if self.stat is None else self.stat.pid
 
     @property
     def lets_others_start(self) -> bool:
-        """Whether services that come after it may start: it is ready, or is not needed and was there before."""
+        """Whether the services that wait for this one may start: it is ready, or it is not vital and was present before."""
         return self.phase == "ready" or (bool(self.known) and not self.vital)
 
     def enter(self, phase: Phase) -> None:
-        """Change the phase."""
+        """Change the phase, and store the time of the change."""
         now = time.monotonic()
         if phase == "ready":
             self.absent_since = None
@@ -63,7 +69,10 @@ class Remote:
 
 
 class Remotes:
-    """Watches the services of other hosts, by their liveliness tokens and their answers; all work is done by handlers of `service`."""
+    """Observes all services of other hosts by their liveliness tokens and their answers.
+
+    All its work is done in the main thread, by handlers of the launcher's `service`.
+    """
 
     def __init__(
         self,
@@ -72,13 +81,14 @@ class Remotes:
         announce: Callable[[str], None] = lambda text: None,
         give_up: Callable[[Remote], None] | None = None,
     ) -> None:
-        """Watch from `begin` on.
+        """Prepare to observe the services; `begin` starts the checks.
 
         Args:
             service: the launcher.
-            vital: names of the services, and whether the robot depends on each.
+            vital: for each service of other hosts, by name, whether the robot depends on it.
             announce: called with each line that a user should see.
-            give_up: called when a service that was ready is absent for ABSENT_TIME; None: the first launcher judges them.
+            give_up: called when a service that was ready has been absent for ABSENT_TIME (60 s); None: the launcher of the first host
+                decides.
         """
         self.services = {who: Remote(who, is_vital) for who, is_vital in vital.items()}
         self._service, self._announce, self._give_up = service, announce, give_up
@@ -86,17 +96,17 @@ class Remotes:
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
-        """Start the checks."""
+        """Start the regular checks."""
         self._check_all()
 
     def end_hosts(self) -> None:
-        """Ask the launchers of other hosts to end, and wait for them."""
+        """Ask the launchers of all other hosts to end, and wait until they have left, for at most 8 s."""
         for launcher in self._launchers:
             self._service.ask(keys.service_rpc(launcher, "shutdown"), Done, lambda answer: None, timeout=STAT_TIMEOUT)
         self._service.spin(time.monotonic() + LEAVE_TIMEOUT, lambda: not self._launchers)
 
     def ask(self, remote: Remote) -> None:
-        """Request the status of a service."""
+        """Request the status of a service by a `stat` call; the answer is handled later."""
         instance, remote.asking, remote.asked_at = remote.instance, True, time.monotonic()
 
         def note(answer: Stat | CallFailed) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a scenario: router, services, supervision, stop, summary."""
+"""Runs a scenario: opens the router, starts and supervises the services, stops them, and prints a summary."""
 
 from __future__ import annotations
 
@@ -65,7 +65,16 @@ _START_NOTICE = 5.0  # s after all are ready: a run in lockstep that is still at
 
 @dataclass(frozen=True)
 class Options:
-    """Options of `mobee launch`."""
+    """The options of `mobee launch`.
+
+    `scenario`: shipped name or path. `settings`: changes of settings, each "table.field=value". `headless`: without the monitor. `page`:
+    with the monitor, even if the scenario has none. `record`: with the recorder, if the scenario has a robot. `cameras`: cameras on links,
+    as in `mobee.robot.cameras`. `duration`: s of real time after all services are ready; None: until the user stops it. `ticks`: in
+    lockstep, number of ticks; None: no limit. `json`: print the summary as JSON. `endpoint`: address of the router; None: that of the
+    scenario. `runs`: parent of the run's folder. `keys`: folder of keys; None: not secured. `insecure`: allow an address that other hosts
+    reach, without keys. `elsewhere`: services that other hosts start. `join`: address of the first host; None: this host is the first.
+    `only`: services that this host starts when it joins. `host`: name of this host when it joins.
+    """
 
     scenario: str = "default"
     settings: tuple[str, ...] = ()  # table.field=value
@@ -87,9 +96,10 @@ class Options:
 
 
 def launch(options: Options) -> int:
-    """Run a scenario to its end; returns the exit code: 0 ok, 1 a service was given up, 2 bad input, 3 environment, 130 early Ctrl-C.
+    """Run a scenario to its end and return the exit code.
 
-    If the system that it has joined was started again, it joins the new one.
+    0: ended normally; 1: a service was given up; 2: the input is not valid; 3: a fault of the environment; 130: ended early by Ctrl-C. If
+    this launcher has joined the system of another host, and that system is started again, it joins the new one.
     """
     while True:
         with contextlib.ExitStack() as open_meanwhile:
@@ -100,7 +110,10 @@ def launch(options: Options) -> int:
 
 
 def refused_now(options: Options) -> int:
-    """Print why the scenario cannot be started beside what runs now, and return the exit code; 0 if it can."""
+    """Check whether a scenario can be started beside the systems that run now.
+
+    If not, print the reason and return the exit code; else return 0.
+    """
     try:
         scenario = _read(options)
         endpoint = options.endpoint or default_endpoint(scenario)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The folder of a run: scenario, settings, versions, logs, results; and settings written as TOML."""
+"""Creates the folder of a run with its scenario, settings, versions and logs, and writes settings as TOML."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ _PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco-c
 
 
 def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:
-    """Make `runs/<time>-<name>/` with scenario.toml, versions.toml, <who>.toml and logs/; raises OSError."""
+    """Create the folder `runs/<time>-<name>/` of a run, and return its path.
+
+    It contains scenario.toml, versions.toml, the settings of each service (<who>.toml), and the folder logs/. `endpoint`: address of the
+    router, written into the settings. Raises OSError if it cannot be written.
+    """
     directory = _new_folder(runs, f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario.name}")
     (directory / "logs").mkdir()
     configs = {part.who: _complete(part.config, part.given, endpoint, directory) for part in scenario.parts}
@@ -69,7 +73,10 @@ def _versions() -> Mapping[str, object]:
 
 
 def to_toml(tables: Mapping[str, Any], prefix: str = "") -> str:
-    """Return tables as TOML text, which `tomllib` reads as the same tables; values of None are left out."""
+    """Return nested tables as TOML text, from which `tomllib` reads the same tables.
+
+    Values of None are left out. `prefix`: name of the table that contains them.
+    """
     plain = {key: value for key, value in tables.items() if value is not None and not isinstance(value, Mapping)}
     nested = {key: value for key, value in tables.items() if isinstance(value, Mapping)}
     lines = [f"{_key(key)} = {_value(value)}\n" for key, value in plain.items()]

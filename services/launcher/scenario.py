@@ -31,7 +31,11 @@ class _File(Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Part:
-    """A service of the scenario, with all its settings."""
+    """A service of a scenario, with all its settings.
+
+    `who`: name. `entry`: fixed properties of the service. `config`: its settings. `given`: names of the settings that the scenario sets;
+    all others have their default values.
+    """
 
     who: str
     entry: Entry
@@ -41,7 +45,11 @@ class Part:
 
 @dataclass(frozen=True)
 class Scenario:
-    """The services to launch, in the order of their start."""
+    """The services to launch, in the order in which they are listed and started.
+
+    `name`: name of the file. `title`: text for the user. `shared`: settings for all services that have a field of that name. `parts`: the
+    services. `where`: returns the place of a field, such as "shared.robot", in the file, for messages.
+    """
 
     name: str
     title: str
@@ -51,15 +59,18 @@ class Scenario:
 
     @property
     def is_locked(self) -> bool:
-        """Whether it runs in lockstep."""
+        """Whether the scenario runs in lockstep."""
         return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
 
     def only(self, names: Collection[str]) -> Scenario:
-        """Return the scenario with these services alone."""
+        """Return a copy of the scenario with only the services in `names`."""
         return replace(self, parts=tuple(part for part in self.parts if part.who in names))
 
     def as_tables(self, configs: Mapping[str, ServiceConfig]) -> dict[str, Any]:
-        """Return the scenario as tables of a TOML file, with every setting of every service."""
+        """Return the scenario as tables of a TOML file, with every setting of every service.
+
+        `configs`: settings by the name of the service.
+        """
         services = {}
         for part in self.parts:
             module = {} if part.entry == entry_of(part.who, None) else {"module": part.entry.module}
@@ -68,7 +79,7 @@ class Scenario:
 
 
 def shipped() -> dict[str, Path]:
-    """Return the files of the scenarios that come with the package, by name."""
+    """Return the files of the shipped scenarios, by name."""
     return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
 
 
@@ -79,12 +90,17 @@ def read_scenario(
     with_also: Sequence[str] = (),
     record: bool = False,
 ) -> Scenario:
-    """Read the scenario with a shipped name or at a path; each of `settings`, "table.field=value", replaces a value of the file.
+    """Read a scenario, shipped or from a file, and return it.
 
-    `leave_out`, `with_also`: services that are not started, and that are started if the file does not name them too.  `record`: the
-    recorder too, if there is a robot.
+    Args:
+        name_or_path: name of a shipped scenario, or path of a .toml file.
+        settings: changes, each "table.field=value", which replace values of the file.
+        leave_out: services that are not started.
+        with_also: services that are started even if the file does not name them.
+        record: whether to add the recorder, if the scenario has the shipped robot_sim.
 
-    Raises ConfigError with one line: the place, the field, and the nearest valid name.
+    Raises:
+        ConfigError: with a message of one line: the place, the field, and the nearest valid name.
     """
     path = _find(name_or_path)
     try:

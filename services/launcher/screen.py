@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the state of the system: one screen in a terminal, lines in a pipe."""
+"""Shows the state of the system: as a screen in a terminal, or as lines if the output is not a terminal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _COLOURS = {"ready": "32", "fault": "1;31", "failed": "33", "starting": "36"}
 
 
 class Screen:
-    """Writes to standard error; standard output is for the summary."""
+    """Writes the state of the system to standard error; standard output is kept for the summary. `title`: name of the system."""
 
     def __init__(self, title: str) -> None:
         self._title, self._started, self._height = title, time.monotonic(), 0
@@ -27,14 +27,18 @@ class Screen:
         self._terminal = sys.stderr.isatty()
 
     def add(self, text: str) -> None:
-        """Add a line; in a pipe, print it."""
+        """Add a line with the present time to the screen. If the output is not a terminal, print it."""
         line = f"{time.strftime('%H:%M:%S')} {printable(text)}"
         self._lines = [*self._lines, line][-_LOG_LINES:]
         if not self._terminal:
             print(line, file=sys.stderr, flush=True)
 
     def draw(self, children: Collection[Watched], directory: Path, *, last: bool = False) -> None:
-        """Draw the screen over the last one; in a pipe, nothing."""
+        """Draw the screen over the previous one.
+
+        `children`: services. `directory`: folder of the run. `last`: no further drawing follows. If the output is not a terminal, nothing
+        is drawn.
+        """
         if not self._terminal:
             return
         columns, rows = shutil.get_terminal_size()

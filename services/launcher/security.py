@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Security of a launched system: keys that are checked before the start, the access list of the router, and reports of what it refuses."""
+"""Security of a launched system: checks the keys before the start, makes the access list of the router, and reports what it refuses."""
 
 from __future__ import annotations
 
@@ -22,12 +22,17 @@ _AT_ONCE = 4  # reports of one check: who tries a new key each time must not fil
 
 
 class Security:
-    """The keys of one launch."""
+    """The keys of one launch.
+
+    `folder`: folder of the keys. `router`: identity of the router. `access`: access list of the router, which says who may use which keys
+    of the bus. `expiring`: texts about identities that expire soon.
+    """
 
     def __init__(self, folder: Path, here: Scenario, *, launcher: str = LAUNCHER, elsewhere: Sequence[str] = ()) -> None:
-        """Check the keys of this host; raises BadKeys, with a remedy, for the first that cannot be used.
+        """Check the keys of this host. Raises BadKeys, with a remedy, for the first one that cannot be used.
 
-        `here`: its services; `launcher`: name of its launcher; `elsewhere`: services of other hosts, whose certificates alone are needed.
+        `folder`: folder of the keys. `here`: services of this host. `launcher`: name of its launcher. `elsewhere`: services of other hosts;
+        only their certificates are needed here.
         """
         from services.common.certificates import SOON, KeyFolder  # 0.1 s, which a launch without keys does not wait for
 
@@ -42,12 +47,12 @@ class Security:
         self.expiring = [f"{one.name} on {one.until:%Y-%m-%d}" for one in issued if one.days_left() < SOON]
 
     def identity(self, who: str) -> Identity:
-        """Return the identity of a service."""
+        """Return the identity (private key and certificate) of the service `who`."""
         return Identity(self.folder, who)
 
 
 class Refusals:
-    """Reports what the router refuses as events, each once in ten seconds however often it happens."""
+    """Reports everything that the router refuses as events. The same refusal is reported at most once in 10 s, with its count."""
 
     def __init__(self, service: Service, log: RefusalLog) -> None:
         self._service, self._log = service, log

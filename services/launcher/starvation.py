@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures how long processes wait for a processor: the launcher must not take a busy machine for a frozen service."""
+"""Measures how long processes wait for a processor, so that the launcher does not take a service on a busy machine for a frozen one."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class _Thread:
 
 
 class Starvation:
-    """Measures how long one of several processes has been without a processor, by the scheduler's numbers of their threads.
+    """Measures how long at least one of several processes has been without a processor, from the Linux scheduler's counts.
 
-    `total`: s since the start; a call passes through several threads, which may all wait for a processor one after the other, so that
-    their waits are added up, to a period at most.  0 where Linux does not report it.
+    `total`: this time [s] since the start of the measurement; 0 where Linux does not report it. A call passes through several threads,
+    which may wait one after the other; therefore the waits of all threads are added up, but count at most as the time that has passed.
     """
 
     def __init__(self, pids: tuple[int, ...], now: float) -> None:
@@ -35,7 +35,7 @@ class Starvation:
         self._threads = {thread: _Thread(ran, waited, None) for thread, ran, waited, _ in _threads(pids)}
 
     def update(self, now: float) -> None:
-        """Continue the measurement, at most once in PERIOD."""
+        """Continue the measurement up to the monotonic time `now` [s]. Nothing is done within 0.2 s of the last update."""
         if now < self._at + PERIOD:
             return
         found: dict[int, _Thread] = {}

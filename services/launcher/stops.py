@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps an emergency stop that robot_sim has not confirmed: on disk, and repeated on the bus."""
+"""Keeps an emergency stop that robot_sim has not confirmed yet: writes it to disk, and repeats it on the bus."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ JUST_CONFIRMED = 0.2  # s after a stop that robot_sim has published, which it re
 
 
 class EmergencyStops:
-    """The launcher's part in an emergency stop: robot_sim may be dead, frozen or starting when one comes.
+    """The launcher's part in an emergency stop. It is needed because robot_sim may be dead, frozen or starting when a stop is sent.
 
-    It writes the record that a new robot_sim reads at its start, and repeats the stop until robot_sim publishes it itself.  It never
-    releases a stop.
+    It writes the record that a new robot_sim reads at its start, and repeats the stop on the bus until robot_sim itself publishes it. It
+    never releases a stop.
     """
 
     def __init__(self, service: Service, record: StopRecord | None, announce: Callable[[str], None]) -> None:
-        """`record`: of the stop, None if robot_sim runs on another host; `announce`: called with each line that a user should see."""
+        """Begin to watch for stops.
+
+        `record`: record of stops on disk; None: robot_sim runs on another host. `announce`: called with each line that a user should see.
+        """
         self._service, self._record, self._announce = service, record, announce
         self._publisher = service.bus.publisher(EStop)
         self._waiting: Stop | None = None  # for robot_sim's confirmation
@@ -34,11 +37,11 @@ class EmergencyStops:
 
     @property
     def waiting(self) -> str:
-        """The stop that robot_sim has not confirmed; empty if there is none."""
+        """The emergency stop that robot_sim has not confirmed yet, as text; empty if there is none."""
         return "" if self._waiting is None else str(self._waiting)
 
     def stop(self, reason: str) -> None:
-        """Stop the robot."""
+        """Stop the robot: record an emergency stop with this reason, and send it until robot_sim confirms it."""
         self._keep(Stop(BY_LAUNCHER, reason[:2000], time.time()))
         self._repeat()
 

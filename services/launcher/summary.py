@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Summarises a run: the numbers of its services since all were ready, as JSON and as text."""
+"""Summarises a run: the numbers of its services since all of them were ready, as JSON and as text."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from services.launcher.child import Watched
 
 
 def summarise(children: Iterable[Watched]) -> dict[str, Any]:
-    """Return the numbers of a run; None for a number that was not measured.
+    """Return the numbers of a run by name, as JSON data; None for a number that was not measured.
 
-    Lengths in m, times in s; ages in ticks; counters since every service was ready, or since the service's last restart.
+    Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}
     sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))
@@ -70,7 +70,10 @@ def _agent(numbers: _Numbers) -> dict[str, Any]:
 
 
 def as_text(summary: dict[str, Any]) -> str:
-    """Return the summary as a small table in text."""
+    """Return the summary of a run as a small table in text.
+
+    `summary`: the result of `summarise` and the entries that the launcher adds, such as "scenario" and "run".
+    """
     ready = summary["seconds_to_ready"]
     course = "never ready" if ready is None else f"ready after {ready:.1f} s, then ran for {summary['duration_s']:.1f} s"
     lines = [

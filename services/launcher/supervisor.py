@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts services in order, restarts failed ones, and gives up those that fail repeatedly."""
+"""Starts the services in order, restarts those that fail, and gives up those that fail repeatedly."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 
 
 class Supervisor:
-    """Starts and supervises the launcher's child processes; all work is done by handlers in the inbox of `service`."""
+    """Starts and supervises the child processes of the launcher. All its work is done in the main thread, by handlers of `service`.
+
+    `children`: the services of this host, by name. `faults`: one line for each service that was given up. `stopped_robot`: a vital service
+    was given up. `bad_settings`: a service was given up because it cannot use its settings.
+    """
 
     def __init__(
         self,
@@ -41,16 +45,17 @@ class Supervisor:
         elsewhere: Mapping[str, Watched] | None = None,
         is_reachable: Callable[[], bool] = lambda: True,
     ) -> None:
-        """Start nothing before `begin`.
+        """Prepare the processes; `begin` starts them.
 
         Args:
             service: the launcher.
-            programs: of the services that it starts.
+            programs: programs of the services that this host starts.
             stops: stops the robot when a vital service is given up.
             announce: called with each line that a user should see.
-            held: the words of HELD for its processes; empty: the launcher's own instance.
-            elsewhere: services that other hosts start, for which some of these wait.
-            is_reachable: returns whether the router can be reached, without which no service can start or answer.
+            held: value of the environment variable HELD of the processes, which names the router that they may join; empty: that of this
+                launcher.
+            elsewhere: services that other hosts start, by name; some services here wait for them.
+            is_reachable: returns whether the router can be reached; without it no service can start or answer.
         """
         self.children = {program.who: Child(program) for program in programs}
         self.faults: list[str] = []  # one line for each service that was given up
@@ -62,7 +67,7 @@ class Supervisor:
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
-        """Start all processes; those without dependencies connect at once, the others when their dependencies are ready."""
+        """Start all processes. A service without dependencies joins the system at once, the others when their dependencies are ready."""
         for child in self.children.values():
             self._spawn(child)
         self._check_all()
@@ -81,12 +86,12 @@ class Supervisor:
         return all(child.phase in ("ready", "ended", "fault") for child in self.children.values())
 
     def has_arrived(self) -> bool:
-        """Return whether robot_sim has reached its last tick."""
+        """Return whether robot_sim has reached its last tick, if a number of ticks is set."""
         sim = self.children.get("robot_sim")
         return sim is not None and sim.stat is not None and (sim.stat.numbers.get("arrived") or 0) > 0
 
     def stop(self) -> None:
-        """End all services, the last started first."""
+        """End all services stage by stage, the last stage first. A service that does not end within 2 s is killed."""
         self._stopping = True
         for stage in sorted({child.program.stage for child in self.children.values()}, reverse=True):
             group = [child for child in self.children.values() if child.program.stage == stage]
@@ -103,7 +108,7 @@ class Supervisor:
         self._service.spin(time.monotonic() + END_TIMEOUT, lambda: not any(child.running() for child in group))
 
     def kill_all(self) -> None:
-        """Kill all processes."""
+        """Kill all processes at once."""
         self._stopping = True
         for child in self.children.values():
             child.kill()
@@ -155,7 +160,7 @@ class Supervisor:
         return child.unanswered >= MAX_UNANSWERED and now - child.answered_at >= limit and child.silence(now) >= limit
 
     def ask(self, child: Child) -> None:
-        """Request the status of a service."""
+        """Request the status of a service by a `stat` call; the answer is handled later."""
         pid, child.asking, child.asked_at = child.pid, True, time.monotonic()
 
         def note(answer: Stat | CallFailed) -> None:
@@ -237,7 +242,10 @@ class Supervisor:
         self.report_fault(f"{child.who} {reason}", child.program.vital, f" (its log: {child.program.log})")
 
     def report_fault(self, fault: str, vital: bool, more: str = "") -> None:
-        """Report that a service was given up, and stop the robot if it is vital; `more`: for the user, after the fault."""
+        """Report that a service was given up, and stop the robot if the service is vital.
+
+        `fault`: service and reason. `more`: text that is added for the user only.
+        """
         self.faults.append(fault)
         self._service.bus.event("error", "fault", fault)
         self._announce(f"FAULT: {fault}{more}")

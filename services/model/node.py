@@ -32,7 +32,7 @@ from services.model.world import WorldServer
 
 
 class ModelNode:
-    """Assembles q from the parts, evaluates the model, publishes forces, poses and contacts."""
+    """Evaluates the model once per tick, and publishes constraint forces, targets, poses and contacts."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot

@@ -31,10 +31,13 @@ MOST_MARGIN = 0.06  # m: an object whose place is less certain is no use as a ta
 
 
 class WorldServer:
-    """Answers calls that edit the world of a model, and adds objects that vision perceives."""
+    """Edits the world of a model: by calls of clients, and by the objects that vision perceives."""
 
     def __init__(self, service: Service, model: Model, sigmas: float, ghosts: Collection[str] = ()) -> None:
-        """`sigmas`: standard deviations of a perceived object's position by which its shape is enlarged; `ghosts`: see the settings."""
+        """`sigmas`: number of standard deviations of a perceived object's position by which its shape is enlarged.
+
+        `ghosts`: names of perceived objects that get the role ghost instead of the role that vision sends.
+        """
         self._service, self._model, self._sigmas, self._ghosts = service, model, sigmas, frozenset(ghosts)
         self.latency = Percentiles()  # ms from the picture that shows an object to its place in the world
         self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
@@ -55,17 +58,17 @@ class WorldServer:
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
 
     def expire(self, t: int) -> None:
-        """Remove perceived objects that were not seen again in time; t in ns of the bus clock."""
+        """Remove the perceived objects whose time of validity is over; `t`: present time, ns of the bus clock."""
         for name in [name for name, until in self._expiry.items() if until < t]:
             self._expire(name, "it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
-        """Return the positions [m], root frame, of the named objects; names that are not in the world are left out."""
+        """Return the positions [m], root frame, of the named objects, by name; names that are not in the world are left out."""
         known = self._model.world.objects
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 
     def forget(self) -> None:
-        """Remove the perceived objects of the last run, at the start of a new one."""
+        """Remove the objects that vision perceived in the last run; call this at the start of a new one."""
         for name in list(self._expiry):
             self._remove(self._model.world, name)
         self._captured.clear()

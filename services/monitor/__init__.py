@@ -3,6 +3,6 @@
 
 Reads: clock, {part}/state, {part}/motion, {part}/reach, model/forces, controller/forces, model/contacts, world/*,
 vision/image/{camera}, agents/*/{decision,transition,learned}, event/*, estop, alive/*/*; asks model/rpc/world/list.
-Writes: event/monitor.  On request of a user of the page: estop, also into its record on disk, and calls of robot_sim, controller, model
-and agents (controls.py).
+Writes: event/monitor. If a user of the page requests it, the monitor sends an emergency stop (estop, and the record of stops on disk), and
+calls robot_sim, controller, model and agents (controls.py).
 """

@@ -16,14 +16,15 @@ class Config(CameraConfig, frozen=True, kw_only=True):
     """The monitor's settings."""
 
     serve: bool = True
-    """Whether a page is served; a recording is made in any case when there is a run_dir."""
+    """Whether to serve a page. A recording is written whenever `run_dir` is set, with or without a page."""
     bind: Literal["127.0.0.1", "0.0.0.0"] = "127.0.0.1"
-    """Address the page is served at; every interface only inside a container whose ports are published on loopback."""
+    """Address at which the page is served. Use 0.0.0.0 (all network interfaces) only in a container whose ports are published on
+    loopback."""
     web_port: Port = 9090
-    """Port of the page."""
+    """TCP port of the page."""
     run_dir: str = ""
-    """Folder for recording.rrd and story.jsonl; empty: no recording."""
+    """Folder in which recording.rrd (3D view) and story.jsonl (values of the page) are written. Empty: nothing is recorded."""
     rate: Annotated[float, Meta(ge=1, le=20)] = 20.0
-    """Updates of the robot a second."""
+    """Number of updates of the robot in the 3D view per second."""
     image_rate: Annotated[float, Meta(gt=0, le=10)] = 2.0
-    """Pictures of each camera shown a second."""
+    """Number of pictures per second that are shown of each camera."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Executes the commands of the page by calls on the bus; one page at a time holds the controls."""
+"""Executes the commands of the page by calls on the bus. At any time at most one page holds the controls."""
 
 from __future__ import annotations
 
@@ -59,7 +59,11 @@ FARTHEST = 3.0  # m: a place farther from the origin is a mistake
 
 @dataclass
 class Known:
-    """The newest messages that the calls depend on; the main thread writes them, other threads read them."""
+    """The newest messages that the commands of the page depend on. The main thread writes them; other threads read them.
+
+    `gates`: state of robot_sim's safety gate, by part. `stopped`: monotonic time [s] at which all parts last reported an emergency stop.
+    `motions`, `reaches`: the newest message, by part. `objects`: objects of the model's world, by name.
+    """
 
     gates: dict[str, str] = field(default_factory=dict)  # by part
     stopped: float = 0.0  # s, monotonic clock: when all parts last reported an emergency stop
@@ -77,10 +81,16 @@ class _Taken:
 
 
 class PageControls:
-    """The calls of all pages.  They run in the web server's threads, one at a time, and wait for the answers of other services."""
+    """Executes the commands of all pages.
+
+    The threads of the web server call it, one at a time; each waits for the answers of other services.
+    """
 
     def __init__(self, service: Service, robot: Robot, known: Known, board: Board, show_fields: Callable[[bool], None]) -> None:
-        """`show_fields`: shows or hides the fields in the 3D view; it is called in the service's main thread."""
+        """Create the controls.
+
+        `show_fields(shown)` shows or hides the robot's fields in the 3D view; it is called in the service's main thread.
+        """
         self._service, self._robot, self._known, self._board = service, robot, known, board
         self._show_fields = show_fields
         self._lock = RLock()
@@ -105,7 +115,10 @@ class PageControls:
         self._publish()
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Execute a command of a page; returns a sentence for the user, raises Refused."""
+        """Execute a command of a page and return a sentence for the user. Raises Refused if the command cannot be executed.
+
+        `page`: id of the page. `verb`: name of the command, such as "stop", "pause" or "goal". `arguments`: its values, by name.
+        """
         if verb == "stop":  # from every page, and without waiting for another call
             return self._stop()
         with self._lock:
@@ -129,7 +142,12 @@ class PageControls:
             return done
 
     def tend(self, open_pages: set[str]) -> None:
-        """Give all parts back if the page that holds the controls is closed, and each part whose reach has ended."""
+        """Give parts back to their agents if they are no longer needed; called once per second.
+
+        If the page that holds the controls is not among `open_pages` (ids), all parts that it has taken are given back. A part that has
+        reached for a target is given back 4 s after the reach has ended. A part that another client has taken no longer counts as taken by
+        the page.
+        """
         with self._lock:
             self._pages = len(open_pages)
             if self._holder and self._holder not in open_pages:
@@ -140,7 +158,7 @@ class PageControls:
             self._publish()
 
     def give_all_back(self) -> None:
-        """Give all parts back to their agents."""
+        """Give all parts that pages have taken back to their agents."""
         with self._lock:
             for part in list(self._taken):
                 self._give(part)

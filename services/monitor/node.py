@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the monitor: sends the newest message of every stream to the page and to files, twenty times per second."""
+"""Runs the monitor: up to 20 times per second, sends the newest message of every stream to the page and to the files."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class MonitorNode:
-    """Shows the newest messages at its own rate; those between are not shown."""
+    """Shows the newest messages at a rate of its own. Older messages that arrived since the last update are not shown."""
 
     def __init__(self, service: Service, config: Config, robot: Robot, output: Output) -> None:
         self._service, self._output, self._robot = service, output, robot
@@ -319,7 +319,7 @@ class MonitorNode:
         self._teller.forget_run()
 
     def end(self) -> None:
-        """Give parts back, and let the open pages say that the system has ended."""
+        """Give all parts back to their agents, and show on the open pages that the system has ended."""
         controls = self._output.controls.real
         if isinstance(controls, PageControls):
             controls.give_all_back()
@@ -328,7 +328,7 @@ class MonitorNode:
 
     @property
     def now(self) -> float:
-        """The robot's time, s, since the first run that was seen."""
+        """The robot's time [s] since the begin of the first run that this monitor has seen; later runs continue this time."""
         return self._last
 
     def _set_time(self) -> None:

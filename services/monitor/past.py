@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The record that a monitor made of a run: every value at every time."""
+"""Reads the record that a monitor made of a run, and returns its values at any time."""
 
 from __future__ import annotations
 
@@ -25,27 +25,33 @@ from services.monitor.web.record import SHOWN_EVENTS, STORY, Entry, entries
 
 @dataclass(frozen=True)
 class Track:
-    """The values of one name in the order of their times [s]."""
+    """All recorded values of one name, `values`, in the order of their times, `times` [s of the robot]."""
 
     times: Sequence[float]
     values: Sequence[Any]
 
     def at(self, moment: float) -> Any:
-        """Return the newest value at a moment; None before the first."""
+        """Return the newest value at the time `moment` [s]; None if there was no value yet."""
         index = bisect_right(self.times, moment)
         return self.values[index - 1] if index else None
 
     def newest(self, moment: float, count: int) -> list[Any]:
-        """Return at most `count` newest values at a moment, in order."""
+        """Return the newest values at the time `moment` [s], at most `count`, the oldest first."""
         index = bisect_right(self.times, moment)
         return list(self.values[max(index - count, 0) : index])
 
 
 class Story:
-    """The record of a run."""
+    """The record of a run: the values that its page showed.
+
+    `tracks`: the values, by name. `robot`: the robot of the run. `begin`, `end`: times of the first pose and of the last value [s].
+    """
 
     def __init__(self, run: Path) -> None:
-        """Read the record in a run's folder; raises MobeeError."""
+        """Read the record in the folder `run`.
+
+        Raises MobeeError if it cannot be read, contains no pose, or belongs to a robot with another number of motors.
+        """
         found = entries(run / STORY)
         self.tracks = _tracks(found)
         if "q" not in self.tracks:
@@ -61,11 +67,14 @@ class Story:
 
     @property
     def length(self) -> float:
-        """Duration of the record, s."""
+        """The duration of the record [s]."""
         return self.end - self.begin
 
     def at(self, seconds: float) -> dict[str, Any]:
-        """Return all values at a moment, s since the beginning."""
+        """Return the newest recorded value of each name at the time `seconds` [s since the begin].
+
+        The value of "events" is a list of the newest events.
+        """
         moment = self.begin + min(max(seconds, 0.0), self.length)
         values = {name: value for name, track in self.tracks.items() if (value := track.at(moment)) is not None}
         if "event" in self.tracks:
@@ -73,7 +82,7 @@ class Story:
         return values
 
     def pose(self, seconds: float) -> Array:
-        """Return the motor positions (n,) rad at a time [s since the beginning], interpolated linearly between recorded ones."""
+        """Return the motor positions (n,) rad at the time `seconds` [s since the begin], interpolated linearly between recorded ones."""
         track, moment = self.tracks["q"], self.begin + min(max(seconds, 0.0), self.length)
         after = min(bisect_right(track.times, moment), len(track.times) - 1)
         before = max(after - 1, 0)
@@ -93,7 +102,7 @@ def _tracks(found: Sequence[Entry]) -> dict[str, Track]:
 
 
 def object_of(recorded: Mapping[str, Any]) -> ObjectState:
-    """Return an object of the world from its record."""
+    """Convert the record of an object of the world, JSON data as of `services.monitor.web.body.thing`, to an ObjectState."""
     turn = quaternion_from_matrix(np.array(recorded["rotation"])[None])[0].tolist()
     geometry = Geometry(recorded["kind"], recorded["size"])
     return ObjectState(recorded["name"], geometry, recorded["position"], turn, recorded["role"], "")

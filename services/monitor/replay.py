@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Replays the record of a monitor: the same page, with a time line."""
+"""Shows the record of a monitor again: the same page, with a time line."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ NOT_SHOWN = ("q", "contacts", "event")  # on the page they are the body, and the
 
 
 class Player:
-    """The position in a story; any thread may change it."""
+    """The current position of a replay in the record of a run, and whether it plays. Its methods may be called from any thread."""
 
     def __init__(self, story: Story) -> None:
         self.story = story
@@ -37,7 +37,10 @@ class Player:
         self._at, self._plays, self._since = 0.0, True, time.monotonic()
 
     def seek(self, query: Mapping[str, str]) -> None:
-        """Execute a command of the page's time line: `at`, s since the beginning, or `toggle` to play or pause.  Raises ValueError."""
+        """Execute a command of the page's time line: "at" sets the position [s since the begin], "toggle" starts or pauses the replay.
+
+        Raises ValueError if "at" is not a number.
+        """
         with self._lock:
             self._advance()
             if "at" in query:
@@ -48,7 +51,7 @@ class Player:
                     self._at = 0.0
 
     def now(self) -> tuple[float, bool]:
-        """Return the position, s since the begin, and whether the story is playing."""
+        """Return the current position [s since the begin], and whether the replay plays."""
         with self._lock:
             self._advance()
             return self._at, self._plays
@@ -63,7 +66,10 @@ class Player:
 
 
 def replay(run: Path, port: int, report: Callable[[str], None]) -> None:
-    """Serve the page of a run until the user interrupts; `report` is called with its address.  Raises MobeeError."""
+    """Serve the page of a recorded run until the user interrupts with Ctrl-C.
+
+    `run`: folder of the run. `report` is called with the page's address. Raises MobeeError if the record cannot be read.
+    """
     story = Story(run)
     player, board = Player(story), Board()
     with tempfile.TemporaryDirectory(prefix="mobee-page-") as private:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state of the system in one sentence, with a remedy."""
+"""Describes a problem of the system in one sentence, with a remedy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,13 @@ HELD = 1.0  # s of real time for which a part must hold before it is reported: e
 
 @dataclass
 class Seen:
-    """The present knowledge of the monitor about the system."""
+    """What the monitor knows about the state of the system.
+
+    `clock_age`: s of real time since the last tick; None: no tick yet. `mode`: mode of the clock, such as "paused". `gates`: state of the
+    safety gate, by part. `held_for`: s of real time for which each part in hold has been held. `why_held`: the controller's reason, by
+    part. `stop`: the emergency stop in force. `services`: running services. `known`: services that have run at some time. `patience`: s of
+    real time without a tick after which the robot counts as not answering. `ended`: the monitor was asked to end.
+    """
 
     clock_age: float | None = None  # s of real time since the last tick; None: there was none
     mode: str = ""  # of the clock
@@ -31,7 +37,10 @@ class Seen:
 
 
 def banner(seen: Seen) -> dict[str, Any] | None:
-    """Return the warning that the page shows in large letters: `level`, `title`, `text`, `todo`; None if all is well."""
+    """Return the warning that the page shows in large letters, as texts `level`, `title`, `text` and `todo` (the remedy).
+
+    Returns None if all is well.
+    """
     names = sorted(seen.services)
     if seen.ended:
         return _said(

@@ -13,7 +13,7 @@ from services.port_filter.node import FilterNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the filter until a signal or a shutdown call."""
+    """Run the port filter until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.port_filter")
     with explained("services.port_filter"):
         robot = robot_of(config)

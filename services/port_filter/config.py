@@ -16,35 +16,38 @@ Seconds = Annotated[float, Meta(ge=0, le=60)]
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The port filter's settings; times in simulated seconds."""
+    """The port filter's settings. Times are in seconds of simulated time."""
 
     clients: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = "icub_filtered"
-    """Namespace in which the clients find the robot."""
+    """Namespace (first part of all keys) in which the filter's clients find the robot."""
     participants: list[str] = []
-    """Lockstep: clients whose answers every tick waits for."""
+    """In lockstep: names of the clients whose answers every tick waits for."""
     contacts: Literal["solid", "field", "both"] = "both"
-    """Kinds of contact that start the reflex: of bodies, or of the larger volumes around them."""
+    """Kinds of contact that start the reflex. solid: contacts of the bodies themselves; field: of the larger volumes around them; both:
+    either kind."""
     tolerance: Annotated[float, Meta(ge=0)] = math.radians(1.0)
-    """Tolerance of motor limits and clauses, rad."""
+    """Distance [rad; m for motors that slide] by which a pose may be beyond a motor limit or a clause before this counts as a violation."""
     history: Annotated[float, Meta(gt=0, le=3600)] = _SETTINGS.history
-    """Time for which poses are recorded, s."""
+    """Length of the record of past poses [s], along which the reflex can move the robot back."""
     confirm: Seconds = _SETTINGS.confirm
-    """Time for which a violation must last before it counts, s; 0: it counts at once, as in the original."""
+    """Time for which a violation must last before it starts the reflex [s]; 0: at once, as in thesis 4.1."""
     release: Seconds = _SETTINGS.release
-    """Time without a violation after which it is over, s."""
+    """Time without a violation after which a violation counts as ended [s]."""
     brake: Annotated[float, Meta(ge=0.05, le=60)] = _SETTINGS.brake
-    """Time for which the robot brakes before it moves back along its path, s; the safety gate refuses to reverse a fast motion."""
+    """Time for which the robot brakes before it moves back along its path [s]. It is needed because the safety gate refuses to reverse a
+    fast motion."""
     dead_time: Seconds = _SETTINGS.dead_time
-    """Time for which the robot rests after it moved back, before the client gets control, s; 0: as in the original."""
+    """Time for which the robot rests after it has moved back, before the client gets control again [s]; 0: none, as in thesis 4.1."""
     pace: Annotated[float, Meta(gt=0, le=10)] = _SETTINGS.pace
-    """Number of recorded poses that the robot moves back per tick."""
+    """Speed at which the robot moves back, in recorded poses per tick; 1: as fast as the recorded motion."""
     must_be_clear: bool = _SETTINGS.must_be_clear
-    """Move back past a waypoint that is itself in contact; false: as in the original."""
+    """Whether to continue to move back if the pose at a waypoint is itself in violation (contact, limit or clause). False: stop at the
+    waypoint, as in thesis 4.1."""
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
-    """Milliseconds without a command after which robot_sim holds a part while it moves back."""
+    """Lifetime of the reflex's commands [ms]: robot_sim holds a part if no new command arrives within this time."""
 
     @property
     def reflex(self) -> ReflexSettings:
-        """Return the settings of the reflex."""
+        """The settings of the reflex, taken from these settings."""
         names = ("history", "confirm", "release", "brake", "dead_time", "pace", "must_be_clear")
         return ReflexSettings(**{name: getattr(self, name) for name in names})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of the filter's clients: forwards drive calls, metadata, emergency stops and liveliness."""
+"""Answers the calls of the filter's clients, and forwards calls, metadata, emergency stops and the router's liveliness."""
 
 from __future__ import annotations
 
@@ -19,17 +19,24 @@ from services.common.service import CallRefused, Service
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """The client that owns a part's drive while its liveliness token exists."""
+    """The client that owns the drive of a part, as long as its liveliness token exists. `who`: name. `instance`: id of its process."""
 
     who: str
     instance: str
 
 
 class DriveServer:
-    """Forwards drive calls to robot_sim, unless the reflex is active; the clients use robot_sim's epochs."""
+    """Forwards the drive calls of clients (take, arm, release, hold) to robot_sim, unless the reflex is active.
+
+    Clients use robot_sim's epochs. `epochs`: the epoch in force, by part.
+    """
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:
-        """`refusal`: returns the reason why no client may drive now, or ""; `on_arm`: called when a client has armed a part."""
+        """Begin to answer the calls of the clients.
+
+        `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients. `refusal`: returns the reason why no
+        client may drive now; empty: clients may drive. `on_arm`: called when a client has armed a part.
+        """
         self._service, self._twin, self._refusal, self._on_arm = service, twin, refusal, on_arm
         self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
@@ -39,14 +46,14 @@ class DriveServer:
         twin.on_alive(self._note_alive)
 
     def forget(self) -> None:
-        """Drop all owners, at the start of a new run."""
+        """Forget all owners and epochs, because a new run has begun."""
         self._owners = dict.fromkeys(self._owners)
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
     def hold(self, part: str) -> None:
-        """Put a part in hold at robot_sim; its owner must arm it again, or without an owner any client may take it.
+        """Put a part in hold at robot_sim. If the part has an owner, this client must arm it again; else any client may take it.
 
-        If robot_sim is gone, nothing is done: it starts again in hold, without owners.
+        If robot_sim does not run, nothing is done, because it will start in hold and without owners.
         """
         if not self._service.alive.get("robot_sim"):
             return
@@ -111,7 +118,10 @@ def _forwarded() -> Iterator[None]:
 
 
 class Forwarder:
-    """Forwards metadata, emergency stops and the router's token between the robot (`service`) and the namespace of the clients (`twin`)."""
+    """Forwards part metadata, emergency stops and the router's liveliness token between the robot and the clients.
+
+    `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients.
+    """
 
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:
         self._service, self._twin = service, twin

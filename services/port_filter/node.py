@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the port filter: forwards states, checks the pose, forwards commands or runs the reflex."""
+"""Runs the port filter: forwards states to the clients, checks the pose, and forwards commands or runs the reflex."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ from services.port_filter.passage import Streams
 
 
 class Switch:
-    """The model, the check of its poses for violations, and the reflex of one run."""
+    """Decides at every tick who commands the robot: the clients, or the reflex.
+
+    `reflex`: the reflex of the present run. `q`: newest measured pose (n,) rad. `violations`: contacts, limits and clauses that it
+    violates.
+    """
 
     def __init__(self, config: Config, robot: Robot) -> None:
         self._settings = config.reflex
@@ -36,18 +40,18 @@ class Switch:
         self.restart(0.01)
 
     def restart(self, dt: float) -> None:
-        """Start a new run with ticks of dt [s], with an empty record of the reflex."""
+        """Begin a new run: a new reflex with no recorded poses. `dt`: duration of a tick [s]."""
         self.reflex = Reflex(self._settings, dt, self._max_velocity)
 
     def tick(self, q: Array) -> Array | None:
-        """Return the target (n,) rad of the reflex at the measured pose q (n,) rad; None while the clients command."""
+        """Check the measured pose `q` (n,) rad. Returns the reflex's target (n,) rad; None while the clients command the robot."""
         self.q = q
         self.violations = self._watch.check(self._track.evaluate(q))
         return self.reflex.tick(q, self.violations)
 
 
 class FilterNode:
-    """The port filter: `service` is a client of the robot, `twin` acts as the robot for the filter's clients."""
+    """The port filter. `service` is its client of the robot; `twin` acts as the robot in the namespace of the filter's clients."""
 
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
         self._service, self._twin, self._config, self._robot = service, twin, config, robot

@@ -19,7 +19,10 @@ REST_TIME = 0.1  # s; a reference that has not changed for so long is at rest
 
 
 class MoveDetector:
-    """Detects when a client begins a position move of one part: its reference leaves rest."""
+    """Detects when a client begins a position move of one part.
+
+    A move begins with the first position command, and when the commanded position changes after at least 0.1 s without a change.
+    """
 
     def __init__(self) -> None:
         self._reference: list[float] | None = None  # of position commands; None: there was none, or another mode
@@ -27,7 +30,7 @@ class MoveDetector:
         self._moving = False
 
     def begins(self, command: Command, t: int) -> bool:
-        """Return whether this command, received at bus time t [ns], begins a position move."""
+        """Return whether this command begins a position move. `t`: bus time at which it was received [ns]."""
         if command.mode != "position":
             self._reference, self._moving = None, False
             return False
@@ -39,7 +42,7 @@ class MoveDetector:
         return begins
 
     def forget(self) -> None:
-        """Forget the reference: the client no longer controls the part."""
+        """Forget the last commanded position, because the client no longer controls the part."""
         self._reference, self._moving = None, False
 
 
@@ -47,9 +50,9 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Publishes the commands of one part to robot_sim, from a client or from the reflex, with one sequence of numbers.
+    """Publishes the commands of one part to robot_sim, with one sequence of numbers for those of clients and of the reflex.
 
-    It remembers the number that the client gave to each of its commands.
+    It remembers which number the client gave to each of its commands.
     """
 
     def __init__(self, bus: Bus, part: str) -> None:
@@ -58,19 +61,23 @@ class CommandStream:
         self._client_seq: OrderedDict[int, int] = OrderedDict()
 
     def forward(self, command: Command) -> None:
-        """Forward a client's command."""
+        """Publish a client's command to robot_sim, with the next number of this stream."""
         self._client_seq[self._seq] = command.seq
         if len(self._client_seq) > MAX_REMEMBERED:
             self._client_seq.popitem(last=False)
         self.put(command.epoch, command.re_k, command.mode, command.ref, command.ttl)
 
     def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
-        """Publish a command."""
+        """Publish a command to robot_sim.
+
+        `epoch`: of the drive. `re_k`: tick that it answers. `reference`: positions [rad] or velocities [rad/s] of the part's motors, by
+        `mode`. `ttl`: lifetime [ms].
+        """
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1
 
     def client_seq(self, seq: int) -> int:
-        """Return the client's number of the command that robot_sim knows as `seq`; -1 if no client sent it."""
+        """Return the number that the client gave to the command `seq` of this stream; -1 if the command is not from a client."""
         return self._client_seq.get(seq, -1)
 
 
@@ -78,12 +85,20 @@ MAX_STATE_AGE = 100_000_000  # ns; a pose with an older state of a part is not c
 
 
 class Streams:
-    """The streams of all parts between robot_sim and the clients."""
+    """Passes the states of all parts to the clients, and the clients' commands to robot_sim.
+
+    `commands`: the stream of commands to robot_sim, by part. `is_stale`: the newest states are too old to check the pose, so that commands
+    are refused. `answered`: in lockstep, called when a message with commands also answers a tick.
+    """
 
     def __init__(
         self, service: Service, twin: Service, robot: Robot, epochs: dict[str, int], refusal: Callable[[], str], mark: Callable[[], object]
     ) -> None:
-        """`epochs`: the drive epoch of each part; `refusal`: see DriveServer; `mark`: called when a position move begins."""
+        """Begin to forward states and commands.
+
+        `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients. `epochs`: the drive epoch in force, by
+        part. `refusal`: returns the reason why clients may not command now; empty: they may. `mark`: called when a position move begins.
+        """
         self._service, self._twin, self._robot = service, twin, robot
         self._epochs, self._refusal, self._mark = epochs, refusal, mark
         self._parts: dict[str, PartStatus] = {}
@@ -101,31 +116,31 @@ class Streams:
             service.on_newest(State, partial(self._publish_state, part), part)
 
     def note(self, tick: Tick) -> None:
-        """Store the state of the robot at the start of a tick."""
+        """Store the robot's state that a tick contains."""
         self._parts, self._q = tick.parts, np.array(tick.q)
         self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > MAX_STATE_AGE
 
     def publish(self, tick: Tick) -> None:
-        """Publish the tick to the clients."""
+        """Publish a tick to the clients; a part that the reflex controls is shown in hold."""
         parts = {part: self._for_clients(part, state) for part, state in tick.parts.items()}
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
     def q(self) -> Array:
-        """Return the motor positions that the encoders measured, (n,) rad."""
+        """Return the measured motor positions of the newest tick, (n,) rad."""
         return self._q
 
     def follows(self, part: str) -> bool:
-        """Return whether the part follows this filter's commands, according to the newest tick."""
+        """Return whether the part is armed with the filter's epoch in the newest tick, so that it follows the filter's commands."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 
     def forget_moves(self) -> None:
-        """Forget the clients' motions when they lose control; their next commands begin a new motion."""
+        """Forget the clients' moves, because the clients have lost control. Their next position command begins a new move."""
         for moves in self._moves.values():
             moves.forget()
 
     def forget(self) -> None:
-        """Drop all states and commands, at the start of a new run."""
+        """Forget all states and commands, because a new run has begun."""
         self._parts = {}
         self.is_stale = False
         self._newest = dict.fromkeys(self._newest, (0, -1))

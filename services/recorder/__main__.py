@@ -14,14 +14,17 @@ from services.recorder.node import RecorderNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Record until a signal or a shutdown call."""
+    """Run the recorder until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.recorder")
     with explained("services.recorder"):
         record("recorder", config)
 
 
 def record(who: str, config: Config) -> None:
-    """Record under a name of a service until a signal or a shutdown call; raises MobeeError or BusUnreachable if it cannot begin."""
+    """Record messages until a signal or a shutdown call.
+
+    `who`: name of this service on the bus. Raises MobeeError or BusUnreachable if the recording cannot begin.
+    """
     robot = robot_of(config)
     spare_threads()  # messages arrive one by one: handing each from thread to thread costs more than it
     if not config.everything:  # pictures are larger

@@ -14,14 +14,16 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """The recorder's settings."""
 
     run_dir: str = "."
-    """Folder of the files messages-0000.mcap, messages-0001.mcap, ..."""
+    """Folder in which the recording is written, as files messages-0000.mcap, messages-0001.mcap, ..."""
     largest: Annotated[float, Meta(ge=10)] = 2000.0
-    """Largest size of all files together, MB; beyond it the oldest file is removed."""
+    """Largest size of all files of the recording together [MB]. When it is reached, the oldest file is removed."""
     keep_free: Annotated[float, Meta(ge=0)] = 500.0
-    """Free space of the disk, MB, below which nothing is recorded, so that the others can still write."""
+    """Least free space on the disk [MB]. With less free space nothing is recorded, so that other programs can still write."""
     pose_rate: Annotated[float, Meta(ge=0, le=100)] = 10.0
-    """Joint states and transforms for viewers, Hz; 0: none."""
+    """Rate [Hz] of joint states and link transforms as ROS 2 messages, which are recorded for viewers; 0: none."""
     json_rate: Annotated[float, Meta(ge=0, le=100)] = 2.0
-    """Largest rate of copies in JSON for viewers, on each key, Hz; 0: none. The messages themselves are all recorded."""
+    """Largest rate [Hz], for each key, of copies in JSON, which are recorded for viewers; 0: none. The messages themselves are all
+    recorded."""
     everything: bool = False
-    """Whether to record also streams that are published for subscribers only: clock, states of single parts, poses, contacts, pictures."""
+    """Whether to record also the streams that are published only if someone subscribes: clock, states of single parts, poses, contacts,
+    pictures."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The MCAP files of a recording: one is written, the oldest are removed when all together are too large."""
+"""The MCAP files of a recording. One file is written at a time; the oldest ones are removed when all together are too large."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ _CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """The messages of one key in one encoding; two that are equal are the same channel."""
+    """The messages of one key in one encoding. Channels with equal fields are the same channel.
+
+    `topic`: the key. `encoding`: msgpack, json or cdr. `about`: the encoding text on the bus, for messages that are recorded unchanged.
+    `schema`: name of the schema; empty: none. `schema_encoding`, `definition`: format and content of the schema.
+    """
 
     topic: str
     encoding: str  # of the messages: msgpack, json or cdr
@@ -31,7 +35,7 @@ class Channel:
 
 
 def parts_of(folder: Path) -> list[Path]:
-    """Return the files of the recording in a folder, the oldest first."""
+    """Return the files messages-*.mcap of the recording in a folder, the oldest first."""
     return [path for _, path in sorted(_numbered(folder).items())]
 
 
@@ -40,10 +44,14 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 class Files:
-    """Writes messages to the files; raises OSError if a file cannot be written."""
+    """Writes messages to the files of a recording. Its methods raise OSError if a file cannot be written."""
 
     def __init__(self, folder: Path, largest: int, settings: Mapping[str, bytes]) -> None:
-        """`largest`: bytes of all files; `settings`: files that are attached to each file, by name."""
+        """Prepare the recording in a folder.
+
+        `largest`: largest size of all files together [bytes]. `settings`: content of the settings files, by name, which is attached to each
+        file.
+        """
         self._folder, self._largest, self._settings = folder, largest, settings
         self._file: IO[bytes] | None = None
         self._writer: Writer
@@ -52,11 +60,14 @@ class Files:
 
     @property
     def size(self) -> int:
-        """Bytes of all files."""
+        """The present size of all files of the recording [bytes]."""
         return sum(path.stat().st_size for path in parts_of(self._folder))
 
     def write(self, channel: Channel, data: bytes, received: int, published: int, sequence: int = 0) -> None:
-        """Add a message; times in ns since 1970."""
+        """Add a message to a channel.
+
+        `received`, `published`: times of receipt and of publication, ns since 1970. `sequence`: number that the sender gave to the message.
+        """
         if self._file is None:
             self._begin()
         number = self._channels.get(channel)
@@ -68,7 +79,10 @@ class Files:
         self._writer.add_message(number, received, data, published, sequence)
 
     def flush(self) -> None:
-        """Give everything to the operating system, so that it survives a kill of this process; end this one if it is large."""
+        """Hand all data to the operating system, so that they are kept even if this process is killed.
+
+        A file that has reached its share of the largest size is ended.
+        """
         if self._file is None:
             return
         self._writer.flush()  # type: ignore[no-untyped-call]  # the package lacks the annotation
@@ -80,7 +94,7 @@ class Files:
         self._remove_oldest()
 
     def close(self) -> None:
-        """End the file with its index."""
+        """End the present file with its index."""
         if self._file is not None:
             file, self._file = self._file, None
             with file:

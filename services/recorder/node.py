@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the recorder: twice per second, writes the messages that have arrived."""
+"""Runs the recorder: twice per second, it writes the messages that have arrived."""
 
 from __future__ import annotations
 
@@ -68,7 +68,10 @@ _header = msgspec.msgpack.Decoder(_Header)
 
 
 def sender_of(payload: bytes) -> tuple[str, int] | None:
-    """Return the sender of a message and its number; None for a message that services refuse: it is recorded all the same."""
+    """Return the name of the sender and the sequence number in a message's header; None if the header cannot be decoded.
+
+    Such a message is recorded nevertheless.
+    """
     try:
         header = _header.decode(payload)
     except UNDECODABLE:
@@ -77,19 +80,20 @@ def sender_of(payload: bytes) -> tuple[str, int] | None:
 
 
 FOR_SUBSCRIBERS: tuple[type[Message], ...] = (Clock, State, Pose, Contacts, Image, Camera)
-"""Streams that need not be published without a subscriber, and that follow from the ticks and the robot's world."""
+"""Types of the streams that are published only if someone subscribes. Their content follows from the ticks and the robot's world."""
 
 PER_TICK: tuple[type[Message], ...] = (
     Clock, Tick, State, Command, Commands, Motion, Follow, Reach, Targets, Pose, Forces, Contacts, Truth,
 )  # fmt: skip
-"""Streams that may have a message in every tick."""
+"""Types of the streams that may have a message in every tick."""
 
 
 def queues(everything: bool, locked: bool) -> dict[str, int]:
-    """Return the key expressions of the streams that are recorded, each with the number of messages that may wait.
+    """Return the key expressions of the streams to record, each with the number of messages that may wait in its queue.
 
-    Zenoh allocates 0.25 kB per place at once, but a place takes memory only when it is used for the first time. A long queue of a stream
-    with few messages would therefore grow for hours.
+    `everything`: also the streams in FOR_SUBSCRIBERS. `locked`: sizes for lockstep. Streams with few messages get short queues: Zenoh
+    allocates 0.25 kB per place, and the memory of each place is used when the first message is put there, so a long queue would grow for
+    hours.
     """
     most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
     recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
@@ -97,13 +101,16 @@ def queues(everything: bool, locked: bool) -> dict[str, int]:
 
 
 def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
-    """Return the keys with a variable that have a message in every tick."""
+    """Return the keys that contain a variable, such as {part}, and have a message in every tick.
+
+    `parts`: parts of the robot. `everything`: also the streams in FOR_SUBSCRIBERS.
+    """
     recorded = (cls for cls in PER_TICK if cls.stream.variable and (everything or cls not in FOR_SUBSCRIBERS))
     return [cls.stream.key(name) for cls in recorded for name in (("model",) if cls is Forces else parts)]
 
 
 class RecorderNode:
-    """Writes all messages as they are, and copies for viewers."""
+    """Writes all messages unchanged, and copies of some for viewers."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._folder, self._keep_free = service, Path(config.run_dir), int(config.keep_free * _MEGABYTE)
@@ -124,9 +131,10 @@ class RecorderNode:
         self._repeat()
 
     def lower_priority(self) -> None:
-        """Let the main thread yield the processor to all services; called when the start, on which they wait, is over.
+        """Lower the priority of the main thread below all services.
 
-        Not in lockstep, where no tick can be late, but the recording of a run can be played again only if nothing is lost.
+        Call this when the recorder is ready, because others wait for its start. In lockstep nothing is done: there no tick can be late, and
+        the run can be played again only if no message is lost.
         """
         if self._service.locked:
             return
@@ -135,7 +143,7 @@ class RecorderNode:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
     def end(self) -> None:
-        """Write the messages that have arrived, and the index of the file."""
+        """Write the messages that have arrived and the index of the file."""
         self._receive_all()
         time.sleep(RECEIVING)
         try:

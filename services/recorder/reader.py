@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads recordings, also of a recorder that was killed: everything up to the last complete chunk."""
+"""Reads recordings. Of a file whose recorder was killed, everything up to the last complete chunk is read."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ _DAMAGE = (McapError, StructError, zstandard.ZstdError, ValueError, EOFError)  #
 
 
 class Recording:
-    """A recording in one file, or in all files of a run's folder."""
+    """A recording: one MCAP file, or all messages-*.mcap files in the folder of a run.
+
+    Iteration yields the messages in the order of arrival, without the copies for viewers.
+    """
 
     def __init__(self, place: Path) -> None:
-        """Find the files; raises MobeeError if there are none, or one of them is no MCAP file."""
+        """Find the files; `place`: a file or a folder. Raises MobeeError if there are none, or one of them is not an MCAP file."""
         try:
             self.files = parts_of(place) if place.is_dir() else [place]
             for path in self.files:
@@ -38,7 +41,7 @@ class Recording:
             raise MobeeError(f"{place}: there is no messages-*.mcap; `mobee launch` records unless it is started with --no-record")
 
     def settings(self) -> dict[str, str]:
-        """Return the settings files of the run, by name."""
+        """Return the settings files of the run that are attached to the recording: text by file name."""
         found = {}
         with self.files[0].open("rb") as file:
             for record in _records(file):

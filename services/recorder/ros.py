@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motor states and link poses as ROS 2 messages: `sensor_msgs/JointState` and `tf2_msgs/TFMessage` in CDR, which common viewers show.
+"""Encodes motor states and link poses as ROS 2 messages that common viewers show: `sensor_msgs/JointState` and `tf2_msgs/TFMessage` in CDR.
 
-The names in a message never change, so its bytes are laid out once, and only times and numbers are written for each message.
+The names in these messages never change. Therefore the bytes are laid out once, and only times and numbers are written for each message.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class _Layout:
 
 
 class JointStates:
-    """Encodes the positions of all motors."""
+    """Encodes the positions of all motors as `sensor_msgs/JointState`. `motors`: names, in the order of the positions."""
 
     def __init__(self, motors: Sequence[str]) -> None:
         layout = _Layout()
@@ -90,14 +90,14 @@ class JointStates:
         self._data = layout.data
 
     def encode(self, t: int, q: Array) -> bytes:
-        """Return the message at time t < END_OF_TIME [ns of the robot]; q (n,) rad."""
+        """Return the encoded message. `t`: the robot's time [ns], below END_OF_TIME (2^31 s). `q`: motor positions (n,) rad."""
         struct.pack_into("<iI", self._data, self._stamp, *divmod(t, 1_000_000_000))
         self._data[self._positions : self._positions + 8 * len(q)] = q.astype("<f8").tobytes()
         return bytes(self._data)
 
 
 class Transforms:
-    """Encodes the pose of every link in the root frame."""
+    """Encodes the pose of every link in the root frame as `tf2_msgs/TFMessage`. `links`: names, in the order of the poses."""
 
     def __init__(self, links: Sequence[str]) -> None:
         layout = _Layout()
@@ -113,7 +113,10 @@ class Transforms:
         self._data = np.frombuffer(layout.data, dtype=np.uint8)
 
     def encode(self, t: int, positions: Array, quaternions: Array) -> bytes:
-        """Return the message at time t < END_OF_TIME [ns of the robot]; positions (L, 3) m, quaternions (L, 4) wxyz."""
+        """Return the encoded message.
+
+        `t`: the robot's time [ns], below END_OF_TIME (2^31 s). `positions`: (L, 3) m, root frame. `quaternions`: (L, 4), order wxyz.
+        """
         rows = np.column_stack([positions, quaternions[:, [1, 2, 3, 0]]]).astype("<f8")
         self._data[self._stamps] = np.frombuffer(struct.pack("<iI", *divmod(t, 1_000_000_000)), dtype=np.uint8)
         self._data[self._poses] = rows.view(np.uint8)

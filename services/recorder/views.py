@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of messages for viewers, at a bounded rate: JSON of every key, the motors as JointState, the links as transforms."""
+"""Makes copies of messages for viewers, at a bounded rate: JSON of every key, motors as JointState, links as transforms."""
 
 from __future__ import annotations
 
@@ -30,17 +30,23 @@ _tick = msgspec.msgpack.Decoder(Tick)
 
 
 class Views:
-    """Makes the copies."""
+    """Makes the copies of recorded messages that viewers show."""
 
     def __init__(self, robot: Robot, pose_rate: float, json_rate: float) -> None:
-        """Rates: copies per second of real time, of the robot's pose and of each key; 0: none."""
+        """Create the encoders.
+
+        `pose_rate`: copies of the robot's pose per second of real time. `json_rate`: JSON copies of each key per second. 0: none.
+        """
         self._robot = robot
         self._model = Model(robot)
         self._joints, self._transforms = ros.JointStates(robot.motors), ros.Transforms(robot.links)
         self._pose_due, self._json_due = _Due(pose_rate), _Due(json_rate)
 
     def of(self, message: Raw, kind: str) -> Iterator[Copy]:
-        """Yield the copies of a message of a type of the contract; of one that cannot be decoded there are none."""
+        """Yield the copies of a message, each with its channel.
+
+        `kind`: name of the message's type. A message that cannot be decoded has no copies.
+        """
         try:
             if kind == "Tick" and self._pose_due.at(message):
                 yield from self._of_tick(_tick.decode(message.payload))

@@ -20,17 +20,19 @@ NO_CONTACT = SolidContact()
 
 
 class BulletBackend:
-    """The upper body of iCub v2.5 with gravity; fingers and eyes have no physics, only the motor model.
+    """The upper body of iCub v2.5 with gravity in PyBullet. Fingers and eyes have no physics, only the motor model.
 
     A joint is a velocity constraint whose largest torque is that of the motor, so the servo holds the weight, as on the real robot. In
-    torque mode the commanded torque acts on the joint, through a gear (bullet_torque.py), and must include the torque that holds the
-    weight.
+    torque mode the commanded torque acts on the joint through a gear (bullet_torque.py), and must include the torque that holds the weight.
     """
 
     name = "pybullet"
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
-        """`dt`: the tick, s.  Raises BackendUnavailable or MobeeError."""
+        """Build the robot and its world.
+
+        `load_world`: returns a new world. `seed`: of the noise. `dt`: the tick, s. Raises BackendUnavailable or MobeeError.
+        """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
         self._substep = dt / self._substeps
@@ -38,38 +40,41 @@ class BulletBackend:
         self._build(seed)
 
     def reset(self, seed: int) -> None:
-        """Set the home posture, at rest, in hold, and the world in its initial state."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
         self._scene.close()
         self._build(seed)
 
     def step(self, dt: float) -> None:
-        """Advance by a tick of dt [s], the same as at the start."""
+        """Advance by one tick; `dt` [s] must be the one that was given at the start."""
         self._deepest.clear()
         for _ in range(self._substeps):
             self._advance(self._substep)
             self._find_contacts()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object at a position, m; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
         self.world.move(name, position=position)
         self._scene.move(name, position)
 
     def contact(self) -> SolidContact:
-        """Return the deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick; its depth is 0 if there was none."""
         if not self._deepest:
             return NO_CONTACT
         pair = max(self._deepest, key=self._deepest.__getitem__)
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
         return self._deepest
 
     def gap(self) -> float:
-        """Return the closest distance of hands and forearms to the obstacles, m; -1 without obstacles."""
+        """Return the smallest distance of hands and forearms from the obstacles, m; 0 in contact, -1 without obstacles.
+
+        The result is MAX_GAP (2 m) if all obstacles are farther.
+        """
         links = [link for link in self._scene.links if link.endswith(GAP_LINKS)]
         gaps = [self._scene.distance(link, obstacle, MAX_GAP) for link in links for obstacle in self._obstacles]
-        return max(min(gaps), 0.0) if gaps else -1.0
+        return min(max(min(gaps), 0.0), MAX_GAP) if gaps else -1.0
 
     def _build(self, seed: int) -> None:
         self.world = self._load_world()

@@ -27,26 +27,26 @@ TABLE = "table"  # in the list it stands for every obstacle of the world
 
 
 class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
-    """The list of pairs whose contacts count as solid contacts, and the record of its origin."""
+    """The list of pairs of links whose contacts count as solid contacts, and how the list was made."""
 
     model: str  # of icub-models
-    distance: float  # m, at which hulls count as apart
-    poses: int  # random legal ones, in all of which the hulls of a pair were apart
+    distance: float  # m, from which on two hulls count as apart
+    poses: int  # number of random poses within the limits, in all of which the hulls of each pair were apart
     seed: int
     always: list[list[str]]  # listed for all poses: hands and forearms against torso, head, other arm, table
-    apart: list[list[str]]  # the others
+    apart: list[list[str]]  # the other pairs, found by the random poses
 
     def links(self) -> set[frozenset[str]]:
-        """Return the pairs of two links of the robot."""
+        """Return the listed pairs of two links of the robot, as sets of two names."""
         return {frozenset(pair) for pair in self.always + self.apart if TABLE not in pair}
 
     def against_table(self) -> list[str]:
-        """Return the links that are listed with the table, sorted."""
+        """Return the links whose contacts with obstacles count, sorted by name."""
         return sorted(first if second == TABLE else second for first, second in self.always + self.apart if TABLE in (first, second))
 
 
 def load_solid_pairs() -> SolidPairs:
-    """Return the list in this repository."""
+    """Return the list of pairs in this repository (solid_pairs.json)."""
     return msgspec.json.decode(SOLID_PAIRS.read_bytes(), type=SolidPairs)
 
 
@@ -55,14 +55,17 @@ BASE = -1  # PyBullet's index of the base link
 
 
 class BulletScene:
-    """The bodies in PyBullet, and their names.
+    """The robot and its world in PyBullet: the bodies and their names.
 
-    `motors` and `joints`: the motors of the robot that PyBullet moves, and their joints in PyBullet; the others (fingers,
-    eyes) have no counterpart in the URDF.
+    `motors`: indices of the robot's motors that PyBullet moves; the others (fingers, eyes) are not in the URDF. `joints`: PyBullet's
+    indices of the joints of these motors, in the same order.
     """
 
     def __init__(self, robot: Robot, world: World, substep: float) -> None:
-        """`substep`: s.  Raises BackendUnavailable for a robot that the URDF does not describe."""
+        """Load the robot and the world; `substep`: time step of the physics, s.
+
+        Raises BackendUnavailable for a robot other than the iCub, which the URDF describes.
+        """
         require_simulated(robot)
         self.client = BulletClient(pybullet.DIRECT)
         self.client.setPhysicsEngineParameter(fixedTimeStep=substep, numSubSteps=1, deterministicOverlappingPairs=1)
@@ -86,16 +89,19 @@ class BulletScene:
         self.objects = {thing.name: self._add(thing) for thing in world.objects.values()}
 
     def close(self) -> None:
-        """Free the simulator's memory."""
+        """End the connection with PyBullet, which frees its memory."""
         self.client.disconnect()
 
     def set_posture(self, q: Array) -> None:
-        """Put the joints at q (n,) rad of all motors, at rest."""
+        """Put the joints at q (n,) rad, the positions of all motors of the robot, at rest."""
         for joint, position in zip(self.joints, q[self.motors].tolist(), strict=True):
             self.client.resetJointState(self.body, joint, position)
 
     def motion(self, q: Array) -> Motion:
-        """Return the equation of motion of the joints in `motors` at q (n,) rad of all motors and at the joints' velocities."""
+        """Return the equation of motion of the joints in `motors`, at their present velocities.
+
+        `q`: (n,) rad, positions of all motors of the robot.
+        """
         velocity = np.array([state[1] for state in self.client.getJointStates(self.body, self.joints)])
         at, moving = q[self.motors][self._order].tolist(), velocity[self._order].tolist()
         still = [0.0] * len(at)
@@ -106,12 +112,12 @@ class BulletScene:
         return Motion(mass[np.ix_(self._back, self._back)], coriolis + gravity_torque(self._robot, q)[self.motors], velocity)
 
     def move(self, name: str, position: Iterable[float]) -> None:
-        """Move a world object to a position (3,), m."""
+        """Move a world object to `position` (3,) m, root frame; its orientation stays the same."""
         _, turn = self.client.getBasePositionAndOrientation(self.objects[name])
         self.client.resetBasePositionAndOrientation(self.objects[name], tuple(position), turn)
 
     def watch(self, links: Collection[frozenset[str]], against: Iterable[tuple[str, str]]) -> None:
-        """Let only these pairs collide: of two links, and of (link, object)."""
+        """Let only these pairs collide: `links`, sets of two links of the robot, and `against`, pairs of a link and an object."""
         names = list(self.links)
         for i, first in enumerate(names):
             for second in names[:i]:
@@ -123,7 +129,10 @@ class BulletScene:
                 self.client.setCollisionFilterPair(self.body, body, index, BASE, int((name, thing) in wanted))
 
     def distance(self, link: str, other: str, within: float) -> float:
-        """Return the distance [m] of a link from another link or a world object, negative when they overlap; inf beyond `within`."""
+        """Return the distance [m] of a link from another link or a world object; negative if they overlap.
+
+        The result is infinite if the distance is larger than `within` [m].
+        """
         body, index = (self.objects[other], BASE) if other in self.objects else (self.body, self.links[other])
         points = self.client.getClosestPoints(self.body, body, within, self.links[link], index)
         return min((point[8] for point in points), default=np.inf)

@@ -16,28 +16,28 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The equation of motion at present: mass * acceleration + bias = joint torques + torques of contacts; (d,) driven joints."""
+    """The equation of motion of the d driven joints at present: mass * acceleration + bias = torques of the joints and of contacts."""
 
     mass: Array  # (d, d) kg m^2
-    bias: Array  # (d,) N m, gravity and what velocities do
+    bias: Array  # (d,) N m, gravity and Coriolis torques
     velocity: Array  # (d,) rad/s
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Share:
-    """The command of each joint in a substep: a torque where `free`, else a velocity; each (d,)."""
+    """The command of each of the d joints in a substep: a torque if the joint is `free`, otherwise a velocity; all arrays (d,)."""
 
     free: Mask
-    torque: Array  # N m, what passes the gear; 0 where not free
+    torque: Array  # N m, passed on by the gear; 0 where not free
     velocity: Array  # rad/s
 
 
 class Gears:
-    """Solves a substep of motor, gear and arm together, implicitly, and returns the torque that passes the gear.
+    """Computes the torques that gears pass on to joints: solves a substep of motor, gear and arm together, implicitly.
 
     A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside. Both are
-    far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge.  The external torque (contacts) is taken from the
-    last substep: it explains the difference between the motion of the joints and the computed motion.
+    far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque `outside` (contacts) is taken
+    from the last substep: it is the difference between the motion of the joints and the computed motion.
     """
 
     def __init__(self, joints: int) -> None:
@@ -45,16 +45,23 @@ class Gears:
         self._nothing = np.zeros(joints)
 
     def forget(self) -> None:
-        """Forget the last substep, as if no torque had been transmitted in it."""
+        """Drop the last substep, so that the next one assumes no external torque."""
         self._last = None
 
     def transmit(
         self, now: Motion, torque: Array, free: Mask, velocity: Array, fastest: tuple[Array, Array], touched: bool, h: float
     ) -> Share:
-        """Return the commands of the joints in a substep of h [s]; all arrays (d,).
+        """Return the commands of the joints in a substep of h [s]; all arrays (d,), by joint.
 
-        `torque` N m acts where `free`, the other joints move at `velocity` rad/s.  A joint that would leave the range `fastest`
-        (lowest and highest velocity, rad/s) is not free: it moves at the limit of the range.
+        Args:
+            now: the equation of motion at present.
+            torque: commanded torques, N m, of the joints that are `free`.
+            free: which joints are in torque mode.
+            velocity: velocities, rad/s, of the other joints.
+            fastest: lowest and highest velocity of each joint, rad/s. A joint that would leave this range is not free in the result: it
+                moves at the limit of the range.
+            touched: whether the robot had a contact in the last substep; without one, the external torques are 0.
+            h: length of the substep, s.
         """
         outside = self._outside(now, h) if touched else self._nothing
         free, velocity = free.copy(), velocity.copy()

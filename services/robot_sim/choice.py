@@ -22,16 +22,16 @@ WITHOUT_PHYSICS = (
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A back-end, and a message for the user about an unexpected choice, or ""."""
+    """The chosen back-end, and a message for the user if the choice may be unexpected; empty if it is not."""
 
     name: Name
     warning: str = ""
 
 
 def choose(backend: Literal["auto", Name], robot: Robot) -> Choice:
-    """Return the back-end for a robot; raises BackendUnavailable for one that cannot move it.
+    """Return the back-end for a robot; raises BackendUnavailable if "pybullet" is given for a robot that it cannot move.
 
-    "auto" is PyBullet for the iCub if it is installed, else MuJoCo if it is installed, else the motor model alone.
+    "auto" is PyBullet for the iCub if it is installed, otherwise MuJoCo if it is installed, otherwise the motor model alone ("kinematic").
     """
     if backend == "pybullet":
         require_simulated(robot)
@@ -43,5 +43,5 @@ def choose(backend: Literal["auto", Name], robot: Robot) -> Choice:
 
 
 def is_installed(name: Name) -> bool:
-    """Return whether the packages of a back-end are installed."""
+    """Return whether the Python packages that a back-end needs are installed."""
     return all(importlib.util.find_spec(package) is not None for package in PACKAGES[name])

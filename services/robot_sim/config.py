@@ -25,46 +25,57 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     """The simulated robot's settings."""
 
     backend: Literal["auto", "pybullet", "mujoco", "kinematic"] = "auto"
-    """Physics with contacts: PyBullet for the iCub or MuJoCo for every robot; kinematic: motor model alone; auto: an installed engine."""
+    """What moves the robot. pybullet: physics with contacts, for the iCub; mujoco: physics with contacts, for every robot; kinematic: the
+    motor model alone; auto: an installed physics engine."""
     rate: Annotated[float, Meta(ge=1, le=1000)] = 100.0
-    """Ticks a second."""
+    """Ticks per second of simulated time."""
     speed: Annotated[float, Meta(gt=0, le=20)] = 1.0
-    """Simulated seconds a second; a command's ttl stays in real time, its age is counted in ticks."""
+    """Simulated seconds per second of real time. The ttl of a command stays in real time, its age is counted in ticks."""
     motors: Literal["published", "identified"] = "published"
-    """The motors' numbers: those below, or those that were fitted to this robot, with which they do not count (docs/plant.md)."""
+    """The parameters of the motors. published: the settings below; identified: parameters that were fitted to this robot, instead of lag,
+    delay, backlash, friction and encoder_noise (docs/plant.md)."""
     lag: NotNegative = 0.05
     """Time constant of the motors, s."""
     delay: NotNegative = 0.02
-    """Time before a command begins to act, s."""
+    """Time from a command to its first effect on the motor, s."""
     backlash: NotNegative = math.radians(0.2)
     """Play between motor and joint, rad."""
     friction: NotNegative = 0.0
-    """Coulomb's, as the velocity that it costs, rad/s."""
+    """Coulomb friction of the motors, as the velocity that it costs, rad/s."""
     torques: Mapping[str, Annotated[float, Meta(gt=0)]] = {}
-    """Largest torques of motors by pattern of their names, N m, in place of those of the robot's file, as { "?_thumb_*" = 0.3 }."""
+    """Largest torques of motors, N m, instead of those in the robot's file, by patterns of motor names, as { "?_thumb_*" = 0.3 }."""
     encoder_noise: NotNegative = math.radians(0.1)
-    """Standard deviation of the encoders at a tick of 20 ms, rad; scaled with the tick."""
+    """Standard deviation of the noise of the encoders at a tick of 20 ms, rad; at another tick dt it is larger by the factor sqrt(20 ms /
+    dt)."""
     substep: Annotated[float, Meta(gt=0)] = 0.005
-    """Longest step of motors and physics, s."""
+    """Longest time step of motors and physics, s."""
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.02
-    """Standard deviation of a part's sampling time, share of a tick."""
+    """Standard deviation of a part's sampling time, as a share of a tick."""
     truth_rate: Annotated[float, Meta(gt=0, le=100)] = 20.0
-    """Rate of the messages with the ground truth, per second."""
+    """Number of messages with the ground truth per second of simulated time."""
     participants: tuple[Annotated[str, Meta(pattern="^[a-z0-9_]+$")], ...] = ()
-    """Lockstep: services that must be present before tick 1; the launcher names all services that affect the robot's motion."""
+    """Lockstep: services that must be present before tick 1. The launcher names all services that affect the robot's motion."""
     ticks: Annotated[int, Meta(ge=0)] = 0
-    """Lockstep: stop after so many ticks; 0: never."""
+    """Lockstep: number of ticks after which the run stops; 0: it does not stop."""
     stop_record: str = ""
-    """File that holds the emergency stop, and into which programs of this machine write one; missing at the start: stopped; empty: none."""
+    """File that records the emergency stop, and into which programs of this machine write a stop. If it is missing at the start, the robot
+    is stopped. Empty: no file."""
     record: str = ""
-    """Folder to which every tick is written as it was, for experiments (services.robot_sim.watch); empty: none."""
+    """Folder into which the true joint positions and the contacts of every tick are written, for experiments (services.robot_sim.watch);
+    empty: none."""
 
     def packages(self) -> Mapping[str, str]:
-        """See ServiceConfig; returns the packages of a back-end that is chosen by name."""
+        """Return the packages of a back-end that is chosen by name; empty for "auto".
+
+        Keys: import names of the packages. Values: the extra of this project that installs the package.
+        """
         return {} if self.backend == "auto" else dict.fromkeys(PACKAGES[self.backend], EXTRA)
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the back-end can move the robot, and that identified motor parameters exist for it; raises MobeeError."""
+        """Check the robot as every service does, and whether the back-end can move it with these motors; raises MobeeError.
+
+        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor.
+        """
         super().check_robot(robot)
         choose(self.backend, robot)
         with_torques(robot, self.torques)
@@ -76,23 +87,24 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """The renderer's settings."""
 
     cameras: tuple[str, ...] = ()
-    """Cameras beside the first two of the robot, as of vision."""
+    """Further cameras, beside the first two of the robot, as in the settings of vision."""
     frame_rate: Annotated[float, Meta(gt=0, le=30)] = 5.0
-    """Pictures of each camera a second of simulated time."""
+    """Number of pictures of each camera per second of simulated time."""
     width: Annotated[int, Meta(ge=16, le=1280)] = 320
     """Columns of a picture."""
     height: Annotated[int, Meta(ge=16, le=1024)] = 240
     """Rows of a picture."""
     optics: Literal["ideal", "dragonfly"] = "ideal"
-    """ideal: pictures of the posture that the encoders report; dragonfly: of the simulator's true posture, by cameras with distortion,
-    noise, motion blur, latency, and mounting errors drawn by the seed, in a room (docs/vision.md).  Needs robot_sim's truth_rate = 100."""
+    """ideal: pictures of the posture that the encoders report. dragonfly: pictures of the simulator's true posture in a room, by cameras
+    with distortion, noise, motion blur, latency, and mounting errors that are drawn with the seed (docs/vision.md); this needs truth_rate =
+    100 in robot_sim."""
     samples: Annotated[int, Meta(ge=1, le=16)] = 2
-    """dragonfly: moments of the exposure at which the scene is drawn; a picture takes as many times as long."""
+    """dragonfly: number of moments of an exposure at which the scene is drawn. The time for a picture is proportional to it."""
     tag: str = ""
     """Marker on which a tag is drawn, for `mobee calibrate`; empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has a camera; raises MobeeError."""
+        """Check the robot as every service does, that it has a camera and the marker `tag`, and the size of pictures; raises MobeeError."""
         super().check_robot(robot)
         require_cameras(robot, cameras_of(robot, self.cameras), 1)
         if self.tag:

@@ -27,18 +27,18 @@ from services.common.service import CallRefused
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Limits of the motors of a part, each of shape (n,)."""
+    """Limits of the motors of a part, each of shape (n_part,)."""
 
     lower: Array  # rad
     upper: Array  # rad
     velocity: Array  # rad/s
     acceleration: Array  # rad/s^2
     torque: Array  # N m
-    fine: Array  # what 1 rad of a threshold is in the unit of the motor, see mobee.robot.motor_units
+    fine: Array  # what 1 rad of a threshold is in the unit of the motor (mobee.robot.motor_units); 1 for motors that turn
 
     @classmethod
     def of(cls, robot: Robot, part: str) -> Limits:
-        """Return the limits in the robot file."""
+        """Return the limits of the part's motors in the robot's file."""
         motors = robot.motor_table[robot.part(part).slice]
         return cls(
             lower=np.array([m.limits[0] for m in motors]),
@@ -51,7 +51,7 @@ class Limits:
 
 
 class Order(Struct, frozen=True, eq=False):
-    """A command to one part, see `Command`; `reference` (n,) rad, rad/s or N m by mode."""
+    """A command to one part, as it arrived in `Command` or `Commands`. `reference`: (n_part,) rad, rad/s or N m, by mode."""
 
     src: str
     epoch: int
@@ -63,12 +63,12 @@ class Order(Struct, frozen=True, eq=False):
 
     @classmethod
     def of(cls, command: Command) -> Order:
-        """Return the order in a command to one part."""
+        """Return the order in a `Command`, the message to one part."""
         return cls(command.src, command.epoch, command.seq, command.re_k, command.mode, np.array(command.ref), command.ttl)
 
 
 def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
-    """Return the orders in a message to several parts, by part; raises KeyError for a part that the robot does not have."""
+    """Return the orders in a `Commands` message, by part; raises KeyError for a part that the robot does not have."""
     reference = np.array(commands.ref)
     src, seq, re_k, ttl = commands.src, commands.seq, commands.re_k, commands.ttl
     return {
@@ -79,7 +79,7 @@ def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
 
 @contextmanager
 def refused_as_call() -> Iterator[None]:
-    """Turn a refusal of the gate into the answer of a call."""
+    """Turn a refusal of the gate (Refused) in the `with` block into a CallRefused with the same reason, for the caller."""
     try:
         yield
     except Refused as refused:
@@ -98,10 +98,14 @@ _EXACT = 1.0 + 1e-9  # factor for rounding: a reference at the limit is within t
 
 
 class Admission:
-    """The checks of one part; each raises Refused with its reason."""
+    """The checks of the commands to one part; each check raises Refused with its reason."""
 
     def __init__(self, part: str, limits: Limits, dt: float, max_ticks: int | None) -> None:
-        """Set the limits; `max_ticks`: largest age [ticks] of the tick that an order answers; None: the ticks that begin within MAX_AGE."""
+        """Set the limits.
+
+        `dt`: the tick, s. `max_ticks`: in lockstep, the largest age of a command, in ticks since the tick that it answers; None: free mode,
+        in which this age is at most MAX_AGE (0.1 s).
+        """
         self._part, self._dt, self._max_ticks = part, dt, max_ticks
         self._velocity, self._torque = limits.velocity * _EXACT, limits.torque * _EXACT
         self._margin, self._start = POSITION_MARGIN * limits.fine, MAX_START * limits.fine
@@ -110,7 +114,7 @@ class Admission:
         self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
 
     def check(self, order: Order, k: int) -> None:
-        """Check numbers and age of an order that arrives in tick k."""
+        """Check the numbers, the age and the ttl of an order that arrives in tick k."""
         reference = order.reference
         if reference.shape != self._lower.shape:
             raise Refused("length", f"{self._part}: {reference.size} numbers for {self._lower.size} motors")
@@ -123,7 +127,14 @@ class Admission:
             raise Refused("ttl", f"{self._part}: ttl {order.ttl} ms, valid: 1 to {MAX_TTL}")
 
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
-        """Check the distance from the position commanded `ticks` ago (`before`), or from the measured q if there is none; all (n,) rad."""
+        """Check that a position command is not too far from the one before.
+
+        Args:
+            reference: commanded position, (n_part,) rad.
+            before: position that was commanded `ticks` ago, (n_part,) rad; None: there is none, and the measured position is used.
+            ticks: number of ticks since `before` was commanded.
+            q: measured position, (n_part,) rad.
+        """
         if before is None:
             before, allowed = q, self._start
         else:
@@ -167,29 +178,35 @@ def _all(found: NDArray[np.bool_]) -> bool:
 
 
 class Shaper:
-    """Limits references to the limits of the motors, tick by tick; arrays (n,)."""
+    """Limits the references of a part to the limits of its motors, tick by tick; arrays (n_part,)."""
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits = limits
         self._asked = Braking(limits.lower, limits.upper, limits.velocity, limits.acceleration * dt, dt)
 
     def start(self, q: Array, velocity: Array) -> None:
-        """Begin at the motors' positions [rad] and velocities [rad/s]."""
+        """Begin at the motors' measured positions [rad] and velocities [rad/s]."""
         self._asked.velocity[:] = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
         self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # by which the reference leads a servo at that speed
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
-        """Return the velocity for this tick; near a position limit, at most the velocity from which the motor can still stop."""
+        """Return the velocity [rad/s] for this tick, as near to `wanted` as the limits allow; `q`: measured position, rad.
+
+        Near a position limit it is at most the velocity from which the motor can still stop.
+        """
         self._asked.to_velocity(wanted, q)
         return self._asked.velocity.copy()
 
     def to_position(self, wanted: Array) -> Array:
-        """Return the position for this tick, on a motion that comes to rest at `wanted`."""
+        """Return the position [rad] for this tick, on a motion that comes to rest at `wanted` [rad]."""
         self._asked.to_position(wanted)
         return self._asked.position.copy()
 
     def runs_out(self, q: Array, velocity: Array) -> bool:
-        """Return whether a motor is too fast to stop before its position limit, by more than it brakes in a tick."""
+        """Return whether a motor is too fast to stop before its position limit, by more than it brakes in a tick.
+
+        `q` [rad], `velocity` [rad/s]: measured, (n_part,) each.
+        """
         return self._asked.runs_out(q, velocity)
 
 
@@ -199,7 +216,7 @@ Report = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
 
 class Drive(Struct, frozen=True, eq=False):
-    """Mode and reference of the motors in this tick; `reference` (n,) rad, rad/s or N m by mode, None on hold."""
+    """Mode and reference of a part's motors in this tick. `reference`: (n_part,) rad, rad/s or N m, by mode; None on hold."""
 
     mode: Mode
     reference: Array | None = None
@@ -209,18 +226,18 @@ HOLD = Drive("hold")
 
 
 class InForce(Struct, frozen=True):
-    """An accepted command."""
+    """A command that was accepted, and the time at which it ends."""
 
     order: Order
     expires: int  # ns, monotonic clock
 
 
 class Gate:
-    """The safety gate of one part.
+    """The safety gate of one part, the last check before its motors.
 
-    States: idle (no owner), hold, armed, fault, estop; the part moves in `armed` only.  Commands are admitted between ticks; `tick` returns
-    what the motors do.  A command is in force until the next one, or until its ttl; then the part brakes at full deceleration, holds where
-    it came to rest, and must be armed again.
+    States: idle (no owner), hold, armed, fault, estop; the part moves only when armed. Commands are admitted between ticks; `tick` returns
+    what the motors do. A command is in force until the next one, or until its ttl is over; then the part brakes at full deceleration, holds
+    where it came to rest, and must be armed again.
     """
 
     def __init__(
@@ -233,17 +250,17 @@ class Gate:
         ttl_ticks: int | None = None,
         speed: float = 1.0,
     ) -> None:
-        """Begin in state idle.
+        """Begin in the state idle.
 
         Args:
-            part: its name, for messages.
-            limits: of its motors.
+            part: name of the part, for messages.
+            limits: limits of its motors.
             dt: the tick, s.
-            epoch: every later epoch is larger.
-            report: called with code, text and numbers when the part holds.
-            ttl_ticks: age [ticks] after which a command is not in force any more; None: the command's own ttl, in real time since the
-                tick that it answers.
-            speed: simulated time per real time; times in real time are longer for a robot in slow motion.
+            epoch: number of the last ownership; every later epoch is larger.
+            report: called with code, text and numbers when the part holds, or enters the state estop or fault.
+            ttl_ticks: in lockstep, the age [ticks] after which a command is not in force any more; None: free mode, in which the ttl of the
+                command counts, in real time from the start of the tick that it answers.
+            speed: simulated seconds per second of real time; for a robot in slow motion, times in real time are longer by this factor.
         """
         self.part, self.epoch, self._ttl_ticks = part, epoch, ttl_ticks
         self._stretch = max(1.0, 1.0 / speed)
@@ -262,7 +279,10 @@ class Gate:
         self._last_position: tuple[Array, int] | None = None  # newest accepted position reference and its tick
 
     def take(self, who: str, instance: str) -> int:
-        """Set a new owner and epoch; later commands of the old owner are refused."""
+        """Set a new owner; return the new epoch. Later commands of the old owner are refused.
+
+        `who`: name of the owner's service. `instance`: last chunk of its liveliness token.
+        """
         self.epoch += 1
         self.owner = (who, instance)
         self._newest_seq = -1
@@ -271,47 +291,47 @@ class Gate:
         return self.epoch
 
     def arm(self, epoch: int) -> None:
-        """Follow commands from now on; raises Refused (epoch, estop, fault)."""
+        """Let the part follow commands from now on; raises Refused if the epoch is not in force, or the state is estop or fault."""
         self._check_epoch(epoch)
         if self.state in ("estop", "fault"):
             raise Refused(self.state, f"{self.part} is in {self.state}: {_REMEDY[self.state]}")
         self.state = "armed"
 
     def release(self, epoch: int) -> None:
-        """End the ownership; raises Refused (epoch)."""
+        """End the ownership; raises Refused if the epoch is not in force."""
         self._check_epoch(epoch)
         self.owner = None
         if self.state in ("hold", "armed"):
             self._enter("idle", "released")
 
     def hold(self, epoch: int) -> None:
-        """Hold at the request of the owner; raises Refused (epoch)."""
+        """Put the part in hold at the request of its owner; raises Refused if the epoch is not in force."""
         self._check_epoch(epoch)
         self.force_hold("requested by its owner")
 
     def force_hold(self, why: str) -> None:
-        """Put the part in hold at once, without a request of the owner."""
+        """Put the part in hold at once, if it is armed, without a request of the owner; `why`: reason, for the event."""
         if self.state == "armed":
             self._enter("hold", why)
 
     def lose_owner(self) -> None:
-        """Put the part in hold, because the owner's liveliness token is gone."""
+        """End the ownership and put the part in hold, because the owner's liveliness token has disappeared."""
         who = self.owner[0] if self.owner else "nobody"
         self.owner = None
         self.force_hold(f"its owner {who} is gone")
 
     def stop(self, why: str) -> None:
-        """Latch an emergency stop."""
+        """Enter the state estop (emergency stop), which lasts until `reset_stop`; `why`: reason, for the event."""
         if self.state != "estop":
             self._enter("estop", why)
 
     def reset_stop(self) -> None:
-        """End the emergency stop; to move again the part must be armed."""
+        """End the emergency stop. The part is then in hold, or in fault, and must be armed to move again."""
         if self.state == "estop":
             self._enter("fault" if self.faults else "hold", "emergency stop reset")
 
     def fail(self, bit: int, why: str) -> None:
-        """Record a hardware fault of the part; only a new run clears it."""
+        """Record a fault of the part, which only a new run clears; `bit`: bit of `faults` that is set; `why`: reason, for the event."""
         self.faults |= bit
         if self.state not in ("fault", "estop"):
             self._enter("fault", why)
@@ -319,7 +339,7 @@ class Gate:
     def admit(self, order: Order, k: int, now: int, q: Array) -> None:
         """Put an order in force from the next tick on, or raise Refused with the reason.
 
-        `k`: the present tick; `now`: ns, monotonic clock; `q`: (n,) rad measured.
+        `k`: the present tick. `now`: time, ns of the monotonic clock. `q`: measured positions of the part's motors, (n_part,) rad.
         """
         if self.state != "armed":
             raise Refused("not_armed", f"{self.part} is in {self.state}")
@@ -340,7 +360,10 @@ class Gate:
         self._in_force = InForce(order, asked + round(order.ttl * 1_000_000 * self._stretch))
 
     def tick(self, k: int, now: int, q: Array, velocity: Array) -> Drive:
-        """Return the order for the motors in tick k, which begins now; `q` [rad] and `velocity` [rad/s] (n,) are measured."""
+        """Return what the motors do in tick k, which begins now.
+
+        `now`: time, ns of the monotonic clock. `q` [rad], `velocity` [rad/s]: measured, (n_part,) each.
+        """
         self._begun.append(now)
         current = self._in_force
         if current is not None and self._has_expired(current, k, now):

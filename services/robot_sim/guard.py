@@ -23,12 +23,13 @@ CHECK_PERIOD = 0.01  # s between two checks for an emergency stop; there is one 
 
 
 class Guard:
-    """One gate per part, and the emergency stop of all parts."""
+    """The gates of all parts, one for each, and the emergency stop of all parts."""
 
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
-        """Begin with the emergency stop that the record holds.
+        """Make the gates; an emergency stop that the record holds is in force from the beginning.
 
-        `record`: None if stops are not kept beyond this process.  `speed`: simulated time per real time.
+        `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `speed`: simulated seconds
+        per second of real time.
         """
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
         self._speed = speed
@@ -52,15 +53,15 @@ class Guard:
 
     @property
     def stop_reason(self) -> str:
-        """The emergency stop in force; empty if there is none."""
+        """The emergency stop in force as a text: who stopped the robot, when and why; empty if there is none."""
         return "" if self._stop is None else str(self._stop)
 
     def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
-        """Lockstep: call handler(service, tick, answer) for the answer in a message of commands."""
+        """In lockstep, call handler(service, tick, answer) for each answer to a tick that comes in a message of commands."""
         self._on_answer = handler
 
     def reset(self) -> None:
-        """Start a new run: all gates are idle and without owner; a latched emergency stop stays."""
+        """Begin a new run: all gates are idle and without owner. An emergency stop stays in force."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
         self._runs.add(self._service.bus.run)
@@ -68,7 +69,7 @@ class Guard:
             self._stop_gates(self._stop)
 
     def tick(self, k: int) -> None:
-        """Pass the commands that are in force in tick k to the motors."""
+        """Give the motors the commands that are in force in tick k."""
         self._check_stop()  # before commands, and past an inbox that a flood has filled
         now = time.monotonic_ns()
         motors = self._backend.motors
@@ -82,14 +83,17 @@ class Guard:
             motors.command(where, drive.mode, drive.reference)
 
     def admit_waiting(self) -> None:
-        """Lockstep: admit the commands that answer this tick, in the order of names, whichever came first."""
+        """In lockstep, admit or refuse the waiting commands, sorted by part, sender and number.
+
+        Their order of arrival therefore has no effect.
+        """
         q = self._backend.motors.q
         for part, order in sorted(self._waiting, key=lambda item: (item[0], item[1].src, item[1].seq)):
             self._admit(part, order, q, self._service.bus.k)
         self._waiting.clear()
 
     def hold_dependents(self, who: str) -> None:
-        """Put the parts in hold that depend on a late service."""
+        """Put the parts in hold that the late service `who` owns; if it is the model, the router or the launcher, put all parts in hold."""
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is late")
         for gate in self.gates.values():
@@ -97,7 +101,7 @@ class Guard:
                 gate.force_hold(f"its owner {who} is late")
 
     def hold_all(self, why: str) -> None:
-        """Put every part in hold at once."""
+        """Put every armed part in hold at once; `why`: reason, for the event."""
         for gate in self.gates.values():
             gate.force_hold(why)
 

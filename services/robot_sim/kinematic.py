@@ -25,14 +25,17 @@ class BackendUnavailable(InvalidValue):
 
 @dataclass(frozen=True, slots=True)
 class SolidContact:
-    """The deepest solid contact of a listed pair; depth 0 without contact."""
+    """The deepest solid contact of a tick. `pair`: the two sorted names with a blank between them.
+
+    Without a contact, depth is 0 and pair empty.
+    """
 
     depth: float = 0.0  # m
     pair: str = ""
 
 
 def require_simulated(robot: Robot) -> None:
-    """Raise BackendUnavailable for a robot that PyBullet cannot move."""
+    """Raise BackendUnavailable if the robot is not the iCub, the only robot that PyBullet can move here."""
     if robot.name != SIMULATED:
         raise BackendUnavailable(
             f'backend = "pybullet" cannot move {robot.name!r}: the physics simulates the links and motors of the {SIMULATED} only. '
@@ -41,57 +44,60 @@ def require_simulated(robot: Robot) -> None:
 
 
 def unmoved(world: World) -> tuple[str, ...]:
-    """Return the note of a back-end that moves no object about the movable ones of a world."""
+    """Return a note for the user about the movable objects of a world, for a back-end in which pushed objects do not move.
+
+    Empty if the world has no movable objects.
+    """
     names = ", ".join(name for name, thing in world.objects.items() if thing.movable)
     return (f'objects with a mass do not move here when they are pushed ({names}): backend = "mujoco" moves them',) if names else ()
 
 
 class Backend(Protocol):
-    """Motors and the body that they move; arrays (n,) in the order of `robot.motors`."""
+    """A simulated robot: its motors, and the body and world around it. Arrays are (n,) in the order of `robot.motors`."""
 
     name: str
-    """As in the settings."""
+    """Name of the back-end, as in the settings."""
     notes: Sequence[str]
-    """Assumptions of the back-end about the robot, one sentence each."""
+    """Assumptions of the back-end about the robot, for the user, one sentence each."""
     pairs_watched: int
 
     @property
     def motors(self) -> Motors:
-        """Positions and velocities of the motors."""
+        """The motors of the robot, with their positions and velocities."""
         ...
 
     @property
     def world(self) -> World:
-        """The objects around the robot."""
+        """The world with all objects at their present poses."""
         ...
 
     def step(self, dt: float) -> None:
-        """Advance by a tick of dt [s]."""
+        """Advance the simulation by a tick of dt [s]."""
         ...
 
     def reset(self, seed: int) -> None:
-        """Set the home posture, at rest, in hold, and the world in its initial state."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Set the position of a world object, m; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
         ...
 
     def contact(self) -> SolidContact:
-        """Return the deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick; its depth is 0 if there was none."""
         ...
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
         ...
 
     def gap(self) -> float:
-        """Return the closest distance of hands and forearms to the table, m; -1 if it is not measured."""
+        """Return the smallest distance of hands and forearms from the obstacles, m; -1 if it is not measured."""
         ...
 
 
 class KinematicBackend:
-    """The motor model alone: joints follow their motors exactly."""
+    """The motor model without physics: joints follow their motors exactly, and nothing is in contact."""
 
     name = "kinematic"
     pairs_watched = 0
@@ -101,13 +107,13 @@ class KinematicBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Set the home posture, at rest, in hold, and the world in its initial state."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
         self.notes: Sequence[str] = unmoved(self.world)
 
     def step(self, dt: float) -> None:
-        """Advance by a tick of dt [s]."""
+        """Advance the motors by a tick of dt [s]; in torque mode gravity acts on them."""
         substeps, motors = self._parameters.substeps(dt), self.motors
         if not motors.in_torque.any():
             motors.move(substeps, dt / substeps)
@@ -117,17 +123,17 @@ class KinematicBackend:
             motors.move(1, dt / substeps)
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Set the position of a world object, m; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
         self.world.move(name, position=position)
 
     def contact(self) -> SolidContact:
-        """Return a contact of depth 0: this back-end has no solids."""
+        """Return a contact of depth 0, because this back-end computes no contacts."""
         return SolidContact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Return no contacts: this back-end has no solids."""
+        """Return an empty dict, because this back-end computes no contacts."""
         return {}
 
     def gap(self) -> float:
-        """Return -1.0: this backend does not measure the distance to the table."""
+        """Return -1.0, because this back-end does not measure the distance to the obstacles."""
         return -1.0

@@ -15,10 +15,10 @@ START_PERIOD = 0.05  # s between two repetitions of tick 0
 
 
 class Lockstep:
-    """The barrier of a run, and the number of events that made the run unrepeatable."""
+    """Lockstep in robot_sim: the barrier of a run, and the number of events that made the run unrepeatable."""
 
     def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
-        """`last_tick`: tick at which the run ends; 0: it does not end."""
+        """`participants`: services that must be present before tick 1. `last_tick`: tick at which the run ends; 0: it does not end."""
         self._service, self._guard = service, guard
         self._barrier = Barrier(service, participants, self._note, patience=service.config.patience)
         guard.on_answer(self._barrier.note)
@@ -28,24 +28,24 @@ class Lockstep:
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
-        """Start a new run."""
+        """Begin a new run, in which no participant is present and no flaw is counted."""
         self._barrier.begin()
         self.flaws, self._reported = 0, -EVENT_PERIOD
 
     def is_complete(self) -> bool:
-        """Return whether all participants have answered tick 0; until then it is repeated."""
+        """Return whether all participants have answered tick 0, which is repeated until then."""
         self._began = time.monotonic()
         return not self._barrier.absent()
 
     def startup_status(self) -> str:
-        """Return the participants for which tick 0 waits, as text for the status."""
+        """Return a text for `mobee status` with the participants for which tick 0 waits."""
         absent = self._barrier.absent()
         return f"waits for {', '.join(absent)}" if absent else "all participants are ready"
 
     def wait(self, k: int) -> None:
-        """Wait until tick k is answered, then admit its commands, in an order that does not depend on their arrival.
+        """Wait until tick k is answered, then admit the commands for it, in an order that does not depend on their arrival.
 
-        Parts that depend on a late participant hold; while a participant is absent, ticks run in real time.
+        Parts that depend on a late participant are put in hold.
         """
         for who in self._barrier.wait(k):
             self._guard.hold_dependents(who)
@@ -57,11 +57,11 @@ class Lockstep:
         return self._service.bus.k == self._last_tick > 0
 
     def is_degraded(self) -> bool:
-        """Return whether an expected participant of lockstep is absent."""
+        """Return whether an expected participant is absent; ticks then run in real time."""
         return bool(self._barrier.absent())
 
     def note_flaw(self, why: str) -> None:
-        """Count an event that makes the run unrepeatable, and report it at most once per second."""
+        """Count an event that makes the run unrepeatable, and report it at most once per second; `why`: text for the report."""
         self.flaws += 1
         now = time.monotonic()
         if now - self._reported >= EVENT_PERIOD:
@@ -69,11 +69,11 @@ class Lockstep:
             self._service.bus.event("warning", "not_repeatable", f"this run is not repeatable: {why}", k=float(self._service.bus.k))
 
     def speed(self, dt: float) -> float:
-        """Return the simulated seconds per second of real time since tick 1."""
+        """Return the average number of simulated seconds per second of real time since tick 1; `dt`: the tick, s."""
         return self._service.bus.k * dt / max(self._answered - self._began, 1e-9)
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the numbers of the run for `stat`."""
+        """Return the numbers of the run for `stat`: tick, number of flaws, and whether the last tick is reached."""
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
 
     def _note(self, who: str, why: str) -> None:

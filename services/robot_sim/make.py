@@ -16,13 +16,19 @@ from services.robot_sim.watch import Recorded
 
 
 def make_backend(config: Config, robot: Robot) -> Backend:
-    """Return the simulated robot that the configuration names; raises BackendUnavailable or MobeeError."""
+    """Return the back-end that the configuration names, which also records if the setting `record` names a folder.
+
+    Raises BackendUnavailable or MobeeError.
+    """
     backend = _make_backend(config, robot)
     return Recorded(backend, Path(config.record)) if config.record else backend
 
 
 def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
-    """Return the parameters of the motors that the configuration names; raises UnknownName for a robot whose motors were not identified."""
+    """Return the parameters of the motors that the configuration names.
+
+    Raises UnknownName for `motors` = "identified" and a robot whose motors were not identified.
+    """
     if config.motors == "identified":
         return replace(MotorParameters.identified(robot.name), substep=config.substep)
     return MotorParameters(

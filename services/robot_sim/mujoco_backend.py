@@ -23,16 +23,19 @@ Mask = NDArray[np.bool_]
 
 
 class MujocoBackend:
-    """All joints of any robot with gravity, its base fixed.
+    """All joints of any robot with gravity in MuJoCo; the base of the robot is fixed.
 
-    A joint is a velocity constraint with the motor's torque as its limit: the servo carries the weight.  In torque mode the commanded
-    torque acts through a gear with the inertia and the friction of the law, and must include the torque that carries the weight.
+    A joint is a velocity constraint whose largest torque is that of the motor, so the servo holds the weight. In torque mode the commanded
+    torque acts through a gear with the inertia and the friction of the control law, and must include the torque that holds the weight.
     """
 
     name = "mujoco"
 
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
-        """`dt`: the tick, s.  Raises MobeeError."""
+        """Build the robot and its world.
+
+        `load_world`: returns a new world. `seed`: of the noise. `dt`: the tick, s. Raises MobeeError.
+        """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
         self._substep = dt / self._substeps
@@ -43,7 +46,7 @@ class MujocoBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Set the home posture, at rest, in hold, and the world in its initial state."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
         self._world = self._load_world()
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self._scene = MujocoScene(self._robot, self._world, self._substep)
@@ -60,14 +63,14 @@ class MujocoBackend:
 
     @property
     def world(self) -> World:
-        """The objects where they are now: those that are movable as the physics has moved them."""
+        """The world with all objects at their present poses; the physics moves the movable ones."""
         for name in self._scene.movable:
             position, rotation = self._scene.pose_of(name)
             self._world.move(name, position=position, rotation=rotation)
         return self._world
 
     def step(self, dt: float) -> None:
-        """Advance by a tick of dt [s], the same as at the start."""
+        """Advance by one tick; `dt` [s] must be the one that was given at the start."""
         self._deepest.clear()
         for _ in range(self._substeps):
             self._advance(self._substep)
@@ -77,28 +80,35 @@ class MujocoBackend:
                     self._deepest[name] = max(depth, self._deepest.get(name, 0.0))
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (3,), m; a movable one is set down there, at rest, turned as in its file; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError.
+
+        A movable object is then at rest, with the orientation in the world's file.
+        """
         self._world.move(name, position=position)
         self._scene.move(name, position)
 
     def set_posture(self, q: Array) -> None:
-        """Put the motors at q (n,) rad, at rest."""
+        """Put the motors at q (n,) rad, at rest and in hold."""
         self._scene.set_posture(q)
         self.motors.restart(self.motors.seed, q)
 
     def contact(self) -> SolidContact:
-        """Return the deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick; its depth is 0 if there was none."""
         if not self._deepest:
             return SolidContact()
         pair = max(self._deepest, key=self._deepest.__getitem__)
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the depth [m] of every solid contact of the last tick, by pair, at its deepest."""
+        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
         return self._deepest
 
     def gap(self) -> float:
-        """Return the closest distance of hands and forearms to the obstacles, m; -1 without obstacles."""
+        """Return the smallest distance of hands and forearms from the obstacles, m; 0 in contact, -1 without obstacles.
+
+        For a robot without hands and forearms, the last link of each chain counts. A distance of more than MAX_GAP (2 m) is returned as 2
+        m.
+        """
         if not self._obstacles or not self._near:
             return -1.0
         return max(self._scene.distance(self._near, self._obstacles, MAX_GAP), 0.0)

@@ -32,19 +32,21 @@ GeomPair = tuple[str, str]
 
 
 class MujocoScene:
-    """The compiled model, its state, and which degrees of freedom and constraints belong to which motor.
+    """The robot and its world in MuJoCo: the compiled model, its state, and the degrees of freedom and constraints of each motor.
 
-    A motor acts on one of its joints, the one with the largest scale, which the others of the motor follow.  It is a constraint that brings
-    this joint to a velocity with a limited torque: MuJoCo's friction, whose velocity is 0, with a velocity that is set for every substep.
+    A motor acts on one of its joints: the one with the largest scale. The other joints of the motor follow this joint. A motor is a
+    constraint that brings its joint to a velocity with a limited torque: MuJoCo's friction, which normally brings a joint to the velocity
+    0, but here to a velocity that is set for every substep.
 
-    `scale`, `offset` (n,): joint = scale * motor + offset; `dofs` (n,): the joints' degrees of freedom; `rows` (n,): of the constraints.
+    Arrays of the n motors: `scale`, `offset` (n,): joint position = scale * motor position + offset. `dofs` (n,): degree of freedom of the
+    joint in MuJoCo. `rows` (n,): row of the motor's constraint in MuJoCo.
     """
 
     def __init__(self, robot: Robot, world: World, substep: float) -> None:
-        """`substep`: s."""
+        """Build the model with the robot at home; `substep`: time step of the physics, s."""
         self._robot, self._substep = robot, substep
         self.left_out = touching_at_home(robot, world)
-        """Pairs of names that touch at home, with the depth in m; they are not tested."""
+        """Depth [m] of each pair of solids that touch at home, by the set of their two names. Contacts of these pairs are not simulated."""
         spec = _options(substep, any(_moves(thing) for thing in world.objects.values()))
         bodies, origins = add_tree(spec, robot, self._weigh)
         for index, shape in enumerate(robot.shapes):
@@ -72,7 +74,7 @@ class MujocoScene:
         self.notes = self._assumptions()
 
     def set_posture(self, q: Array) -> None:
-        """Put the joints at q (n,) rad of the motors, at rest."""
+        """Put the joints at the motor positions q (n,) rad, at rest."""
         matrix, offset = self._robot.coupling
         self.data.qpos[self._all_qpos] = matrix @ q + offset
         self.data.qvel[:] = 0.0
@@ -83,12 +85,15 @@ class MujocoScene:
         mujoco.mj_step1(self.model, self.data)
 
     def motor_positions(self) -> Array:
-        """Return the positions (n,) rad of the motors, from the joints on which they act."""
+        """Return the positions (n,) rad of the motors, computed from the joints on which they act."""
         q: Array = (self.data.qpos[self._qpos] - self.offset) / self.scale
         return q
 
     def move(self, name: str, position: Iterable[float]) -> None:
-        """Move a world object to a position (3,), m; a movable one is at rest there, turned as in the world's file."""
+        """Move a world object to `position` (3,) m, root frame.
+
+        A movable object is then at rest, with the orientation in the world's file.
+        """
         if name in self._mocap:
             self.data.mocap_pos[self._mocap[name]] = tuple(position)
         else:
@@ -100,25 +105,25 @@ class MujocoScene:
 
     @property
     def movable(self) -> Iterable[str]:
-        """The objects that move when they are pushed."""
+        """The names of the objects that move when they are pushed."""
         return self._free.keys()
 
     def pose_of(self, name: str) -> tuple[Array, Array]:
-        """Return position (3,) m and rotation (3, 3) of a movable object."""
+        """Return position (3,) m and rotation (3, 3) of a movable object, root frame."""
         at = self._free[name].qposadr[0]
         return self.data.qpos[at : at + 3].copy(), matrix_from_quaternion(self.data.qpos[at + 3 : at + 7])
 
     def set_gear(self, motor: Motor, inertia: float, friction: float) -> None:
-        """Set the inertia [kg m^2] and the viscous friction [N m s/rad] of a motor behind its gear; `refresh` must follow."""
+        """Set the inertia [kg m^2] and the viscous friction [N m s/rad] that a motor has behind its gear; call `refresh` afterwards."""
         for joint, scale, _ in motor.joints:
             dof = self._all_dofs[joint]
             self.model.dof_armature[dof] = _share(inertia, motor, scale)
             self.model.dof_damping[dof] = _share(friction, motor, scale)
 
     def contacts(self) -> Mapping[tuple[str, str], float]:
-        """Return the depth [m] of each pair that overlaps, at its deepest point, by the sorted names of its links or objects.
+        """Return the depth [m], at the deepest point, of each pair that overlaps.
 
-        Pairs of two objects are left out.
+        Keys are pairs of sorted names, of two links or of a link and an object. Pairs of two objects are left out.
         """
         data, found = self.data, dict[tuple[str, str], float]()
         if data.ncon == 0:
@@ -132,7 +137,10 @@ class MujocoScene:
         return found
 
     def distance(self, links: Iterable[str], objects: Iterable[str], within: float) -> float:
-        """Return the smallest distance [m] of links from objects, negative when they overlap; `within` if all are farther."""
+        """Return the smallest distance [m] between the links `links` and the objects `objects`; negative if they overlap.
+
+        The result is `within` [m] if all distances are larger.
+        """
         ours = [geom for link in links for geom in self._solids.get(link, ())]
         theirs = [self.model.geom(_of_object(name)).id for name in objects]
         nearest = within
@@ -238,7 +246,10 @@ class MujocoScene:
 
 
 def reflected_inertia(motor: Motor) -> float:
-    """Return the inertia [kg m^2] of a motor's rotor behind its gear: that of the law, or less for a motor too weak to accelerate it."""
+    """Return the inertia [kg m^2] of a motor's rotor as it acts behind the gear.
+
+    It is INERTIA, that of the control law, or less for a motor that is too weak to accelerate this inertia.
+    """
     return min(INERTIA, 0.5 * motor.max_torque / motor.max_acceleration)
 
 
@@ -248,7 +259,7 @@ def _share(amount: float, motor: Motor, scale: float) -> float:
 
 
 def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
-    """Return the pairs of solids, by name, that the model finds in contact at home, with the depth in m."""
+    """Return the depth [m] of each pair of solids that the model finds in contact at home, by the set of their two names."""
     contacts = Model(robot, world).evaluate(robot.home).contacts
     return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 

@@ -25,19 +25,20 @@ GEOMS = {
 
 
 def link_name(link: int) -> str:
-    """Return the name of a link's body in MuJoCo: by number, since a world object may have the name of a link."""
+    """Return the name of a link's body in MuJoCo. It has the link's number, because a world object may have the name of a link."""
     return f"link{link}"
 
 
 def joint_name(joint: int) -> str:
-    """Return the name of a joint in MuJoCo."""
+    """Return the name of a joint in MuJoCo, which has the joint's number."""
     return f"joint{joint}"
 
 
 def add_tree(spec: Any, robot: Robot, weigh: Callable[[Any, int, Array], None]) -> tuple[list[Any], Array]:
-    """Add a body for each link, and its joint; returns the bodies and the origins (L, 3) m of their frames, root frame, zero pose.
+    """Add a body for each link of the robot, and its joint, to a MuJoCo specification.
 
-    The axes of all frames are those of the root frame at zero pose.  `weigh(body, link, origin)` gives a body its mass.
+    Returns the bodies, and the origins (L, 3) m of their frames in the root frame at zero pose. The axes of all frames are those of the
+    root frame at zero pose. `weigh(body, link, origin)`: called for each link, to give its body a mass.
     """
     bodies = [spec.worldbody.add_body(name=link_name(0))]
     origins = [np.zeros(3)]
@@ -52,7 +53,10 @@ def add_tree(spec: Any, robot: Robot, weigh: Callable[[Any, int, Array], None]) 
 
 
 def add_volume(spec: Any, body: Any, name: str, volume: Shape | WorldObject, position: Array) -> Any:
-    """Add a volume at `position` (3,) m in a body's frame as a geom of that name, and return the geom."""
+    """Add a volume to a body as a geom with the given name; return the geom.
+
+    `position`: (3,) m, centre of the volume in the body's frame.
+    """
     size = np.zeros(3)
     size[: len(volume.size)] = volume.size
     size[slice(None) if volume.kind == "box" else slice(1, None)] /= 2.0  # MuJoCo has half lengths

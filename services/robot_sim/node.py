@@ -34,14 +34,17 @@ MAX_PAUSE = 600.0  # s after which a pause ends by itself
 
 
 class Pause(Struct, frozen=True):
-    """A pause of the robot's time."""
+    """A pause of the robot's time. `by`: name of the process that has requested the pause.
+
+    `until`: time at which the pause ends by itself.
+    """
 
     by: str
     until: float  # monotonic clock
 
 
 class Node:
-    """The simulated robot as a service."""
+    """robot_sim as a service: makes the ticks, and connects gates, physics and encoders with the bus."""
 
     def __init__(self, service: Service, config: Config, robot: Robot, backend: Backend) -> None:
         self._service, self._config, self._robot, self._backend = service, config, robot, backend

@@ -35,7 +35,7 @@ from services.robot_sim.renderer_imperfect import ImperfectCameras, Stamp
 
 
 class RendererNode:
-    """Mirrors the state streams and draws the pictures of all cameras at one posture."""
+    """Follows the state of the robot and its objects on the bus, and draws the pictures of all cameras at the same posture."""
 
     def __init__(self, service: Service, config: RendererConfig, robot: Robot) -> None:
         self._service = service

@@ -25,9 +25,9 @@ FARTHEST = 0.03  # s between two messages of the truth, between which postures a
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamp:
-    """The time `t` [s] of an exposure by the camera's clock, and the encoders then: `q` (n,) rad and `dq` (n,) rad/s.
+    """The time `t` [s] of an exposure by the camera's clock, and the encoder values at that time: `q` (n,) rad and `dq` (n,) rad/s.
 
-    `readings`: the number of readings of each encoder in them.
+    `readings`: number of readings of each encoder from which `q` and `dq` were computed.
     """
 
     t: float
@@ -37,7 +37,7 @@ class Stamp:
 
 
 class ImperfectCameras:
-    """Follows truth and encoders on the bus, and exposes pictures in the recent past."""
+    """Follows the simulator's true posture and the encoders on the bus, and draws pictures of moments in the recent past."""
 
     def __init__(
         self,
@@ -50,7 +50,11 @@ class ImperfectCameras:
         on_truth: Callable[[], None],
         on_encoders: Callable[[], None],
     ) -> None:
-        """`seed`: of the noise in stamps and pictures.  `on_truth`, `on_encoders`: called when these are known until a later time."""
+        """Subscribe to the truth and the ticks.
+
+        `seed`: of the noise in stamps and pictures. `on_truth`, `on_encoders`: called after each new message with the truth, or with the
+        encoders.
+        """
         self.settings, self.errors = settings, errors
         self._scene, self._bus = scene, service.bus
         self._on_truth, self._on_encoders = on_truth, on_encoders
@@ -64,31 +68,40 @@ class ImperfectCameras:
         service.on_each(Tick, self._note_tick)
 
     def forget(self) -> None:
-        """Drop what was before, at the start of a new run."""
+        """Drop all postures and encoder values; call this at the start of a new run."""
         self._truths.clear()
         self._readings.forget()
         self._ticked = 0.0
 
     @property
     def exposed(self) -> int:
-        """The time of the newest exposure that can be drawn, ns: the truth is known until its end."""
+        """The middle of the newest exposure that can be drawn, ns of the bus clock; 0 if there is none.
+
+        An exposure can be drawn when the truth is known until its end.
+        """
         return round(1e9 * (self._truths[-1][0] - 0.5 * self.settings.exposure)) if self._truths else 0
 
     @property
     def arrived(self) -> int:
-        """The time of the newest exposure whose pictures have come out of the camera, ns."""
+        """The time, ns of the bus clock, of the newest exposure whose pictures have left the camera after its latency."""
         return round(1e9 * (self._ticked - self.settings.latency - self.errors.latency))
 
     def postures(self, t: float) -> list[Array]:
-        """Return the true postures in the exposure whose middle is at time t [s]; raises InvalidValue if the truth is missing around it."""
+        """Return the true postures (n,) rad at several moments of the exposure whose middle is at the time t [s].
+
+        Raises InvalidValue if the truth around that time is not known.
+        """
         return [self._true_at(t + moment) for moment in self._cameras.moments]
 
     def draw(self, name: str, postures: list[Array]) -> Picture:
-        """Return the picture of a camera, of an exposure with these postures."""
+        """Return the picture of the camera `name` for an exposure; `postures`: the true postures in it, as `postures` returns them."""
         return self._cameras.expose(name, postures)
 
     def stamp(self, t: float) -> Stamp:
-        """Return the stamp of the exposure at time t [s]; raises InvalidValue if readings of the encoders are missing around it."""
+        """Return the stamp of the exposure at the true time t [s], with the constant error and the jitter of the camera's clock.
+
+        Raises InvalidValue if readings of the encoders around that time are missing.
+        """
         stamp = t + self.errors.latency + self.settings.jitter * float(self._rng.standard_normal())
         return Stamp(stamp, *self._readings.at(stamp))
 

@@ -24,17 +24,17 @@ DRAWN_TICKS = 256  # ticks whose jitter is drawn at once
 
 
 class Phases:
-    """The times within each tick at which the parts are sampled: a fixed phase for each part plus jitter, both drawn from a seed."""
+    """The times within each tick at which the parts are sampled: a fixed phase for each part plus jitter; both are drawn with a seed."""
 
     def __init__(self, parts: Sequence[str], jitter: float, seed: int) -> None:
-        """`jitter`: standard deviation, share of a tick."""
+        """`jitter`: standard deviation of the jitter, as a share of a tick."""
         self._parts, self._jitter = tuple(parts), jitter
         self._rng = np.random.default_rng([seed, 0x706861])
         self._phases = self._rng.uniform(0.0, PHASE_RANGE, len(parts))
         self._drawn: Iterator[list[float]] = iter(())
 
     def next(self) -> list[tuple[float, str]]:
-        """Return (share of the tick, part) of each part for one tick, in order of time; every share lies in 0..1."""
+        """Return a pair for each part, sorted by time: the share of the next tick (0 to 1) after which it is sampled, and its name."""
         times = next(self._drawn, None)
         if times is None:
             jitter = self._jitter * self._rng.standard_normal((DRAWN_TICKS, len(self._parts)))
@@ -44,7 +44,7 @@ class Phases:
 
 
 def part_meta(robot: Robot, part: str) -> PartMeta:
-    """Return the part's motors and their limits."""
+    """Return the part's motors and their limits, as the reply to the call `{part}/meta`."""
     limits = Limits.of(robot, part)
     return PartMeta(
         v=VERSION,
@@ -61,7 +61,7 @@ def part_meta(robot: Robot, part: str) -> PartMeta:
 
 
 class Sensors:
-    """The newest sample of every part, and the streams that publish it."""
+    """The newest sample of every part, and the streams `tick` and `{part}/state` that publish the samples."""
 
     def __init__(self, bus: Bus, robot: Robot, dt: float) -> None:
         self._bus, self._dt = bus, dt
@@ -74,21 +74,25 @@ class Sensors:
         self.reset()
 
     def reset(self) -> None:
-        """Start a new run."""
+        """Drop all samples and the hash; call this at the start of a new run."""
         self._hash = hashlib.sha256()
         self._statuses: dict[str, PartStatus] = {}
 
     @property
     def hash(self) -> str:
-        """SHA-256 over q, dq, mode and gate of every part at every tick from 1 on, in lockstep."""
+        """SHA-256, in lockstep, over q, dq, mode and gate of every part at every tick from 1 on."""
         return self._hash.hexdigest()
 
     def begin(self, motors: Motors) -> None:
-        """Store positions and velocities at the start of the tick."""
+        """Store the motors' positions and velocities at the start of the tick; `sample` interpolates between these and those at its end."""
         self._q_before, self._dq_before = motors.q, motors.motor_velocities
 
     def sample(self, shares: Sequence[tuple[float, str]], motors: Motors, gates: Mapping[str, Gate]) -> None:
-        """Read parts as they are after their shares of the tick, with encoder noise; velocity from the motor side."""
+        """Read parts at their times in this tick, by interpolation between its start (`begin`) and its end, with encoder noise.
+
+        `shares`: pairs of the share of the tick (0 to 1) and the part. Velocities are those of the motors. Each sample is published on
+        `{part}/state`.
+        """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
         noise = motors.encoders(self._bus.k, self._dt) - q
 
@@ -109,7 +113,10 @@ class Sensors:
             self._report(part, self._bus.t + round(share * self._dt * 1e9), gates[part])
 
     def sample_now(self, motors: Motors, gates: Mapping[str, Gate]) -> None:
-        """Read all parts as they are now, at the beginning of the tick; tick 0, in which nothing moves, is read without noise."""
+        """Read all parts as they are now, at the beginning of the tick, and publish the samples on `{part}/state`.
+
+        Tick 0, in which nothing moves, is read without noise.
+        """
         k = self._bus.k
         self._q = motors.encoders(k, self._dt) if k else motors.q
         self._dq, self._tau = motors.motor_velocities, motors.efforts
@@ -117,7 +124,10 @@ class Sensors:
             self._report(part, self._bus.t, gate)
 
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
-        """Publish the start of the tick, once every part has been read."""
+        """Publish the start of the tick (`Tick`), if every part has been read.
+
+        `mode`: as in `Clock`. `dt`: the tick, ns. `rate`: simulated seconds per second of real time.
+        """
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)
 

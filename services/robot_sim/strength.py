@@ -12,9 +12,10 @@ from mobee.robot.robot import Robot
 
 
 def with_torques(robot: Robot, torques: Mapping[str, float]) -> Robot:
-    """Return the robot with other largest torques [N m], by pattern of motor names; the first pattern that matches counts.
+    """Return the robot with other largest torques of its motors.
 
-    Raises UnknownName for a pattern that matches no motor.
+    `torques`: torque [N m] by pattern of motor names, such as "?_thumb_*"; the first pattern that matches a motor counts. Raises
+    UnknownName for a pattern that matches no motor.
     """
     for pattern in torques:
         if not any(fnmatchcase(name, pattern) for name in robot.motors):

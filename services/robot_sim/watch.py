@@ -29,7 +29,7 @@ REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 @dataclass(slots=True)
 class Stops:
-    """Statistics of the stops of held parts: the stop in progress of each part, and the largest time and distance of ended stops."""
+    """Statistics of how parts come to rest in hold: the stops in progress, and the largest time and distance of ended stops."""
 
     count: int = 0
     time_max: float = 0.0  # s
@@ -42,7 +42,7 @@ class Stops:
         Args:
             part: the part.
             now: time, ns.
-            q: measured position (n,) rad; the array is kept, so the caller must not change it afterwards.
+            q: measured positions of the part's motors, (n_part,) rad; the array is kept, so the caller must not change it afterwards.
             moves: whether the part moves; if it rests, its record is removed.
         """
         if moves:
@@ -51,7 +51,11 @@ class Stops:
             self._commanded.pop(part, None)
 
     def note_hold(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
-        """Return time [s] and distance [rad] since the last command if the part has just come to rest; else None."""
+        """Record that the part is in hold; if it has just come to rest, return time [s] and distance [rad] since its last command.
+
+        Otherwise return None. `now`: time, ns. `q`: measured positions of the part's motors, (n_part,) rad. `moves`: whether the part still
+        moves. The distance is the largest one of the part's motors.
+        """
         if moves or part not in self._commanded:
             return None
         start, q_start = self._commanded.pop(part)
@@ -61,12 +65,12 @@ class Stops:
         return time, distance
 
     def forget(self) -> None:
-        """Discard the commands of the last run, when a new one begins."""
+        """Drop the recorded commands; call this when a new run begins."""
         self._commanded.clear()
 
 
 class Counters:
-    """Counts of one measurement; the age of a tick is that of its oldest command."""
+    """The counts of one measurement."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -82,7 +86,7 @@ class Counters:
         self.tick_time = Percentiles()  # ms, gate to end of physics
 
     def count_gates(self, gates: Iterable[Gate]) -> None:
-        """Count ages and holds, once per tick."""
+        """Count the tick, the age of its oldest command, and whether all owned parts follow commands or one holds; once per tick."""
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
         ages = [gate.age for gate in owned if gate.mode != "hold"]  # a commanded hold counts as a hold
@@ -94,19 +98,19 @@ class Counters:
             self.armed_ticks += 1
 
     def count_contact(self, contact: SolidContact) -> None:
-        """Count the deepest contact, once per tick."""
+        """Count a tick with a solid contact, and keep the deepest one; `contact`: the deepest contact of the tick."""
         if contact.depth > 0.0:
             self.solid_ticks += 1
         if contact.depth > self.deepest.depth:
             self.deepest = contact
 
     def count_gap(self, gap: float) -> None:
-        """Note a measured gap, m."""
+        """Keep the smallest measured gap [m], the distance of hands and forearms from the obstacles; a negative gap was not measured."""
         if gap >= 0.0 and (gap < self.gap_min or self.gap_min < 0.0):
             self.gap_min = gap
 
     def age_at(self, percent: float) -> float:
-        """Return a percentile of the age in ticks, -1 before the first command."""
+        """Return a percentile (0 to 100) of the age of commands, in ticks; -1 before the first command."""
         total, seen = sum(self.ages.values()), 0
         for age in sorted(self.ages):
             seen += self.ages[age]
@@ -115,7 +119,10 @@ class Counters:
         return -1.0
 
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
-        """Return the counts for `stat`; `missed`: ticks skipped since the start of the process."""
+        """Return the counts for `stat`, by name. `missed`: number of ticks skipped since the start of the process.
+
+        `pairs_watched`: number of pairs that the back-end tests for contact.
+        """
         return {
             "ticks": self.ticks,
             "missed_ticks": missed - self.missed_before,
@@ -144,13 +151,13 @@ CONTACTS = "contacts.csv"  # tick, pair, depth [m]; nothing for a tick without c
 
 
 class Recorded:
-    """A back-end that keeps the joint positions, without noise, and the solid contacts of every tick.
+    """A back-end that also writes the true joint positions and the solid contacts of every tick into files.
 
-    Both files begin anew with every run; written data are in them even when the process is killed.
+    Both files begin anew with every run. Written data are in the files even if the process is killed.
     """
 
     def __init__(self, inner: Backend, folder: Path) -> None:
-        """Open the files; raises InvalidValue for a folder that cannot be written."""
+        """Open the files in `folder`; raises InvalidValue for a folder that cannot be written. `inner`: the back-end that is recorded."""
         self._inner = inner
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -180,24 +187,24 @@ class Recorded:
             self._contacts.write(f"{self._k},{pair},{depth:.6g}\n")
 
     def reset(self, seed: int) -> None:
-        """Reset the recorded back-end, and empty the records."""
+        """Reset the recorded back-end as `Backend.reset` does, and empty the files."""
         self._inner.reset(seed)
         self._begin()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Put a world object of the recorded back-end at a position, m; raises MobeeError."""
+        """Move a world object of the recorded back-end to a position (x, y, z) m, root frame; raises MobeeError."""
         self._inner.place(name, position)
 
     def contact(self) -> SolidContact:
-        """Return the deepest solid contact of the last tick."""
+        """Return the deepest solid contact of the last tick; its depth is 0 if there was none."""
         return self._inner.contact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the depths of the solid contacts of the last tick, m, by pair."""
+        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
         return self._inner.contacts()
 
     def gap(self) -> float:
-        """Return the closest distance of hands and forearms to the obstacles, m; -1 if it is not measured."""
+        """Return the smallest distance of hands and forearms from the obstacles, m; -1 if it is not measured."""
         return self._inner.gap()
 
     def _begin(self) -> None:
@@ -212,10 +219,10 @@ NOT_FINITE = 1  # fault bit
 
 
 class Watch:
-    """Counts gate states, contacts and stops in every tick, and publishes the true state of the simulated robot."""
+    """Counts gate states, contacts and stops in every tick, and publishes the true state of the simulated robot (`sim/truth`)."""
 
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
-        """`truth_period`: ticks between two messages of the truth."""
+        """`truth_period`: number of ticks between two messages of the truth."""
         self._bus, self._robot, self._backend, self._guard = bus, robot, backend, guard
         self._truth = bus.publisher(Truth)
         self._truth_period = truth_period
@@ -223,16 +230,19 @@ class Watch:
         self.counters = Counters()
 
     def mark(self, missed: int) -> None:
-        """Begin a measurement; `missed`: ticks skipped until now."""
+        """Begin a measurement, with all counts at 0; `missed`: number of ticks skipped since the start of the process."""
         self.counters = Counters()
         self.counters.missed_before = missed
 
     def reset(self) -> None:
-        """Start a new run."""
+        """Drop what belongs to the last run; call this at the start of a new run."""
         self.counters.stops.forget()
 
     def measure(self) -> None:
-        """Count gates and contacts, once per tick, after the physics."""
+        """Count gates, contacts and stops; call this once per tick, after the physics.
+
+        If the physics gives positions that are not finite, all gates enter the state fault.
+        """
         gates = self._guard.gates
         self.counters.count_gates(gates.values())
         contact = self._backend.contact()
@@ -259,7 +269,7 @@ class Watch:
                 self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
 
     def publish_truth(self) -> None:
-        """Publish the truth, if it is due in this tick and has a subscriber."""
+        """Publish the true state if it is due in this tick and there is a subscriber."""
         if self._bus.k % self._truth_period:
             return
         gap = self._backend.gap()

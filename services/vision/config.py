@@ -18,20 +18,24 @@ from services.common.worlds import world_around
 
 
 class Config(CameraConfig, frozen=True, kw_only=True):
-    """The locator's settings; it uses the first two cameras, and looks for what the targets of the world look like, wherever they are."""
+    """The settings of the locator.
+
+    It uses the first two cameras, and looks for what the targets of the world look like, wherever they are.
+    """
 
     world: str = ""
     """Shipped world, path to a world file, or none; empty: the table for the shipped iCubs, none for every other robot."""
     detector: str = "color"
-    """What finds things in a picture: color, a file of `mobee detector train`, or module:name of a function that returns a detector."""
+    """What finds things in a picture: color (their colours), a file of `mobee detector train`, or module:name of a function that returns a
+    detector."""
     most: Annotated[int, Meta(ge=1, le=100)] = 1
-    """Objects of each thing that get a name: NAME, NAME_2, ..."""
+    """Largest number of objects of each thing that get a name: NAME, NAME_2, ..."""
     calibration: str = ""
-    """File of `mobee calibrate`; empty: cameras and encoders are as the model has them."""
+    """File of `mobee calibrate`; empty: cameras and encoders are assumed to have no errors."""
     encoder_noise: Annotated[float, Meta(ge=0, le=0.1)] = 0.0025
-    """Standard deviation of one reading of an encoder, in rad, on which the covariance of a position depends."""
+    """Standard deviation of one reading of an encoder, in rad. The covariance of a position depends on it."""
     valid_for: Annotated[float, Meta(gt=0, le=60)] = 5.0
-    """Time for which a position may be used after the picture was taken, in s of simulated time."""
+    """Time after a picture for which the position in it may be used, in s of simulated time."""
     max_age: Annotated[float, Meta(gt=0, le=10)] = 0.3
     """Largest age of a picture at its arrival, in s of simulated time; older ones are not used."""
     blind_after: Annotated[float, Meta(gt=0, le=60)] = 1.0
@@ -42,7 +46,10 @@ class Config(CameraConfig, frozen=True, kw_only=True):
         return world_around(self.world, self.robot)
 
     def things(self) -> list[Thing]:
-        """Return what is looked for; raises InvalidValue if there is nothing, and the errors of the world's file."""
+        """Return the things to look for: the coloured targets of the world.
+
+        Raises InvalidValue if there is none, and the errors of the world's file.
+        """
         found = things_in(self.load_world())
         if not found:
             raise InvalidValue(
@@ -52,7 +59,10 @@ class Config(CameraConfig, frozen=True, kw_only=True):
         return found
 
     def check_robot(self, robot: Robot) -> None:
-        """Check also that the robot has two cameras, and that there is something to look for; raises MobeeError."""
+        """Check the robot as every service does, that it has two cameras, and that there is something to look for; raises MobeeError.
+
+        The detector and the calibration must be usable too.
+        """
         super().check_robot(robot)
         require_cameras(robot, self.cameras_on(robot), STEREO)
         require_detector(self.detector, self.things())

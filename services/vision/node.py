@@ -35,7 +35,10 @@ DIGITS = 3  # of published sizes, m: the model need not make a new shape in each
 
 
 class VisionNode:
-    """Locates things when both pictures and both cameras of a tick are there; reads no other stream of the robot."""
+    """Locates things in the pictures of two cameras, when both pictures and both camera messages of a tick have arrived.
+
+    It reads no other stream of the robot.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config = service, config

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Films of runs: the frames, drawn as the page shows them, and the files."""
+"""Makes films of runs: draws the frames in the style of the page, and writes the files."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A short film of a run: the robot with the places that it wonders about, and the story of its agents."""
+"""Makes a short film of a run: the robot, the hand positions of its agents' states, and the story of the agents."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ COLORS = 64  # of a GIF
 
 
 def film(run: Path, file: Path, progress: Callable[[float], None] = lambda share: None) -> Path:
-    """Write the film of a run's folder as .gif or .mp4; `progress` is called with the share that is done.
+    """Write a film of a run as .gif or .mp4 and return `file`.
 
-    Raises MobeeError if the run has no record, InvalidValue for another ending of the file's name, NotInstalled without the packages.
+    `run`: folder of the run. `progress` is called with the share of the frames that are finished, 0 to 1. Raises MobeeError if the run has
+    no record of a monitor, InvalidValue for another file suffix, NotInstalled if a package for films is missing.
     """
     if file.suffix not in (".gif", ".mp4"):
         raise InvalidValue(f"{file}: a film is a .gif or a .mp4: give a name with one of these endings.")
@@ -44,7 +45,10 @@ def film(run: Path, file: Path, progress: Callable[[float], None] = lambda share
 
 
 def scene_times(length: float) -> list[float]:
-    """Return the moments of the frames, s since the begin of a run of that length [s]: SCENES stretches, evenly apart."""
+    """Return the times of the film's frames, s since the begin of a run that lasts `length` s.
+
+    The film shows SCENES (4) stretches of the run, evenly spaced from its begin to its end.
+    """
     frames = round(LENGTH * RATE / SCENES)
     stretch = min(frames * SPEED / RATE, length / SCENES)
     begins = np.linspace(0.0, max(0.0, length - stretch), SCENES)
@@ -52,7 +56,10 @@ def scene_times(length: float) -> list[float]:
 
 
 def first_complete_moment(story: Story) -> float:
-    """Return when all agents have begun to act and the world is known, s since the beginning; 0 if that is later than a tenth of it."""
+    """Return the first time [s since the begin] at which all agents act and the objects of the world are known.
+
+    Returns 0 if this is later than a tenth of the record's length.
+    """
     cards, objects = story.tracks.get("cards"), story.tracks.get("objects")
     if cards is None:
         return 0.0
@@ -64,10 +71,10 @@ def first_complete_moment(story: Story) -> float:
 
 
 class Artist:
-    """Draws the frames of a story."""
+    """Draws the frames of a film from the record of a run."""
 
     def __init__(self, story: Story, seen: Sequence[float]) -> None:
-        """`seen`: moments, s since the begin, at which the camera must see the whole robot."""
+        """Prepare the drawing; `seen`: times [s since the begin] at which the camera must see the whole robot."""
         first = story.at(0.0) | story.at(story.length)
         self._story, self._name = story, story.robot.name
         self._colors: dict[str, Color] = {one["name"]: tuple(one["color"]) for one in first.get("robot", {}).get("parts", [])}
@@ -76,7 +83,7 @@ class Artist:
         self._told = StoryView(self._colors, self._fonts)
 
     def frame(self, moment: float) -> Any:
-        """Return the frame at a moment, s since the begin of the run, as an image."""
+        """Return the frame at the time `moment` [s since the begin of the run] as a Pillow image."""
         from PIL import Image, ImageDraw
 
         values = self._values(moment)

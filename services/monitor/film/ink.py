@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colours, fonts and marks of a film, as those of the page (web/files/page.css)."""
+"""The colours, fonts and marks of a film. They match those of the page (web/files/page.css)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ OTHERS = (124, 138, 153)  # colour of the curve of random exploration
 
 @dataclass(frozen=True)
 class Fonts:
-    """The fonts: of titles, of what an agent tries, of text, and of remarks."""
+    """The Pillow fonts of a film.
+
+    `title`: for titles. `strong`: for the action that an agent tries. `text`: for other text. `small`: for remarks.
+    """
 
     title: Any
     strong: Any
@@ -29,7 +32,7 @@ class Fonts:
 
 
 def fonts() -> Fonts:
-    """Return the fonts, which Matplotlib brings; raises NotInstalled."""
+    """Return the fonts of a film, loaded from the font files of Matplotlib. Raises NotInstalled if Matplotlib or Pillow is missing."""
     try:
         from matplotlib import get_data_path
         from PIL import ImageFont
@@ -41,21 +44,27 @@ def fonts() -> Fonts:
 
 
 def mixed(first: Color, second: Color, share: float) -> Color:
-    """Return a colour between two; `share`: of the second, 0 to 1."""
+    """Return a mixture of two colours (red, green, blue; 0 to 255). `share`: weight of `second`, 0 to 1."""
     red, green, blue = (round((1.0 - share) * a + share * b) for a, b in zip(first, second, strict=True))
     return red, green, blue
 
 
 def dot(ink: Any, at: tuple[float, float], radius: float, fill: Color | None, rim: Color | None = None, width: int = 1) -> None:
-    """Draw a disc with a rim; either may be missing."""
+    """Draw a disc at the pixel `at` (x, y) with a radius in pixels.
+
+    `ink`: drawing context of Pillow (ImageDraw). `fill`: colour of the disc; None: not filled. `rim`: colour of the outline, `width` pixels
+    wide; None: no outline.
+    """
     x, y = at
     ink.ellipse((x - radius, y - radius, x + radius, y + radius), fill=fill, outline=rim, width=width if rim else 0)
 
 
 def write(ink: Any, x: float, y: float, runs: Sequence[tuple[str, Any, Color]], width: float, rows: int, height: float) -> float:
-    """Write runs of (text, font, colour) one after the other, broken at blanks into at most `rows` lines of a width.
+    """Write text from the pixel (x, y), with line breaks at blanks, and return the y below the last line.
 
-    `height`: of a line, in pixels.  The last line ends with … if there is more text.  Returns the y below the last line.
+    `ink`: drawing context of Pillow (ImageDraw). `runs`: pieces of text as (text, font, colour), written one after the other. `width`:
+    width of a line [pixels]. `rows`: largest number of lines; text that does not fit is replaced by an ellipsis. `height`: height of a line
+    [pixels].
     """
     blank = runs[0][1].getlength(" ")
     at, row = 0.0, 0

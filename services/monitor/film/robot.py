@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in a film: in its world, with the places of its hands by what is left to learn there, and where its actions lead."""
+"""The picture of the robot in a film: robot, world, the hand's position in each state of an agent, and the agent's plan."""
 
 from __future__ import annotations
 
@@ -33,16 +33,23 @@ FIRST_VIEW, OTHER_VIEW = (-32.0, 22.0), (148.0, 22.0)  # azimuth, elevation [deg
 
 
 class RobotView:
-    """Draws the robot of a run; the camera stands still."""
+    """Draws the robot of a run, seen by a camera that does not move."""
 
     def __init__(self, robot: Robot, colors: Mapping[str, Color], size: tuple[int, int], moments: Sequence[dict[str, Any]]) -> None:
-        """`colors`: of the parts.  `size`: width and height of the pictures, in pixels.  `moments`: of the story, for the camera."""
+        """Choose the camera.
+
+        `colors`: colour of each part. `size`: width and height of the pictures [pixels]. `moments`: recorded values at some times, as of
+        `services.monitor.past.Story.at`, with the pose q; the camera shows the robot at nearly all of them.
+        """
         self._robot, self._colors = robot, colors
         self._model = Model(robot, World())
         self._camera = self._framed(moments, size)
 
     def picture(self, values: dict[str, Any]) -> Any:
-        """Return the picture of the robot at a moment of a story, see Story.at."""
+        """Return the picture of the robot as a Pillow image.
+
+        `values`: the recorded values at one time, as of `services.monitor.past.Story.at`, and `q`, the pose (n,) rad.
+        """
         from PIL import Image, ImageDraw
 
         pose, scene = self._scene(values)
@@ -109,7 +116,10 @@ class RobotView:
 
 
 def moved(transforms: Array, where: dict[str, Any]) -> Array:
-    """Return the points (N, 3) m of places, which move with a link, in the root frame; `transforms`: (L, 4, 4)."""
+    """Return points that are fixed to a link, (N, 3) m, in the root frame.
+
+    `transforms`: poses of all links in the root frame, (L, 4, 4). `where`: {"link": index of the link, "points": (N, 3) m in its frame}.
+    """
     link, points = transforms[where["link"]], np.array(where["points"])
     found: Array = points @ link[:3, :3].T + link[:3, 3]
     return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The story in a film: a card for each agent, and the curves of what they know."""
+"""The text of a film: a card for each agent, and curves of how many of its actions each agent has tried."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ LEAST_KNOWN = 0.05  # share at the top of the curves' axis, at least
 
 
 class StoryView:
-    """Writes the stories of at most MOST agents."""
+    """Draws the cards and the curves of at most MOST (3) agents."""
 
     def __init__(self, colors: Mapping[str, Color], fonts: Fonts) -> None:
-        """`colors`: of the parts."""
+        """Create the view; `colors`: colour of each part."""
         self._colors, self._fonts = colors, fonts
 
     def draw(self, ink: Any, values: dict[str, Any], box: tuple[int, int, int, int]) -> None:
-        """Draw cards and curves into a box: left, top, right, bottom."""
+        """Draw the cards and the curves.
+
+        `ink`: drawing context of Pillow. `values`: recorded values at one time, as of `services.monitor.past.Story.at`. `box`: left, top,
+        right and bottom [pixels].
+        """
         left, top, right, bottom = box
         cards = values.get("cards", [])[:MOST]
         for card in cards:
@@ -93,7 +97,7 @@ def _surprise(last: dict[str, Any]) -> str:
 
 
 def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
-    """Write what the film shows, and the robot's time, s since the begin of the run."""
+    """Write the title of the film with the robot's `name`, and the robot's time `moment` [s since the begin of the run]."""
     ink.text((12, 8), f"MoBeE: {name}", font=fonts.title, fill=TEXT)
     minutes, seconds = divmod(round(moment), 60)
     if minutes >= 60:
@@ -104,7 +108,7 @@ def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
 
 
 def remarks(ink: Any, below: int, fonts: Fonts) -> None:
-    """Explain the marks beside the robot; `below`: the last row of pixels."""
+    """Write the text that explains the marks beside the robot; `below`: y of the last row of pixels."""
     top, long = below - 14 * len(REMARKS) - 10, max(fonts.small.getlength(text) for text in REMARKS)
     ink.rounded_rectangle((6, top, 18 + long, below - 4), 5, fill=GROUND)
     for row, text in enumerate(REMARKS):

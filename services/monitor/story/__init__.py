@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Describes the actions, expectations and knowledge of the agents, in words and numbers for users."""
+"""Describes the actions, expectations and knowledge of the agents in words and numbers for users."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates random and least-tried exploration with the outcomes that an agent has learned, to compare it with them."""
+"""Simulates random and least-tried exploration with the outcomes that an agent has learned, to compare these explorers with it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,25 @@ LONGEST = 10_000  # transitions that are simulated: 0.4 s of a core
 SEED = 0
 
 Curve = list[tuple[int, float, float]]
-"""Points of a curve: number of transitions, share of the state-actions that were tried, and share that are predictable."""
+"""A learning curve, as points (number of transitions, share of the state-actions that were tried, share that are predictable)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """The outcomes of all state-actions: states (S, A, B), and their cumulative probabilities (S, A, B)."""
+    """The possible outcomes of all state-actions.
+
+    `states`: up to B next states of each state-action, (S, A, B). `cumulative`: their cumulative probabilities along the last axis, (S, A,
+    B).
+    """
 
     states: Ints
     cumulative: Array
 
 
 def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
-    """Return the outcomes that an agent has seen, with their shares.
+    """Return the outcomes that an agent has observed in each state-action, with their relative frequencies as probabilities.
 
-    An untried action reaches its goal with the success rate of all the agent's tries; otherwise it stays in its state.
+    A state-action that was never tried reaches its goal with the success rate of all the agent's tries; otherwise it stays in its state.
     """
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
     (count, actions), missed = known.tries.shape, np.zeros(known.tries.shape)
@@ -58,9 +62,10 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
 
 
 def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transitions: int) -> dict[str, Curve]:
-    """Simulate the explorers BASELINES, each from the state `start`; return the curve of each.
+    """Simulate the explorers BASELINES (least_tried and random) and return the learning curve of each, by name.
 
-    `exists`: (S, A), True where a state has an action.
+    `exists`: (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: length of the
+    simulation, at most LONGEST (10 000). Each curve is the mean of 4 simulations.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

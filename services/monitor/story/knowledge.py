@@ -17,9 +17,11 @@ from mobee.learning.space import Space
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Numbers of all state-actions of an agent, (S, A): tries, last information gain [nats], value, and where a state has an action.
+    """What an agent knows about its state-actions, as arrays (S, A): S states with at most A actions each.
 
-    `usual`: share of its most frequent outcome.  `n`: transitions.  `state`: where the agent is.
+    `exists`: whether the state has the action. `tries`: number of tries. `reward`: information gain of the last try [nats]. `value`: action
+    value, -inf where there is no action. `usual`: share of the most frequent outcome. `n`: number of transitions that the agent has
+    observed. `state`: the agent's present state.
     """
 
     exists: NDArray[np.bool_]
@@ -32,31 +34,31 @@ class Knowledge:
 
     @property
     def tried(self) -> float:
-        """Share of the state-actions that were tried."""
+        """The share of the state-actions that were tried, 0 to 1."""
         return float((self.tries > 0)[self.exists].mean())
 
     @property
     def predictable(self) -> float:
-        """Share of the state-actions that were tried at least twice and ended alike in at least 80 % of the tries."""
+        """The share of the predictable state-actions: tried at least twice, with the same outcome in at least 80 % of the tries."""
         return float(((self.tries >= PREDICTABLE_TRIES) & (self.usual >= PREDICTABLE_SHARE))[self.exists].mean())
 
     def left(self, first: float) -> Array:
-        """Return how much can still be learned in each state, (S,) in 0..1.
+        """Return how much can still be learned in each state, (S,), 0 to 1.
 
-        It is the mean information gain of the state's actions, divided by the gain `first` of a first try.
+        It is the mean information gain of the state's actions, divided by `first`, the gain of a first try [nats].
         """
         gain = np.where(self.exists, self.reward, 0.0).sum(axis=1) / np.maximum(self.exists.sum(axis=1), 1)
         left: Array = np.clip(gain / max(first, 1e-12), 0.0, 1.0)
         return left
 
     def untried(self) -> Ints:
-        """Return how many actions of each state were never tried, (S,)."""
+        """Return, for each state, how many of its actions were never tried, (S,)."""
         found: Ints = ((self.tries == 0) & self.exists).sum(axis=1)
         return found
 
 
 def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:
-    """Return the knowledge in a message; None if its numbers do not fit the space."""
+    """Return the knowledge that a `Learned` message contains; None if its arrays do not have the size of the space."""
     shape = space.goals.shape
     found = numbers_of(learned, shape)
     if found is None or learned.s >= shape[0]:
@@ -74,7 +76,10 @@ def knowledge_of(learned: Learned, space: Space) -> Knowledge | None:
 
 
 def numbers_of(learned: Learned, shape: tuple[int, ...]) -> tuple[Array, Array, Array] | None:
-    """Return tries, rewards and values of a message, each of a shape (S, A); None if it has other numbers of them."""
+    """Decode the tries, rewards and action values of a `Learned` message as three arrays of the given shape (S, A).
+
+    Returns None if the message has another number of values.
+    """
     columns = ((learned.tries, "<u4"), (learned.reward, "<f4"), (learned.value, "<f4"))
     if any(len(data) != 4 * int(np.prod(shape)) for data, _ in columns):
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the hand of a part is in each state of an agent's space."""
+"""Computes the position of a part's hand in each state of an agent's space."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_STATES = 4096  # more places could not be distinguished
 
 
 def space_of(settings: str, robot: Robot) -> Space | None:
-    """Return the space of a `Learned` message; None if this robot cannot make it."""
+    """Rebuild the space of an agent from the JSON text in a `Learned` message; None if the settings are not valid for this robot."""
     try:
         return space_from(json.loads(settings), robot)
     except (MobeeError, ValueError, TypeError, RecursionError):  # of another robot or version: its numbers cannot be placed
@@ -30,7 +30,10 @@ def space_of(settings: str, robot: Robot) -> Space | None:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A point on a link that shows where a part is: `position` (3,) m, in the root frame with every joint at zero."""
+    """A point on a link by which a part is shown, such as the palm of an arm.
+
+    `link`: index of the link. `position`: (3,) m, in the root frame with every joint at zero.
+    """
 
     name: str
     link: int
@@ -38,9 +41,10 @@ class Spot:
 
 
 def shown_spot(robot: Robot, part: str) -> Spot | None:
-    """Return the marker with the fewest motors of other parts before it, among equals the farthest; without markers, the last link.
+    """Return the point by which a part is shown, such as an arm's palm or the head of a torso; None if the part moves no link.
 
-    That is an arm's palm, and a torso's head; None if the part moves no link.
+    Among the markers that the part moves, the one is chosen that the fewest motors of other parts move; among equals, the one that the most
+    motors move. If the part moves no marker, the link is chosen in the same manner.
     """
 
     def rank(link: int) -> tuple[int, int]:
@@ -58,15 +62,15 @@ def shown_spot(robot: Robot, part: str) -> Spot | None:
 
 
 def base_link(robot: Robot, part: str) -> int:
-    """Return the link that a part is mounted on."""
+    """Return the index of the link on which a part is mounted: the parent of its first joint, 0 (root) if it has none."""
     first = {index for motor in robot.motor_table if motor.part == part for index, _, _ in motor.joints}
     return min((robot.joints[index].parent for index in first), default=0)
 
 
 def places(space: Space, spot: Spot, q: Array) -> Array:
-    """Return the position of `spot`, a point on a link, in each state: (S, 3) m, in the frame of the link on which the part is mounted.
+    """Return the position of `spot` in each state, (S, 3) m, in the frame of the link on which the part is mounted.
 
-    `q`: (n,) rad, posture of the other parts.
+    `q`: posture of the whole robot, (n,) rad; the part's own motors are set to the sample of each state.
     """
     robot, part = space.robot, space.robot.part(space.part)
     base, pose = base_link(robot, space.part), q.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sentences of an agent's story: its action, its expectation, the outcome, and its aim."""
+"""Builds the sentences of an agent's story: its action, its expectation, the outcome, and its plan."""
 
 from __future__ import annotations
 
@@ -25,13 +25,16 @@ WITHOUT_PLAN = {"random": "it chooses at random", "least_tried": "it chooses wha
 
 
 def tries_sentence(decision: Decision, space: Space, places: Array | None) -> str:
-    """Return a description of the present action: "elbow +32°: its hand goes 12 cm up. 4th try from here."."""
+    """Describe the present action, such as "elbow +32°: its hand goes 12 cm up. 4th try from here.".
+
+    `places`: position of the hand in each state, (S, 3) m; None: the motion of the hand is not described.
+    """
     shift = "" if places is None else displacement(places[decision.goal] - places[decision.s], space.robot.name)
     return f"{action_words(space, decision.s, decision.goal)}{f': {shift}' if shift else ''}. {ordinal(decision.tries + 1)} try from here."
 
 
 def expects_sentence(decision: Decision) -> str:
-    """Return the outcome that the agent expects of the present action."""
+    """Describe the outcome that the agent expects of the present action, with its probability."""
     if decision.tries == 0:
         return f"It cannot know what will happen; it gives getting there {percent(decision.reached)}."
     if decision.expected == decision.goal:
@@ -43,7 +46,7 @@ def expects_sentence(decision: Decision) -> str:
 
 
 def outcome_sentence(seen: Transition) -> str:
-    """Return what happened: "It got there", "It ended against the table and did not get there"."""
+    """Describe the outcome of an action, such as "It got there." or "It ended against the table, not where it wanted."."""
     touched = listed([f"the {name}" for name in seen.touched[:2]]) if seen.touched else ""
     against = f" against {touched}" if touched else ""
     rest = "" if seen.settled else ", still moving when its time was over"
@@ -55,14 +58,18 @@ def outcome_sentence(seen: Transition) -> str:
 
 
 def surprise_sentence(seen: Transition) -> str:
-    """Return how surprised the agent was, and how much it learned."""
+    """Describe how much a transition surprised the agent, and how much the agent learned from it, both in nats."""
     if seen.probability < LEAST_PROBABILITY:
         return f"It had never seen that: surprise over {surprise_of(0.0):.1f} nats, learned {seen.reward:.3f} nats."
     return f"Surprise {surprise_of(seen.probability):.2f} nats, learned {seen.reward:.3f} nats."
 
 
 def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence[int]) -> str:
-    """Return where the agent's plan leads and why; `untried`, `actions`: of each state, how many actions were never tried, and all."""
+    """Describe where the agent's plan leads and why.
+
+    `untried`, `actions`: for each state, the number of its actions that were never tried, and of all its actions. The text is empty if
+    these numbers are not known for the last state of the plan.
+    """
     if decision.explorer in WITHOUT_PLAN:
         return f"nothing in particular: {WITHOUT_PLAN[decision.explorer]}."
     end = decision.plan[-1] if decision.plan else decision.goal
@@ -76,7 +83,7 @@ def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence
 
 
 def reach_sentence(reach: Reach) -> str:
-    """Return the state of a reach."""
+    """Describe the state of a reach: its target, its phase, and the remaining distance in mm."""
     target, left = ("the place" if reach.object == "reach_target" else f"the {reach.object}"), f"{1000 * reach.missing:.0f} mm"
     if reach.phase == "reaching":
         return f"Reaches for {target}: {left} to go."
@@ -88,7 +95,7 @@ def reach_sentence(reach: Reach) -> str:
 
 
 def playback_sentence(seen: Playback) -> str:
-    """Return the state of a motion along a path of a roadmap."""
+    """Describe the state of a motion along the path of a roadmap: its marker, its goal, its phase, and the remaining distance in mm."""
     marker, left = f"the {title_of(seen.marker)}", f"{1000 * seen.missing:.0f} mm"
     where = seen.place.replace(f"{seen.marker} ", "")  # coordinates of a roadmap are named by their marker
     if seen.phase == "interrupted":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collects the story of every agent from its messages, as plain data for the page."""
+"""Collects the stories of all agents from their messages, as plain data for the page."""
 
 from __future__ import annotations
 
@@ -59,10 +59,13 @@ class _Agent:
 
 
 class Teller:
-    """The agents' stories; `changed` holds the names of the values that must be put on the board again."""
+    """The stories of all agents: actions, outcomes, knowledge and reaches.
+
+    `changed`: names of the values that have changed since the last call of `values`.
+    """
 
     def __init__(self, robot: Robot, colors: dict[str, Color]) -> None:
-        """`colors`: of all parts."""
+        """Create empty stories; `colors`: colour of each part of the robot."""
         self._robot, self._colors = robot, colors
         self._agents: dict[str, _Agent] = {}
         self._playback: Playback | None = None
@@ -70,18 +73,18 @@ class Teller:
 
     @property
     def parts(self) -> list[str]:
-        """Parts that an agent moves, or that reach."""
+        """The parts about which something was received: from an agent, or about a reach."""
         return [part for part in self._colors if part in self._agents]
 
     def forget_run(self) -> None:
-        """Discard the actions in progress, at the start of a new run of the robot."""
+        """Discard the actions and motions in progress, because a new run of the robot has begun."""
         for agent in self._agents.values():
             agent.decision = agent.reach = None
         self._playback = None
         self.changed |= {"cards", "path"}
 
     def note_decision(self, seen: Decision) -> None:
-        """Store the action that an agent begins."""
+        """Store the action that an agent has decided on, and now begins."""
         agent = self._agent(seen.agent)
         if agent is not None:
             self._drop_playback()
@@ -89,7 +92,7 @@ class Teller:
             self.changed |= {"cards", "left"}
 
     def note_transition(self, seen: Transition) -> None:
-        """Store the outcome of an action that has ended."""
+        """Store the observed transition of an action that has ended."""
         agent = self._agent(seen.agent)
         if agent is not None:
             agent.last = seen
@@ -99,7 +102,11 @@ class Teller:
             self.changed.add("cards")
 
     def note_learned(self, learned: Learned) -> None:
-        """Store the knowledge that an agent has published."""
+        """Store the knowledge that an agent has published.
+
+        Its learning curve gets a point; the baselines are simulated again if the agent has made 10 % more transitions since the last
+        simulation.
+        """
         agent = self._agent(learned.agent)
         if agent is None:
             return
@@ -120,7 +127,7 @@ class Teller:
         self.changed |= {"cards", "left", "curves"}
 
     def note_reach(self, part: str, reach: Reach) -> None:
-        """Store that a part reaches, or has reached."""
+        """Store the newest message about a reach of a part, in progress or ended."""
         agent = self._agent(part)
         if agent is not None and agent.reach != reach:
             self._drop_playback()
@@ -128,18 +135,18 @@ class Teller:
             self.changed.add("cards")
 
     def note_playback(self, seen: Playback) -> None:
-        """The robot moves along a path of a roadmap, or has moved."""
+        """Store the newest message about a motion along the path of a roadmap, in progress or ended."""
         self._playback = seen
         self.changed.add("path")
 
     def note_gone(self, who: str) -> None:
-        """A process has ended: a motion that it has not ended itself was interrupted."""
+        """Note that the process `who` has ended: if it was moving the robot along a path, this motion counts as interrupted."""
         seen = self._playback
         if seen is not None and seen.src == who and seen.phase == "moving":
             self.note_playback(replace(seen, phase="interrupted"))
 
     def values(self) -> dict[str, Any]:
-        """Return the values that have changed, by name, as plain JSON data."""
+        """Return the values that have changed since the last call, by name, as plain JSON data."""
         made = {name: getattr(self, f"_{name}")() for name in sorted(self.changed)}
         self.changed.clear()
         return made

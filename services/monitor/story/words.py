@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Words for parts, motions and numbers."""
+"""Words for parts, motors, motions and numbers in the sentences of a story."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ SIDES = ("l_", "r_", "left_", "right_")
 
 
 def title_of(name: str) -> str:
-    """Return the name of a part for people: left_arm is "left arm"."""
+    """Return a name as words for users: left_arm becomes "left arm"."""
     return name.replace("_", " ")
 
 
 def joint_words(name: str, part: str, robot: Robot) -> str:
-    """Return the name of a motor without redundant words: l_shoulder_pitch of left_arm is "shoulder pitch", panda_joint1 "joint 1".
+    """Return the name of a motor in words, without redundant ones.
 
-    The words of the part and the side are removed, or the beginning that all motors of the robot share.
+    For example, l_shoulder_pitch of left_arm becomes "shoulder pitch", and panda_joint1 becomes "joint 1". The name of the part, a prefix
+    for the side (such as l_), or else the prefix that all motors of the robot share is removed.
     """
     shared = os.path.commonprefix(robot.motors)
     for prefix in (f"{part}_", *SIDES, shared[: shared.rfind("_") + 1]):
@@ -42,20 +43,21 @@ def joint_words(name: str, part: str, robot: Robot) -> str:
 
 
 def ordinal(n: int) -> str:
-    """Return 1st, 2nd, 3rd, 4th, 11th, ..."""
+    """Return an integer as an ordinal number: 1st, 2nd, 3rd, 4th, 11th, ..."""
     suffix = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
     return f"{n}{suffix}"
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return "a", "a and b", "a, b and c"."""
+    """Join words to a list in a sentence: "a", "a and b", "a, b and c". `words` must not be empty."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def displacement(motion: Array, robot: str) -> str:
-    """Describe how a hand moves by `motion` (3,) m, by its main directions: "12 cm up and forward"; empty if it hardly moves.
+    """Describe the displacement `motion` (3,) m of a hand, such as "12 cm up and forward".
 
-    For robots of the iCub's family the directions are those of the body, such as forward; for others, the axes of the root frame.
+    Only the main directions are named. The text is empty if the displacement is below 1.5 cm. `robot`: name of the robot. For robots of the
+    iCub's family the directions are those of the body, such as forward; for others, the axes of the root frame.
     """
     length = float(np.linalg.norm(motion))
     if length < SHORTEST:
@@ -73,7 +75,7 @@ def _direction(axis: int, along: float, robot: str) -> str:
 
 
 def action_words(space: Space, state: int, goal: int) -> str:
-    """Describe an action by the joints that it turns: "elbow +32°, shoulder yaw −20°"."""
+    """Describe the action from a state to a goal state by the joints that it turns, such as "elbow +32°, shoulder yaw −20°"."""
     turns = space.samples[goal] - space.samples[state]
     named = []
     for index in np.argsort(-np.abs(turns)).tolist():
@@ -89,7 +91,10 @@ def _amount(space: Space, index: int, turn: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as whole percent; 0 % and 100 % only where the share is exactly that."""
+    """Return a share (0 to 1) as whole percent.
+
+    It is "0 %" or "100 %" only if the share is exactly 0 or 1; else "under 1 %" or "over 99 %".
+    """
     rounded = round(100 * share)
     if rounded == 0 and share > 0.0:
         return "under 1 %"

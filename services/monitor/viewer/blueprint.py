@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layout of the page, and the extent of a robot for its cameras."""
+"""The layout of the 3D view, and a camera position from which the whole robot is visible."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SMALLEST = 0.1  # m
 
 
 def extent_of(robot: Robot) -> tuple[Array, float]:
-    """Return centre (3,) m and diameter [m] of the robot at home."""
+    """Return the centre (3,) m and the diagonal [m] of the box around all shape centres and joints of the robot at home (root frame)."""
     transforms = link_transforms(robot, np.clip(robot.home, *robot.limits.T))
     links = [shape.link for shape in robot.shapes] + [joint.parent for joint in robot.joints]
     places = [shape.position for shape in robot.shapes] + [joint.point for joint in robot.joints]
@@ -32,7 +32,7 @@ def extent_of(robot: Robot) -> tuple[Array, float]:
 
 
 def eye_of(robot: Robot) -> tuple[Array, Array]:
-    """Return the position of the camera that sees the whole robot, and the centre of its view, each (3,) m."""
+    """Return the position of a camera that sees the whole robot, and the point at which it looks, each (3,) m in the root frame."""
     centre, diameter = extent_of(robot)
     eye: Array = centre + DISTANCE * diameter * VIEWPOINT / np.linalg.norm(VIEWPOINT)
     return eye, centre
@@ -48,11 +48,10 @@ MOST_EYES = 4  # cameras on the page
 
 @dataclass(frozen=True)
 class Shown:
-    """The content of the monitor's page.
+    """The content of the monitor's 3D view.
 
-    `name`: of the robot.  `parts`: those with plots.  `cameras`: those that may have pictures to show.
-
-    `eye`, `target`: from where the scene is seen, and its middle, (3,) m.
+    `name`: title of the tab with the robot. `parts`: parts whose motion is plotted. `cameras`: cameras that may have pictures to show.
+    `eye`: position of the viewer's camera; `target`: point at which it looks; both (3,) m in the root frame.
     """
 
     name: str
@@ -63,7 +62,10 @@ class Shown:
 
 
 def shown_of(robot: Robot, cameras: Sequence[str] = ()) -> Shown:
-    """Return the view of a robot and its cameras; that of the iCub includes its table."""
+    """Return what the 3D view shows of a robot and its cameras.
+
+    For the iCub a fixed viewpoint also shows its table; for other robots the viewpoint follows from their size.
+    """
     parts = tuple(colors_of(robot.parts))
     if robot.name in AT_TABLE:
         return Shown("iCub", parts, tuple(cameras), np.array([-0.98, -0.60, 0.42]), np.array([-0.14, 0.0, 0.06]))
@@ -71,9 +73,9 @@ def shown_of(robot: Robot, cameras: Sequence[str] = ()) -> Shown:
 
 
 def blueprint(shown: Shown, in_motion: bool = True) -> rrb.Blueprint:
-    """Make tabs of the robot, its eyes, its motion, its learning and its state spaces, without side panels.
+    """Build the layout of the 3D view: tabs with the robot, camera pictures, motion, learning, state spaces and events.
 
-    `in_motion`: False for the tab of the robot alone.
+    `in_motion`: False: only the tab with the robot.
     """
     eyes = [rrb.Grid(*map(_eye, shown.cameras[:MOST_EYES]), name="eyes")] if shown.cameras else []
     others: list[rrb.Container | rrb.View] = [*eyes, _motion(shown.parts), _learning(), _spaces(shown.parts), _log()] if in_motion else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws a robot: its visuals and shapes are logged once, then one transform per link."""
+"""Draws a robot in Rerun: its visuals and shapes are logged once, then one transform per link and pose."""
 
 from __future__ import annotations
 
@@ -25,7 +25,12 @@ from services.monitor.web.surfaces import flat
 def drawn(
     kind: ShapeKind, size: tuple[float, ...], position: Array, rotation: Array, color: Rgba, vertices: Array | None = None
 ) -> rr.AsComponents:
-    """Return the volume at position (3,) m, turned by rotation (3, 3), filled with the colour."""
+    """Return a shape as a Rerun component, filled with a colour.
+
+    `size` [m]: (radius,) of a sphere, (radius, length) of a capsule or cylinder, three edge lengths of a box. `position`: centre, (3,) m.
+    `rotation`: (3, 3). `color`: red, green, blue, opacity, 0 to 255. `vertices`: (v, 3) m in the frame of the shape, for kind "convex"
+    only.
+    """
     w, x, y, z = quaternion_from_matrix(rotation)
     turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
     if kind == "convex":
@@ -41,7 +46,10 @@ def drawn(
 
 
 def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:
-    """Return the Rerun components that change the colour of a volume of this kind."""
+    """Return the Rerun components that change the colour of an already logged shape of this kind.
+
+    `color`: red, green, blue, opacity, 0 to 255.
+    """
     if kind == "convex":
         return rr.Mesh3D.from_fields(albedo_factor=color)
     if kind == "box":
@@ -60,7 +68,10 @@ def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
 
 
 def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
-    """Yield name and components of each Rerun entity for solids of one link at zero pose; all its opaque meshes are one entity."""
+    """Yield (name, components) of each Rerun entity that draws the solids of one link, in the root frame with every joint at zero.
+
+    All opaque meshes together are one entity.
+    """
     opaque = [one.solid for one in solids if one.solid.mesh is not None and one.solid.opacity >= 1.0]
     if opaque:
         yield "mesh", _joined(opaque)
@@ -100,9 +111,10 @@ PUSH, LONGEST = 5.0, 0.15  # length of a contact's arrow: in depths, and at most
 
 
 class Figure:
-    """Logs a robot and its world to a stream, then its poses over time.
+    """Logs a robot and its world to a Rerun stream, then its poses over time.
 
-    A link is shown by its visuals, and its solids while they touch; `solids`: always by its solids.
+    A link is drawn by its visuals, and its solids are shown only while they are in contact. `solids`: True: always draw the solids, never
+    the visuals.
     """
 
     def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None, solids: bool = False) -> None:
@@ -127,7 +139,10 @@ class Figure:
             self._log_markers(link)
 
     def move(self, begin: float, rate: float, poses: Array) -> None:
-        """Log the robot in poses (k, n) rad with their contacts: the first at `begin` [s], then `rate` poses per second."""
+        """Log a motion of the robot with its contacts.
+
+        `poses`: (k, n) rad; the first one is at the time `begin` [s], the others follow with `rate` poses per second.
+        """
         times = begin + np.arange(len(poses)) / rate
         transforms = link_transforms(self._robot, poses)
         turns = quaternion_from_matrix(transforms[..., :3, :3])[..., [1, 2, 3, 0]]
@@ -146,7 +161,7 @@ class Figure:
         self._columns(["plots", "motors"], times, rr.Scalars.columns(scalars=shares.ravel()).partition([len(low)] * len(poses)))
 
     def say(self, begin: float, text: str) -> None:
-        """Log a text of the event that begins at `begin` [s]."""
+        """Log a text as an event at the time `begin` [s]."""
         self._stream.set_time(TIMELINE, duration=begin)
         self._stream.log("events", rr.TextLog(text, level="INFO"))
 

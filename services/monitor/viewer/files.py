@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Extracts the files of Rerun's browser viewer from Rerun's program, which is a part of its wheel."""
+"""Extracts the files of Rerun's browser viewer from the program `rerun`, which is part of Rerun's Python package."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TIMEOUT = 30.0  # s
 
 
 def program() -> Path:
-    """Return Rerun's program; raises SystemExit if it is not installed."""
+    """Return the path of the program `rerun`; raises SystemExit if Rerun is not installed."""
     spec = find_spec("rerun_cli")
     if spec is None or spec.origin is None:
         raise SystemExit('the page needs rerun-sdk: pip install "mobee[viz]"')
@@ -28,13 +28,13 @@ def program() -> Path:
 
 
 class ViewerFiles:
-    """The viewer's files in a folder, extracted at the first request."""
+    """The files of Rerun's browser viewer in a folder. They are extracted when the first one is requested."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._lock = folder, Lock()
 
     def path(self, name: str) -> Path:
-        """Return the path of a file; any thread may call this."""
+        """Return the path of the viewer's file `name`, such as re_viewer.js. Any thread may call this."""
         with self._lock:
             if not (self._folder / name).is_file():
                 self._extract()

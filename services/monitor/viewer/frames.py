@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data for viewers in browsers: a viewer asks for its next frame when it has shown the last one, so that a slow one skips frames."""
+"""Sends data to 3D viewers in browsers. A viewer requests its next frame when it has shown the last one, so a slow viewer skips frames."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ WANTED_FOR = 15.0  # s after its last request for which a viewer counts as open,
 
 
 class Stream(Protocol):
-    """The calls of a recording stream that the scene uses."""
+    """The methods of a Rerun recording stream that the 3D scene uses."""
 
     def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
-        """Log components at the present time."""
+        """Log Rerun components on the entity `path` at the current time; `static`: True for data without a time."""
 
 
 class _Part:
@@ -50,10 +50,10 @@ class _Part:
 
 
 class Frames:
-    """A stream that logs to a file, if there is one, and keeps the data that open viewers still need.
+    """A stream that keeps data for open viewers, and also logs to `file` unless it is None.
 
-    Static data are kept for all viewers; changes are kept up to a size. Of the updates of the robot's pose only the newest is kept, and it
-    is made only if a viewer waits for one. The file gets every fourth update.
+    Static data are kept for all viewers; changes are kept up to 4 MB. An update is the robot's pose with all that changes with it: only the
+    newest update is kept, and it is built only if a viewer waits for one. The file gets every fourth update.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
@@ -72,7 +72,10 @@ class Frames:
         self._time = 0.0
 
     def log(self, path: str | list[object], *what: Any, static: bool = False) -> None:
-        """Log components to the file, and for viewers."""
+        """Log Rerun components on the entity `path`, to the file and for the viewers.
+
+        Data that neither the file nor an open viewer needs are dropped; static data are always kept.
+        """
         if self._file is not None and (self._is_recorded or not self._is_in_update):
             self._file.log(path, *what, static=static)
         if static:
@@ -84,19 +87,22 @@ class Frames:
             self._update.log(path, *what, static=False)
 
     def set_time(self, timeline: str, seconds: float) -> None:
-        """Set the time of all following logs."""
+        """Set the time of all following logs to `seconds` on a timeline."""
         self._time = seconds
         for stream in (self._file, self._changes.stream, self._update.stream):
             if stream is not None:
                 stream.set_time(timeline, duration=seconds)
 
     def close(self) -> None:
-        """Discard the data that no viewer has requested; nothing can be logged afterwards."""
+        """End the streams, and discard the data that no viewer has requested. Nothing can be logged afterwards."""
         for part in (self._static, self._changes, self._update):
             part.close()
 
     def begin_update(self) -> bool:
-        """Begin an update of the whole robot, which `end_update` completes; returns whether a viewer or the file needs it."""
+        """Begin an update of the whole robot, which `end_update` completes.
+
+        Returns True if a viewer or the file needs this update; else the caller need not log it.
+        """
         self._is_in_update = True
         self._is_recorded = self._file is not None and self._updates % RECORDED == 0
         self._updates += 1
@@ -105,7 +111,7 @@ class Frames:
         return self._is_wanted or self._is_recorded
 
     def end_update(self) -> None:
-        """Send the update, and all changes since the one before, to the viewers that wait."""
+        """End the update; send it to the viewers that wait, together with all changes since the previous one."""
         self._is_in_update = False
         if not self._is_wanted:
             return
@@ -123,10 +129,10 @@ class Frames:
             self._published.notify_all()
 
     def newest(self, after: int, patience: float) -> bytes:
-        """Return the data for a viewer that has shown frame `after`; waits for a newer frame. Any thread may call this.
+        """Return the data that a viewer needs after it has shown frame `after`. Any thread may call this.
 
-        Bytes: number of the frame (uint64) and its time (float64, s), then pieces, each with its length (uint32) before it; all
-        little-endian.  Without a newer frame there are no pieces.
+        The call waits for a newer frame for at most `patience` s. The bytes, all little-endian: number of the frame (uint64), its time
+        (float64, s), then pieces of data, each after its length in bytes (uint32). If there is no newer frame, there are no pieces.
         """
         give_up = time.monotonic() + patience
         with self._published:

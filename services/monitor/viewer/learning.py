@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws the learning of agents: the state space with its uncertain actions; rewards, values and tries."""
+"""Draws the learning of agents: the state space with its uncertain actions, and bar charts of rewards, values and tries."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ QUANTITIES = ("tries", "reward", "value")
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """The drawing of a space: positions of its states, (S, 2), and which entries of (S, A) are state-actions."""
+    """The drawing of an agent's state space.
+
+    `places`: position of each state in the plane, (S, 2). `exists`: (S, A), True where the state has the action.
+    """
 
     space: Space
     places: Array
@@ -37,7 +40,7 @@ class Drawn:
 
 
 class Learning:
-    """Logs to a stream under learning/."""
+    """Logs the learning of agents to a Rerun stream, on entities below learning/."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
@@ -46,7 +49,10 @@ class Learning:
         self._made_from: dict[str, str] = {}
 
     def log(self, part: str, learned: Learned) -> None:
-        """Log the space, the arrows, and the bars of an agent."""
+        """Log the knowledge of the agent of a part: its state space with arrows for its actions, and bar charts of all state-actions.
+
+        A space with more than MAX_DRAWN (65 536) state-actions is not drawn; an event reports this once.
+        """
         if len(learned.tries) > 4 * MAX_DRAWN:
             self._leave_out(part, learned)
             return
@@ -72,7 +78,7 @@ class Learning:
         self._log_states(f"{path}/space/states", drawn, best, learned.s)
 
     def log_step(self, part: str, seen: Transition) -> None:
-        """Log the newest transition: one arrow to its goal, and one to its outcome."""
+        """Log the newest transition of the agent of a part as two arrows: from its state to its goal, and from its state to its outcome."""
         drawn = self._drawn.get(part)
         if drawn is None or max(seen.s, seen.goal, seen.s_next) >= len(drawn.places):
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outputs of the monitor: a page on loopback, a recording, or both."""
+"""The outputs of the monitor: a page on the loopback interface, a recording, or both."""
 
 from __future__ import annotations
 
@@ -34,34 +34,44 @@ RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
 
 
 class NoControls:
-    """Controls that refuse all commands: of a page before the monitor is on the bus, and of a replay."""
+    """Controls that refuse all commands. They are used by a replay, and by a page whose monitor is not yet on the bus."""
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Refuse."""
+        """Raise Refused: no command can be executed."""
         raise Refused("the page cannot do that now")
 
     def tend(self, open_pages: set[str]) -> None:
-        """Do nothing: no part was taken."""
+        """Do nothing, because pages without controls cannot take a part."""
 
 
 class LaterControls:
-    """Forwards the commands of the page to `real`, which the monitor sets when it is on the bus; until then all are refused."""
+    """Forwards the commands of the page to `real`.
+
+    The monitor sets `real` when it is on the bus. Until then, all commands are refused (`NoControls`).
+    """
 
     def __init__(self) -> None:
         self.real: Controls = NoControls()
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """See Controls."""
+        """Execute a command of a page by `real` and return a sentence for the user, as in `services.monitor.web.server.Controls.do`.
+
+        Raises Refused.
+        """
         return self.real.do(page, verb, arguments)
 
     def tend(self, open_pages: set[str]) -> None:
-        """See Controls."""
+        """Pass the ids of the open pages to `real`, as in `services.monitor.web.server.Controls.tend`."""
         self.real.tend(open_pages)
 
 
 @dataclass(frozen=True)
 class Output:
-    """The outputs of the monitor: the 3D view and the recording (`frames`), the values of the page (`board`), and the page itself."""
+    """The outputs of the monitor.
+
+    `frames`: stream to the 3D view and to the recording. `board`: values of the page. `record`: file of these values; None: not recorded.
+    `server`: web server of the page; None: no page. `controls`: executes the page's commands. `url`: address of the page; empty: no page.
+    """
 
     frames: Frames
     board: Board
@@ -73,9 +83,9 @@ class Output:
 
 @contextmanager
 def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Iterator[Output]:
-    """Serve as configured, and record to a run_dir if there is one; exits with code 2 and one line if a port cannot be used.
+    """Open the outputs of the monitor: the page if `config.serve` is set, and a recording if `config.run_dir` is set.
 
-    `now`: the robot's time, s.
+    `now`: returns the robot's time [s]. Exits with code 2 and one line on standard error if the port is in use, or `run_dir` is no folder.
     """
     folder, layout = _folder_of(config), blueprint(shown_of(robot, list(config.cameras_on(robot))))
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
@@ -125,7 +135,11 @@ def _key_of(folder: Path | None) -> str:
 
 
 def serve(site: Site, bind: str, port: int) -> PageServer:
-    """Serve a page; exits with code 2 and one line if the port stays in use for a second: a program that has just ended may hold it."""
+    """Serve a page at an address and port, and return its server.
+
+    If the port is in use, the call tries again for 1 s, because a program that has just ended may still hold it; then it exits with code 2
+    and one line on standard error.
+    """
     give_up = time.monotonic() + 1.0
     while True:
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plots: joint positions and goals, forces by term, rewards."""
+"""Draws plots over time: motor positions and goals, forces by term, and the rewards of agents."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ LEARNED = ("reward", "value", "transitions")
 
 
 class Plots:
-    """Logs numbers to a stream under plots/; few entities with many series each, because each entity makes a recording larger."""
+    """Logs numbers to a Rerun stream, on entities below plots/.
+
+    It uses few entities with many series each, because each entity makes a recording larger.
+    """
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
@@ -39,13 +42,16 @@ class Plots:
                 self._style(f"{quantity}/{part}", [color], [1.4], [part.replace("_", " ")])
 
     def log_motion(self, part: str, motion: Motion) -> None:
-        """Log positions and goal of a part; parts without a plot are left out."""
+        """Log the positions and the goal of the first four motors of a part [rad]; nothing for a part without a plot."""
         if part not in self._parts:
             return
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
-        """Log the norms of the forces over the whole robot, together with those of the other sender's terms."""
+        """Log the norm of each force term over all motors of the robot [rad/s^2].
+
+        The terms come from two senders, model and controller; of the other sender's terms the newest norms are logged again.
+        """
         known = len(self._strengths)
         self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}
         if len(self._strengths) > known:
@@ -53,7 +59,7 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Log reward, value and number of a transition; nothing for a part without a plot."""
+        """Log the reward [nats], the value and the number of a transition; nothing for a part without a plot."""
         if part not in self._parts:
             return
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The 3D scene: the robot, its fields, objects, the paths of the hands, and the poses in which actions ended."""
+"""The 3D scene: the robot, its fields, the objects, the trails of the hands, and the poses in which actions ended."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from services.monitor.viewer.frames import Frames
 
 
 class Links:
-    """Logs the visuals of each link to a stream under robot/ once; then one transform per link."""
+    """Logs the visuals of each link to a Rerun stream once, on entities below robot/. Then `move` logs one transform per link."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream = stream
@@ -33,7 +33,7 @@ class Links:
                 stream.log(path, rr.CoordinateFrame(frame), body, static=True)
 
     def move(self, transforms: Array) -> None:
-        """Log the present transforms (L, 4, 4) of the links, as link_transforms returns them."""
+        """Log the present poses of the links in the root frame, (L, 4, 4), as `mobee.model.kinematics.link_transforms` returns them."""
         turns = quaternion_from_matrix(transforms[:, :3, :3])[:, [1, 2, 3, 0]]
         for link, frame in self._frames.items():
             place = rr.Transform3D(
@@ -49,7 +49,10 @@ HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["ri
 
 
 class Scene:
-    """Logs poses to a stream; what does not move is logged once."""
+    """Logs the robot, its fields, the trails of its hands and the objects to a Rerun stream.
+
+    The geometry of the links is logged once, then only their poses.
+    """
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
@@ -62,16 +65,16 @@ class Scene:
         self._links = Links(stream, robot)
 
     def show_fields(self, shown: bool) -> None:
-        """Show or hide the fields."""
+        """Show or hide the robot's fields, from the next update on."""
         self._fields = [shape for shape in self._robot.shapes if shape.role == "field"] if shown else []
 
     def forget(self) -> None:
-        """End the trails, at the start of a new run."""
+        """Delete the trails of the hands, because a new run has begun."""
         for trail in self._trails.values():
             trail.clear()
 
     def log_robot(self, q: Array, contacts: list[ContactItem]) -> None:
-        """Log the robot at q (n,) rad; fields named in a contact are red."""
+        """Log the robot in the pose `q` (n,) rad. Fields that are named in one of the contacts are red."""
         transforms = link_transforms(self._robot, q)
         self._links.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})
@@ -80,7 +83,7 @@ class Scene:
         self._updates += 1
 
     def set_objects(self, objects: list[ObjectState]) -> None:
-        """Show the objects of the model's world and remove those that are no longer in it."""
+        """Show all objects of the model's world, and remove those that the world no longer contains."""
         known = {thing.name: thing for thing in objects}
         for name in self._objects.keys() - known.keys():
             self._stream.log(f"scene/objects/{name}", rr.Clear(recursive=False))
@@ -89,7 +92,7 @@ class Scene:
             self.log_object(thing)
 
     def log_object(self, thing: ObjectState | WorldObject) -> None:
-        """Log an object at its position in the model's world."""
+        """Log one object with its shape, position and colour, as a message about the world describes it (root frame)."""
         self._objects[thing.name] = thing
         color = palette.of_object(thing.geometry.kind, thing.role)
         turn = matrix_from_quaternion(np.array(thing.quaternion))
@@ -155,7 +158,7 @@ SHOULDERS = {"left_arm": "l_shoulder_pitch", "right_arm": "r_shoulder_pitch"}
 
 
 class Poses:
-    """Logs a cloud of arms to a stream: shoulder, elbow and palm of each pose as a thin line."""
+    """Logs the last 600 arm poses in which actions ended to a Rerun stream: thin lines from shoulder to elbow to palm."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
@@ -170,7 +173,7 @@ class Poses:
         stream.log("scene/poses", rr.CoordinateFrame(ROOT), static=True)
 
     def note(self, q: Array) -> None:
-        """Add the pose q (n,) rad in which an action has ended."""
+        """Add the arms of the robot in the pose `q` (n,) rad, in which an action has ended."""
         transforms = link_transforms(self._robot, q)
         for part, (joint, markers) in self._chains.items():
             shoulder = self._robot.joints[joint]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A view of a robot moved through its range or to given poses, with contacts."""
+"""Shows a robot in motion, with its contacts: every motor through its range, or given poses."""
 
 from __future__ import annotations
 
@@ -30,14 +30,17 @@ TOGETHER = 12.0  # s for all
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A section of the motion: a description of the moving motors, and the poses (k, n) rad."""
+    """A section of a motion. `title`: description of what moves. `poses`: (k, n) rad, RATE (20) poses per second."""
 
     title: str
     poses: Array
 
 
 def sweep(robot: Robot) -> list[Stretch]:
-    """Return a section per motor, home -> minimum -> maximum -> home, and one in which all move at once; each begins and ends at home."""
+    """Return a section for each motor (home, minimum, maximum, home), and one in which all motors move at once.
+
+    Each section begins and ends at home.
+    """
     low, high = robot.limits.T
     home = np.clip(robot.home, low, high)
     stretches = []
@@ -87,10 +90,11 @@ def view(
     stretches: Sequence[Stretch] | None = None,
     solids: bool = False,
 ) -> None:
-    """Show a motion on a page until the user interrupts, or save it to a file.
+    """Show a motion of a robot on a page until the user interrupts with Ctrl-C, or save it to a file.
 
-    `report` is called with the page's address when all data are logged.  `stretches`: of the motion, RATE poses a second; None: a sweep
-    through the ranges of all motors.  `solids`: show the solids in place of the file's visuals.
+    `world`: objects around the robot. `save`: file to write (.rrd); None: show a page. `report` is called with the page's address when all
+    data are logged. `stretches`: sections of the motion; None: a sweep through the ranges of all motors. `solids`: draw the solids instead
+    of the visuals of the robot file.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
@@ -118,7 +122,7 @@ def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretche
 
 
 def layout(robot: Robot) -> rrb.Blueprint:
-    """Return the layout: the robot large, its motors, contacts and events on the right, time below."""
+    """Return the layout of the Rerun view: the robot on the left; plots of motors and contacts, and events, on the right."""
     eye, centre = eye_of(robot)
     scene = rrb.Spatial3DView(
         origin="/",

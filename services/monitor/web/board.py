@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds the newest value of everything that the page shows; readers get what has changed since they last asked."""
+"""Holds the newest value of everything that the page shows. A page asks for what has changed since its last request."""
 
 from __future__ import annotations
 
@@ -18,10 +18,13 @@ class _Item:
 
 
 class Board:
-    """Named values, of which a slow reader skips versions and never gets an old one.  Any thread may call its methods."""
+    """The named values that the page shows.
+
+    Each change has a number (version). A slow page skips old versions and always gets the newest. Any thread may call the methods.
+    """
 
     def __init__(self, record: Callable[[str, str], None] | None = None) -> None:
-        """`record`: called with the name and JSON text of every new value."""
+        """Create an empty board; `record`: called with the name and the JSON text of every new value."""
         self._items: dict[str, _Item] = {}
         self._changed = Condition()
         self._version = 0
@@ -29,11 +32,11 @@ class Board:
 
     @property
     def version(self) -> int:
-        """The number of the newest change."""
+        """The number of the newest change; 0 before the first."""
         return self._version
 
     def put(self, name: str, value: Any) -> None:
-        """Set a value, given as plain JSON data; an equal value is no change."""
+        """Set the value of a name, as plain JSON data. Nothing changes if the value equals the present one."""
         text = json.dumps(value, separators=(",", ":"))
         with self._changed:
             known = self._items.get(name)
@@ -46,12 +49,16 @@ class Board:
             self._record(name, text)
 
     def record(self, name: str, value: Any) -> None:
-        """Record a value that the page itself does not show."""
+        """Write a value to the record only; the page does not show it."""
         if self._record is not None:
             self._record(name, json.dumps(value, separators=(",", ":")))
 
     def news(self, after: int, patience: float) -> str:
-        """Return the values that changed after a version, as a JSON object with the present `version`; waits for one for `patience` s."""
+        """Return the values that have changed since version `after`, as a JSON text.
+
+        It is an object with the newest `version`, and the changed values by name. If nothing has changed, the call waits for a change for
+        at most `patience` s.
+        """
         give_up = time.monotonic() + patience
         with self._changed:
             while self._version <= after and (left := give_up - time.monotonic()) > 0.0:

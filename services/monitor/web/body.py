@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot's shapes and their poses as plain data, for the page's own picture of the body."""
+"""The robot's shapes and poses as plain JSON data, for the page's own drawing of the robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ DIGITS = 4  # of lengths in m
 
 
 def shapes_of(robot: Robot, colors: dict[str, Color]) -> list[dict[str, Any]]:
-    """Return all shapes as they are with every joint at zero, in the root frame."""
+    """Return all shapes of a robot as JSON data: link, kind, size [m], position [m], rotation (3 x 3), part, name.
+
+    Shapes are placed as with every joint at zero, in the root frame. "part": index of the part in `colors`, -1: no part. "field": True,
+    only if the shape is a field. "vertices": [m], only of a convex shape.
+    """
     return [_shape(shape, list(colors)) for shape in robot.shapes]
 
 
@@ -53,7 +57,10 @@ def _fewer(vertices: Array) -> Array:
 
 
 def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:
-    """Return the poses of the links at q (n,) rad, rows of [R | p], and the contacts."""
+    """Return the robot in the pose `q` (n,) rad as JSON data.
+
+    "links": (L, 12), for each link the rows of [R | p], root frame, m. "contacts": as of `contacts_of`.
+    """
     transforms = link_transforms(robot, q)
     return {
         "links": np.round(transforms[:, :3, :].reshape(len(transforms), 12), DIGITS).tolist(),
@@ -62,12 +69,12 @@ def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, An
 
 
 def contacts_of(contacts: list[ContactItem]) -> list[dict[str, Any]]:
-    """Return the contacts."""
+    """Return contacts as JSON data: for each "kind", the names of the two shapes ("first", "second"), and "point" (3,) m, root frame."""
     return [{"kind": c.kind, "first": c.first, "second": c.second, "point": _rounded(np.array(c.point))} for c in contacts]
 
 
 def thing(item: ObjectState | WorldObject) -> dict[str, Any]:
-    """Return an object of the world."""
+    """Return an object of the world as JSON data: name, kind, size [m], position [m] and rotation (3 x 3; root frame), role, colour."""
     return {
         "name": item.name,
         "kind": item.geometry.kind,

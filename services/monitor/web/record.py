@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps what the page showed, so that it can be shown again: a line of JSON for each new value."""
+"""Records the values that the page shows, so that they can be shown again: a file with one line of JSON for each new value."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FULL = 500_000_000  # bytes at which a record ends
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A value at a time, s of the robot."""
+    """One recorded value, with its name and the robot's time `time` [s]."""
 
     time: float
     name: str
@@ -29,16 +29,19 @@ class Entry:
 
 
 class Record:
-    """A file that grows; any thread may write."""
+    """The file of the recorded values, to which lines are appended, up to 500 MB. Any thread may write."""
 
     def __init__(self, path: Path, now: Callable[[], float]) -> None:
-        """`now`: the robot's time, s."""
+        """Open the file; `now`: returns the robot's time [s]."""
         self._file = path.open("a", encoding="utf-8", buffering=1 << 16)
         self._next: dict[str, float] = {}  # s, by name
         self._now, self._lock, self._size = now, Lock(), path.stat().st_size
 
     def put(self, name: str, text: str) -> None:
-        """Write a value, given as JSON text."""
+        """Append a value, given as JSON text, with the present time.
+
+        Some names are recorded seldom or never: curves at most every 10 s, the body not at all.
+        """
         now = self._now()
         if name in LEFT_OUT or now < self._next.get(name, now):
             return
@@ -51,19 +54,22 @@ class Record:
                 self._size += len(line)
 
     def flush(self) -> None:
-        """Give what was written to the operating system: it survives a kill of this process."""
+        """Hand all written lines to the operating system, so that they are kept even if this process is killed."""
         with self._lock:
             if not self._file.closed:
                 self._file.flush()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; later values are not recorded."""
         with self._lock:
             self._file.close()
 
 
 def entries(path: Path) -> list[Entry]:
-    """Return what a file holds, in order; a last line that was cut off is left out.  Raises MobeeError if it cannot be read."""
+    """Return the values in a record file, in the order of the file.
+
+    An incomplete last line is left out. Raises MobeeError if the file cannot be read, or a line is not valid.
+    """
     try:
         return list(_read(path))
     except OSError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Serves the page on loopback: its files, the board's news, pictures for the 3D view, and calls of people who have the key."""
+"""Serves the page on loopback: its files, changes of the board, data of the 3D view, and commands from pages that have the key."""
 
 from __future__ import annotations
 
@@ -31,33 +31,43 @@ POLICY = (
     "default-src 'self'; connect-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
     "img-src 'self' data: blob:; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-src {both}; frame-ancestors {both}"
 )
-"""Content security policy: the browser itself refuses every address but this server."""
+"""Content security policy of the page: with it the browser itself refuses to load or send anything except from and to this server."""
 
 
 class Refused(Exception):
-    """A call that cannot be done; the text is shown on the page."""
+    """Raised if a command of the page cannot be executed. The page shows the text of the exception to the user."""
 
 
 class Controls(Protocol):
-    """The calls of the page."""
+    """Executes the commands of the page."""
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Do what a page asks for; returns a sentence for the person, raises Refused."""
+        """Execute the command `verb` of the page with the id `page`, and return a sentence for the user.
+
+        Raises Refused if it cannot be executed.
+        """
 
     def tend(self, open_pages: set[str]) -> None:
-        """Called every second with the ids of the open pages."""
+        """Do the regular work; called once per second with the ids of the open pages."""
 
 
 class Frames(Protocol):
-    """The 3D view's data."""
+    """The data of the 3D view."""
 
     def newest(self, after: int, patience: float) -> bytes:
-        """Return what a viewer needs after a frame: see viewer/frames.py."""
+        """Return the encoded data that a viewer needs after it has shown frame `after`; wait at most `patience` s for a newer frame.
+
+        Format: `services.monitor.viewer.frames.Frames.newest`.
+        """
 
 
 @dataclass
 class Pages:
-    """The open pages, by the ids that they chose: how late each is, and which version of the board it has shown."""
+    """The open pages. Each page chooses an id, which is the key of all fields.
+
+    `seen`: monotonic time of its last request [s]. `shown`: version of the board that it has shown. `late`: delay of the body and of the 3D
+    view that it shows [s of robot time]. `lock`: protects the fields.
+    """
 
     seen: dict[str, float] = field(default_factory=dict)  # monotonic clock of the last request
     shown: dict[str, int] = field(default_factory=dict)
@@ -65,31 +75,31 @@ class Pages:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def note(self, page: str, shown: int, late: dict[str, float]) -> None:
-        """Note a request of a page."""
+        """Record a request of a page: the version of the board that it has shown, and its delays [s of robot time], by name."""
         with self.lock:
             self.seen[page], self.shown[page], self.late[page] = time.monotonic(), shown, late
 
     def open(self) -> set[str]:
-        """Return the pages that asked for something lately; the others are forgotten."""
+        """Return the ids of the pages with a request in the last 6 s; forget all others."""
         with self.lock:
             for page in [page for page, when in self.seen.items() if time.monotonic() - when > GONE]:
                 del self.seen[page], self.shown[page], self.late[page]
             return set(self.seen)
 
     def have_shown(self, version: int) -> bool:
-        """Whether every open page has shown a version of the board."""
+        """Return whether every open page has shown the version `version` of the board, or a newer one."""
         return all(self.shown.get(page, version) >= version for page in self.open())
 
 
 @dataclass(frozen=True)
 class Site:
-    """What the server serves.
+    """The content and the functions of the page that a `PageServer` serves.
 
-    `key`: the word in the page's address without which a page shows everything and can do nothing.
-    `surfaces`: returns the robot as triangles, see web/surfaces.py.
-    `viewer_file`: returns the path of a file of Rerun's viewer, by name; None: there is no 3D view.
-    `time`: the robot's time now, s.  `others`: further files, by the name under which they are served.
-    `seek`: moves in time on a page that shows the past, given the query of the address.
+    `board`: values of the page. `key`: secret word in the page's address; without it a page shows everything but cannot send commands.
+    `controls`: executes commands. `frames`: data of the 3D view; None: no live 3D view. `viewer_file`: returns the path of a file of
+    Rerun's viewer, by name; None: no viewer. `time`: returns the robot's time [s]. `others`: further files, by the name under which they
+    are served. `seek`: for a replay, moves in time by the query of the address. `surfaces`: returns the robot as triangles, encoded as by
+    `services.monitor.web.surfaces.encoded`. `pages`: the open pages.
     """
 
     board: Board
@@ -116,10 +126,10 @@ class _Server(ThreadingHTTPServer):
 
 
 class PageServer:
-    """The server in threads of its own."""
+    """The web server of the page. It runs in threads of its own."""
 
     def __init__(self, site: Site, bind: str, port: int) -> None:
-        """Begin to serve; raises OSError if the port cannot be used."""
+        """Start to serve `site` at the address `bind` and the port `port` (0: any free port). Raises OSError if the port cannot be used."""
         self.site = site
         self._server = _Server((bind, port), partial(_Handler, site))
         self.port = int(self._server.server_address[1])
@@ -128,13 +138,13 @@ class PageServer:
         threading.Thread(target=self._tend, daemon=True, name="tend").start()
 
     def let_pages_show(self, patience: float) -> None:
-        """Wait until every open page has shown what is on the board now, at most for `patience` s."""
+        """Wait until every open page has shown the present values of the board, but at most `patience` s."""
         version, give_up = self.site.board.version, time.monotonic() + patience
         while not self.site.pages.have_shown(version) and time.monotonic() < give_up:
             time.sleep(0.02)
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server and release its port."""
         self._ends.set()
         self._server.shutdown()
         self._server.server_close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot as triangles, for the page's own 3D view."""
+"""The robot as triangles, for the page's own 3D drawing."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ BLOCK = 4  # bytes to which the header is padded: the arrays that follow are rea
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles of one colour that move with a link of a part, by its number; -1: of no part.
+    """Triangles of one colour that move with one link.
 
-    `vertices`: (v, 3) m, in the root frame with every joint at zero.  `normals`: (v, 3), of length 1.  `triangles`: (t, 3) indices, the
-    corners anticlockwise as seen from outside.
+    `link`: index of the link. `part`: index of the part that the link belongs to; -1: none. `vertices`: (v, 3) m, in the root frame with
+    every joint at zero. `normals`: unit normal of each vertex, (v, 3). `triangles`: indices of the vertices, (t, 3), anticlockwise as seen
+    from outside.
     """
 
     link: int
@@ -41,7 +42,10 @@ class Surface:
 
 
 def surfaces_of(robot: Robot) -> Callable[[], bytes]:
-    """Return a function that returns what is drawn of a robot, encoded; it is made when the first page asks for it."""
+    """Return a function that returns the triangles of a robot as bytes, in the format of `encoded`.
+
+    The triangles are computed at the first call and then kept.
+    """
     return cache(lambda: encoded(_surfaces(robot)))
 
 
@@ -64,10 +68,10 @@ def _surface(one: LinkSolid, parts: Sequence[str]) -> Surface:
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:
-    """Return the bytes that the page reads.
+    """Encode surfaces as the bytes that the page reads, all little-endian.
 
-    The length of the header (uint32); the header, JSON padded with spaces: link, part, colour, and numbers of vertices and triangles
-    of each surface; then of each surface vertices and normals (float32) and triangles (uint32), all little-endian.
+    Order: length of the header in bytes (uint32); the header, JSON padded with spaces, with link, part, colour and numbers of vertices and
+    triangles of each surface; then for each surface its vertices and normals (float32) and triangles (uint32).
     """
     rows = [
         {"link": one.link, "part": one.part, "color": one.color, "vertices": len(one.vertices), "triangles": len(one.triangles)}
@@ -85,7 +89,10 @@ Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame o
 
 
 def flat(corners: Array) -> Made:
-    """Return triangles (t, 3, 3) with flat faces: every triangle has corners of its own."""
+    """Return triangles with flat shading as vertices (3 t, 3), normals (3 t, 3) and indices (t, 3).
+
+    `corners`: (t, 3, 3) m. Triangles share no vertices.
+    """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3)
