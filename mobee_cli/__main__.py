@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `mobee`: finds the verb, and imports only the module of that verb."""
+"""The command `mobee`: finds the verb (first argument), and imports only the module of that verb."""
 
 from __future__ import annotations
 
@@ -57,13 +57,16 @@ EXTRAS = {
     "mujoco": "sim",
     "icub_models": "sim",
 }
-"""Packages that some verbs import, and the extra of this project that installs each."""
+"""Python packages that some verbs import, each with the extra of this project that installs it: `pip install "mobee[EXTRA]"`."""
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # matrices are small: more threads would only wait
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb; return the exit code: 0 ok, 1 failed, 2 bad input, 3 environment, 130 interrupted."""
+    """Run the verb that the arguments name (default: sys.argv), and return its exit code.
+
+    0: ok; 1: the task failed; 2: bad input; 3: a fault of the environment; 130: interrupted.
+    """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         code = _main(arguments)
@@ -98,7 +101,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser_of(verb: str) -> argparse.ArgumentParser:
-    """Return the parser of a verb's options; imports the verb's module."""
+    """Return the parser for the options of a verb. The verb's module is imported."""
     parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
     importlib.import_module(f"mobee_cli.{verb}").add_arguments(parser)
     return parser

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee bench`: measure mobee on this machine, beside other programs."""
+"""`mobee bench`: measures the speed of mobee on this machine, and compares it with other programs."""
 
 from __future__ import annotations
 
@@ -24,10 +24,14 @@ _NOTES = "Exit code: 0 every requirement is met and all agree, 1 not, 3 another 
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """The options of one benchmark, the module `experiments.bench.<name>`.
+    """The options of one benchmark. The benchmark itself is the module `experiments.bench.<name>`.
 
-    The module has `Settings`, whose fields have the names of the options.  It has `measure(settings)`, which returns a result of JSON types
-    with the verdict under "passed", and `report(result)`.  If there is a --quick, it has `QUICK`, the settings for it.
+    The module has a class `Settings`, whose fields have the names of the options, a function `measure(settings)`, which returns JSON data
+    with the verdict under "passed", and a function `report(result)`, which returns the result as text. With --quick it also has `QUICK`,
+    the settings for a short measurement.
+
+    `text`: description. `quick`, `figure`: help texts of --quick and --figure; None: no such option. `options`: arguments of argparse's
+    add_argument, by option.
     """
 
     text: str
@@ -207,7 +211,7 @@ BENCHES = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a parser for each benchmark."""
+    """Add the options of `mobee bench` to the parser: one subcommand for each benchmark."""
     benches = parser.add_subparsers(dest="bench", required=True, metavar="BENCHMARK")
     for name, bench in BENCHES.items():
         one = benches.add_parser(name, help=bench.text, description=bench.text, epilog=_NOTES)
@@ -221,7 +225,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, print, and return the exit code."""
+    """Run `mobee bench`: measure, print the result or draw the figure, and return the exit code."""
     from experiments.bench.against import AgainstFailed
     from experiments.kit.live.launch import LaunchFailed
     from experiments.kit.plots import MatplotlibMissing

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee calibrate`: finds by how much cameras and head encoders of a robot differ from its model, by looking at its own hand."""
+"""`mobee calibrate`: measures how the cameras and head encoders of a robot differ from its model. The robot looks at its own hand."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ A scenario uses the file as `calibration` of the services vision and model."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the robot, the postures and the file."""
+    """Add the options of `mobee calibrate` to the parser: robot, postures, file and others."""
     parser.epilog = _NOTES
     parser.add_argument("--live", action="store_true", help="calibrate the robot of the running system, not a simulated one")
     parser.add_argument("--save", type=Path, default=FILE, metavar="FILE", help="file of the result (default: %(default)s)")
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Calibrate, save and print."""
+    """Run `mobee calibrate`: calibrate the robot, save and print the result, and return the exit code."""
     try:
         if arguments.live:
             require_none(arguments, "only valid without --live; with it robot and world are those of the running system")
@@ -79,7 +79,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def rig_of(robot: Robot, marker: str, settings: CameraSettings) -> Rig:
-    """Return the robot with its first two cameras, and a tag on a marker; raises MobeeError."""
+    """Return the robot with its first two cameras and a tag on a marker, as calibration needs them.
+
+    Raises MobeeError if the robot has fewer than two cameras or no such marker.
+    """
     cameras = cameras_of(robot)
     require_cameras(robot, cameras, STEREO)
     robot.marker(marker)

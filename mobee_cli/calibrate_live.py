@@ -51,14 +51,20 @@ FIRST_PICTURE = 15.0  # s for the first picture
 
 
 class Shot(NamedTuple):
-    """Pictures of one stamp, by camera."""
+    """The pictures of all cameras at one time.
+
+    `cameras`: state of each camera; `images`: picture of each camera; both by the name of the camera.
+    """
 
     cameras: dict[str, Camera]
     images: dict[str, Image]
 
 
 class Pictures:
-    """Collects the pictures that come, as long as it is asked to."""
+    """Collects the pictures of the cameras in `rig` that arrive on the bus.
+
+    `shots`: complete sets of pictures, in order of arrival; the caller may clear this list.
+    """
 
     def __init__(self, service: Service, rig: Rig) -> None:
         self._names = tuple(rig.cameras)
@@ -78,7 +84,11 @@ class Pictures:
 
 
 def calibrated_live(endpoint: str, marker: str, count: int, seed: int) -> Calibration:
-    """Calibrate the robot of the system at `endpoint`; raises UserError if no system runs, or it sends no pictures."""
+    """Calibrate the robot of the system at `endpoint` by moving its hand with a tag, and return the calibration.
+
+    `marker`: marker that carries the tag. `count`: number of postures. `seed`: chooses the postures. Raises UserError if no system runs, or
+    if it sends no pictures.
+    """
     with connected(endpoint) as session:
         robot, world = _robot_of(session, endpoint)
         settings = CameraSettings()

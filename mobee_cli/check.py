@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee check`: reports what is wrong with a robot or world file, with line numbers."""
+"""`mobee check`: reports faults of a robot or world file, with line numbers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FEW = 0.5  # of the random poses: a pair that touches in fewer may be a true col
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the file and the options."""
+    """Add the options of `mobee check` to the parser: the file and others."""
     parser.epilog = _NOTES
     parser.add_argument("file", help="shipped robot or world, or path of a .xml, .urdf or MJCF file")
     parser.add_argument("--world", metavar="FILE", help="also check what the robot touches at home in this world")
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check the file and print the findings."""
+    """Run `mobee check`: check the file, print the findings, and return the exit code (0: at most notes, 1: something is wrong)."""
     try:
         world = load_world(arguments.world) if arguments.world else None
         written = _write_srdf(arguments) if arguments.write_srdf is not None else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee completion`: prints the script with which a shell completes verbs, options and files of this command."""
+"""`mobee completion`: prints a script with which a shell completes the verbs, options and files of this command."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ A new shell then completes `mobee re<TAB>`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the shell."""
+    """Add the argument of `mobee completion` to the parser: the name of the shell."""
     parser.epilog = _NOTES
     parser.add_argument("shell", choices=SHELLS, help="the shell that reads the script")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the script."""
+    """Run `mobee completion`: print the script for the shell, and return the exit code."""
     import shtab
 
     print(shtab.complete(whole_parser(), arguments.shell))
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def whole_parser() -> argparse.ArgumentParser:
-    """Return a parser of the whole command; imports the module of every verb."""
+    """Return one parser for the whole command `mobee` with all verbs and their options. The module of every verb is imported."""
     import shtab
 
     from mobee_cli.__main__ import VERBS

@@ -16,7 +16,7 @@ PATIENCE = 0.3  # s: a system that runs answers at once
 
 
 def add_endpoint(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the address of the router, and for the keys of a secured system."""
+    """Add two options to a parser: --endpoint, the address of the router, and --keys, the keys of a secured system."""
     text = "address of the router (default: %(default)s)"
     parser.add_argument("--endpoint", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ADDRESS", help=text)
     text = f"folder of keys of a secured system (default: ${KEYS}); the identity is {OPERATOR}, unless ${IDENTITY} names another"
@@ -24,7 +24,7 @@ def add_endpoint(parser: argparse.ArgumentParser) -> None:
 
 
 def endpoint(text: str) -> str:
-    """Return an address of a router; raises ArgumentTypeError for one that Zenoh could not use."""
+    """Check the address of a router that a user gives, and return it. Raises ArgumentTypeError if Zenoh cannot use it."""
     protocol, _, place = text.partition("/")
     if not place or (protocol == "tcp" and not place.rpartition(":")[2].isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r} is no address of a router: write tcp/HOST:PORT, such as {DEFAULT_ENDPOINT}")
@@ -33,7 +33,10 @@ def endpoint(text: str) -> str:
 
 @contextmanager
 def connected(endpoint: str, patience: float = PATIENCE) -> Iterator[Any]:
-    """Open a session with the running system; raises UserError if there is none within `patience` s."""
+    """Open a session with the running system for the block of a `with` statement.
+
+    Raises UserError if no system answers within `patience` s.
+    """
     from services.common.session import BusUnreachable, open_client  # it needs zenoh, and `mobee doctor` works without
 
     try:

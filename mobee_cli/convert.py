@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee convert`: converts zero-position XML to URDF and back, and older zero-position files to the present version."""
+"""`mobee convert`: converts zero-position XML to URDF and back, and older zero-position files to the present format."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WRITERS = {".xml": write_xml, ".urdf": write_urdf}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the input file, the output file and the options for URDF files."""
+    """Add the options of `mobee convert` to the parser: input file, output file and options for URDF files."""
     parser.add_argument("source", metavar="IN", help="shipped robot, or a .xml, .urdf or MJCF file, or a world in .xml")
     parser.add_argument("target", metavar="OUT", type=Path, help=".xml or .urdf file to write")
     add_urdf_options(parser)
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Convert the file, and print the written content and the content that the new format cannot express."""
+    """Run `mobee convert`: write the file, print what it contains and what the new format cannot express, and return the exit code."""
     target: Path = arguments.target
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee detector train`: trains a detector of the things of a world on rendered pictures, and writes it as ONNX."""
+"""`mobee detector train`: trains a detector of the objects (things) of a world on rendered pictures, and writes it as ONNX."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FILE holds the network and the things; the vision service uses it:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the only action."""
+    """Add the options of `mobee detector` to the parser: its only action, train."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="train")
     one = actions.add_parser(
         "train", help=_DESCRIPTION, description=_DESCRIPTION, epilog=_NOTES, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Train, save and print."""
+    """Run `mobee detector train`: train the detector, save it, print its quality, and return the exit code."""
     file: Path = arguments.file
     if file.suffix != SUFFIX:
         raise UserError(f"{file}: its name must end in {SUFFIX}", BAD_INPUT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee doctor`: checks this machine and this installation, and names a command that repairs each fault."""
+"""`mobee doctor`: checks this machine and this installation, and names a command that corrects each fault."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ EXTRAS = {
     "planning": {"ompl": "ompl"},
     "bench": {"mujoco": "mujoco", "cma": "cma", "mink": "mink", "quantecon": "quantecon"},
 }
-"""Extras of this project: importable package -> its distribution."""
+"""The extras of this project. For each, the packages that can be imported and the distributions that contain them."""
 WANTED = ("live", "sim", "viz")  # of `mobee launch`
 _NOTES = """A line is ok, a note (`mobee launch` does not need it), or wrong, with the
 command that mends it.
@@ -45,7 +45,10 @@ Verdict = Literal["ok", "note", "wrong"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report."""
+    """One line of the report.
+
+    `subject`: what was checked. `verdict`: ok, note or wrong. `found`: what was found. `remedy`: what to do about it.
+    """
 
     subject: str
     verdict: Verdict
@@ -54,14 +57,17 @@ class Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `mobee doctor` to the parser."""
     parser.epilog = _NOTES
     add_endpoint(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check everything and print the findings."""
+    """Run `mobee doctor`: check everything, print the findings, and return the exit code.
+
+    0: `mobee launch` can start here; 3: something is wrong.
+    """
     findings = list(examine(arguments.endpoint))
     if arguments.json:
         print(json.dumps([asdict(one) for one in findings], indent=2))
@@ -72,7 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def examine(endpoint: str) -> Iterator[Finding]:
-    """Yield the findings, each independent of the others."""
+    """Yield the findings one by one; each check is independent of the others.
+
+    `endpoint`: address of the router of a system that may run.
+    """
     yield _python()
     yield _cores()
     yield _memory()

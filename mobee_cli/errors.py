@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error that a verb raises when its user, or the machine, has to change something."""
+"""The error that a verb raises if its user must change something, or if the machine has a fault."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from services.common.exit_codes import FAILED
 
 
 class UserError(Exception):
-    """A message for standard error, and the exit code of the command."""
+    """Raised to end a verb. The text is printed on standard error; `code` is the exit code of the command."""
 
     def __init__(self, text: str, code: int = FAILED) -> None:
         super().__init__(text)

@@ -24,14 +24,14 @@ _REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under atta
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `mobee estop` to the parser."""
     add_endpoint(parser)
     parser.add_argument("--reset", action="store_true", help="release the robot: the controller and the agents continue at once")
     parser.add_argument("--reason", default="asked for at the terminal", help="text for the event log (default: %(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Send the stop or the release, and wait until the robot confirms it."""
+    """Run `mobee estop`: send the emergency stop or its release, wait until the robot confirms it, and return the exit code."""
     if arguments.reset:
         _release(arguments.endpoint)
         return 0

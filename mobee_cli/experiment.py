@@ -59,7 +59,7 @@ _NOT_OPTIONS = ("json", "runs", "resume", "track")  # of the experiment: they ma
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a parser for each action."""
+    """Add the options of `mobee experiment` to the parser: one subcommand for each action (list, run, figure, claims)."""
     parser.set_defaults(make_parser=type(parser))
     actions = parser.add_subparsers(dest="action", required=True, metavar="list|run|figure|claims")
     listing = actions.add_parser("list", help="list all experiments", description="List all experiments with claims and sources.")
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the requested action of the command."""
+    """Run the action of `mobee experiment` that the arguments name, and return the exit code."""
     try:
         if arguments.action == "list":
             return _list(arguments)

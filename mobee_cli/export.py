@@ -32,7 +32,7 @@ _IN_THE_RUN = Path()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the run and the file."""
+    """Add the options of `mobee export` to the parser: the run, and the kind and name of the file."""
     parser.epilog = _NOTES
     parser.add_argument(
         "run", type=Path, metavar="RUN", help=f"folder of a run of `mobee launch` or `mobee experiment`, or a file such as {STORE}"
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the table."""
+    """Run `mobee export`: write the table, print its number of rows, and return the exit code."""
     if not arguments.run.exists():
         raise UserError(f"{arguments.run}: there is no such folder; give the folder of a run, one of those in runs/", BAD_INPUT)
     file: Path = arguments.parquet or arguments.csv or arguments.reaches or _IN_THE_RUN
@@ -76,7 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def write_csv(file: Path, records: Iterable[Record]) -> int:
-    """Write one line per transition, lists as JSON, empty cells where a record lacks a column; return the number of lines."""
+    """Write transitions as CSV, one line for each, and return the number of lines.
+
+    `records`: transitions of one agent each. Lists are written as JSON; a cell is empty if the record lacks this column.
+    """
     rows = 0
     with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
         lines = csv.writer(sink)
@@ -89,7 +92,11 @@ def write_csv(file: Path, records: Iterable[Record]) -> int:
 
 
 def write_parquet(file: Path, records: Iterable[Record]) -> int:
-    """Write a row per transition, a row group per agent, and all settings as JSON in the metadata; return the number of rows."""
+    """Write transitions as Parquet, and return the number of rows.
+
+    Each record (the transitions of one agent) is a row group. The settings of all agents are JSON in the metadata of the file. Raises
+    UserError if pyarrow is not installed.
+    """
     try:
         import pyarrow as arrow
         from pyarrow import parquet
@@ -121,7 +128,10 @@ def _text(value: Any) -> Any:
 
 @contextmanager
 def written_whole(file: Path) -> Iterator[Path]:
-    """Yield a temporary path, renamed to the file when everything is written."""
+    """Yield a temporary path for the block of a `with` statement.
+
+    If the block succeeds, the file at this path is renamed to `file`; else it is removed.
+    """
     unfinished = file.with_name(f"{file.name}.unfinished")
     try:
         yield unfinished
@@ -131,7 +141,10 @@ def written_whole(file: Path) -> Iterator[Path]:
 
 
 def write_reaches(file: Path, folder: Path) -> int:
-    """Write a line per step of every reach that was learned from; return the number of lines.  Raises MobeeError if there are none."""
+    """Write all reaches from which agents have learned as CSV, one line for each step, and return the number of lines.
+
+    Raises MobeeError if the run has no such reaches.
+    """
     rows = 0
     with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:
         lines = csv.writer(sink)

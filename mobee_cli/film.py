@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee film`: makes a film of a run."""
+"""`mobee film`: makes a film of a recorded run."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ twice the robot's speed, with the stories of up to three agents."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the run and the file."""
+    """Add the options of `mobee film` to the parser: the folder of the run and the file."""
     parser.epilog = _NOTES
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run that had a monitor")
     parser.add_argument("--to", type=Path, metavar="FILE", help="film.gif or film.mp4 (default: film.gif in the folder)")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw and write the film."""
+    """Run `mobee film`: draw the film, write it, and return the exit code."""
     folder: Path = arguments.run
     if not folder.is_dir():
         raise UserError(f"{folder}: there is no such folder; runs of `mobee launch` are in runs/", BAD_INPUT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee keys`: makes the keys of a secured system (new, add), and prints what each identity is and until when it is valid (list)."""
+"""`mobee keys`: makes the keys of a secured system (new, add), and lists all identities and how long they are valid (list)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Then: mobee launch --secure, mobee status --keys DIR."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a parser for each action."""
+    """Add the options of `mobee keys` to the parser: one subcommand for each action (new, add, list)."""
     parser.epilog = _NOTES
     actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(_ACTIONS))
     new = actions.add_parser("new", help="make an authority and an identity for each service", description="Make a folder of keys.")
@@ -60,7 +60,7 @@ def _add_days(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action."""
+    """Run the action of `mobee keys` that the arguments name, and return the exit code."""
     folder = arguments.folder or default_folder()
     try:
         return _ACTIONS[arguments.action](folder, arguments)

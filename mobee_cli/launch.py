@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee launch`: starts a scenario, keeps it running, and prints a summary at the end."""
+"""`mobee launch`: starts a scenario, supervises it until it ends, and prints a summary."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ standard output, everything else to standard error."""
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add the option --set."""
+    """Add the option --set, which changes a setting of a scenario, to a parser."""
     text = "change a setting, such as services.model.contact_forces=false"
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="FIELD=VALUE", help=text)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the scenario and the options."""
+    """Add the options of `mobee launch` to the parser: the scenario and others."""
     parser.epilog = _NOTES.format(scenarios=", ".join(shipped()))
     parser.add_argument("scenario", nargs="?", default="default", help="shipped scenario, or path of a .toml file (default: default)")
     add_settings(parser)
@@ -84,7 +84,7 @@ def _computer() -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Launch, and return at the end."""
+    """Run `mobee launch`: start the scenario, wait for its end, and return the exit code of `services.launcher.run.launch`."""
     _check(arguments)
     if arguments.keys is not None and not arguments.secure:
         raise UserError("--keys is for --secure: give both, or neither", BAD_INPUT)

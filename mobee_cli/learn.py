@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee learn`: agents learn offline on any robot, and their transitions are kept in a file."""
+"""`mobee learn`: lets agents learn offline on any robot, and writes their transitions to a file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ written the robot, FILE.xml, and a scenario to continue live, FILE.toml; with
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add robot, number of transitions, file and options."""
+    """Add the options of `mobee learn` to the parser: robot, number of transitions, file and others."""
     parser.epilog = _NOTES
     add_robot(parser, f"default: {DEFAULT}")
     add_world(parser)
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Derive the agents of the robot, let them learn, and print the results."""
+    """Run `mobee learn`: derive agents from the robot, let them learn, print the results, and return the exit code."""
     curves = arguments.store.with_name(f"{arguments.store.stem}-tensorboard")
     if arguments.store.suffix != ".sqlite":
         raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)

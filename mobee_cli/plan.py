@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee plan`: plans a path between states or poses with what an agent of a run has learned."""
+"""`mobee plan`: plans a path between states or poses with the model that an agent has learned in a run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _NAME_IT = " The run does not record the file of its robot: name it with --robot
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the run, the agent, goal and start."""
+    """Add the options of `mobee plan` to the parser: run, agent, goal, start and others."""
     parser.epilog = _NOTES
     parser.add_argument("--run", type=Path, required=True, metavar="RUN", help=f"folder of the run, or its file {STORE}")
     parser.add_argument("--agent", metavar="PART", help="part of the agent, if the run had several agents")
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rebuild the agent's model, plan, and print the plan."""
+    """Run `mobee plan`: rebuild the agent's model from its transitions, plan a path, print it, and return the exit code."""
     file = store_of(arguments.run)
     try:
         learned = load_learned(file, arguments.agent, _robot(arguments))

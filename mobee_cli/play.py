@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee play`: any robot becomes curious: derives its parts, learns offline for some seconds, and continues live."""
+"""`mobee play`: makes any robot curious. It derives agents from the robot, lets them learn offline for some seconds, and continues live."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ the page is in the table of services; Ctrl-C ends everything. docs/play.md."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the robot and the options."""
+    """Add the options of `mobee play` to the parser: the robot and others."""
     parser.epilog = _NOTES
     parser.add_argument("robot", nargs="?", default=ICUB, metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
     add_urdf_options(parser)
@@ -51,7 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Derive the agents of the robot, let them learn offline, then live; return the exit code of the live system."""
+    """Run `mobee play`: derive agents from the robot, let them learn offline, then live.
+
+    Returns the exit code, which is that of the live system if one is started.
+    """
     if arguments.learned is not None:
         files = Files(arguments.learned)
         if not files.store.is_file() or not files.scenario.is_file():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee reach`: reaches for a position or an object, with the running robot or offline."""
+"""`mobee reach`: moves a hand to a position or an object, with the running robot or offline."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Exit code: 0 reached, 1 not reached, 2 bad input, 3 no system is running."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the target, the hand, and the robot."""
+    """Add the options of `mobee reach` to the parser: target, hand, robot and others."""
     parser.epilog = _NOTES
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="position of the target [m]")
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reach, and print the result."""
+    """Run `mobee reach`: reach for the target, print the result, and return the exit code (0: reached, 1: not reached)."""
     if arguments.aim is None:
         arguments.aim = "surface" if arguments.object is not None or arguments.facing else "centre"
     try:
@@ -85,7 +85,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A marker, the part that moves it, and how they were chosen; "" if the user gave both."""
+    """The hand that reaches.
+
+    `marker`: marker to bring to the target. `part`: part that moves it. `why`: how they were chosen; empty if the user gave both.
+    """
 
     marker: str
     part: str
@@ -93,13 +96,15 @@ class Hand:
 
 
 Choose = Callable[[Robot, Array | None], Hand]
-"""Chooses the hand of a robot for a target at a position (3,) m, or None where the position is not known."""
+"""A function that chooses the hand of a robot for a target. Its arguments: the robot, and the target's position (3,) m in the root
+frame, or None if it is not known."""
 
 
 def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: str | None) -> Hand:
-    """Return the hand for a target; a part or marker that is not given follows from the target and the robot.
+    """Return the hand that reaches for a target. If `part` or `marker` is None, it is chosen by the target and the robot.
 
-    Raises UnknownName for a part or a marker that the robot does not have, InvalidValue if no motor moves the marker.
+    `position`: of the target, (3,) m in the root frame; None: not known. Raises UnknownName for a part or marker that the robot does not
+    have, InvalidValue if no motor moves the marker.
     """
     if part is not None:
         robot.part(part)
@@ -113,10 +118,11 @@ def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """A plant, offline or live, and the hand that reaches.
+    """The plant on which a hand reaches, offline or live.
 
-    `q`: measures all motors, (n,) rad.  `present_object`: makes an object of the plant's world the target.  `first_motion`: time from
-    the last request to the first command that moves [s]; None offline.
+    `hand`: the marker and the part that reach. `q`: measures the positions of all motors, (n,) rad. `present_object(name, aim, faces)`:
+    makes an object of the plant's world the target and returns the target. `first_motion`: returns the time from the last request to the
+    first command that moves the robot [s]; None offline.
     """
 
     robot: Robot
@@ -128,13 +134,16 @@ class Setup:
 
     @property
     def model(self) -> Model:
-        """The robot without a world."""
+        """A model of the robot without any world objects."""
         return Model(self.robot)
 
 
 @contextmanager
 def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> Iterator[Setup]:
-    """Set up the offline plant with the robot at home in a world; `target`: the position (3,) m, or the name of an object."""
+    """Set up the offline plant with the robot at home in a world, for the block of a `with` statement.
+
+    `choose`: chooses the hand. `target`: a position (3,) m in the root frame, or the name of an object in the world.
+    """
     known = {name: found.position for name, found in world.objects.items()}
     hand = choose(robot, known.get(target) if isinstance(target, str) else target)
     plant = OfflinePlant(Model(robot, world))
@@ -234,14 +243,14 @@ def _place(position: Array) -> str:
 
 
 def store_of(run: Path) -> Path:
-    """Return the database of a run, given as its folder or as this file."""
+    """Return the path of a run's database. `run`: folder of the run, or the path of the database itself."""
     return run / STORE if run.is_dir() else run
 
 
 def go_to_pre_reach(agent: ReachAgent, target: ReachTarget) -> tuple[tuple[int, ...], tuple[tuple[int, int], ...], float]:
-    """Move to the state from which reaching for a target promises the largest reward.
+    """Move to the state from which the agent expects the largest reward of a reach for the target.
 
-    The agent remembers transitions that fail, and plans around them.
+    After each transition the agent plans again. It remembers transitions that have failed, and plans around them.
 
     Returns:
         The states of the path, the transitions (state, goal) that the plans avoided, and the reward expected in the last state.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee reach` with the running robot."""
+"""Sets up `mobee reach` with the running robot."""
 
 from __future__ import annotations
 
@@ -41,7 +41,10 @@ MOVES = {"position": 5e-5, "velocity": 5e-3, "torque": 25e-3}  # rad, rad/s, N m
 
 
 class LivePlant(BusPlant):
-    """A BusPlant whose calls time out, and that measures when a reach begins to move the robot."""
+    """A BusPlant whose calls raise an error after a time limit.
+
+    It also measures how soon the robot begins to move after a reach is requested.
+    """
 
     def __init__(self, service: Service, robot: Robot, part: str, modality: str) -> None:
         super().__init__(service, robot, (part,))
@@ -54,12 +57,15 @@ class LivePlant(BusPlant):
 
     @property
     def q(self) -> Array:
-        """Positions of all motors, as of a BusPlant; raises UserError if no tick arrives for 8 s."""
+        """The positions of all motors in the newest tick, (n,) rad. Raises UserError if no tick arrives for 8 s."""
         with self._timeout(CONTROL_TIMEOUT, f"no tick of the robot in {CONTROL_TIMEOUT:g} s: `mobee status` shows whether robot_sim runs"):
             return super().q
 
     def measure(self, part: str) -> Array:
-        """Measure a part, as a BusPlant; raises UserError if the part stays in hold or another client owns it."""
+        """Measure the motor positions of a part, (n_part,) rad.
+
+        Raises UserError if the part stays in hold for 8 s, or another client owns it.
+        """
         with self._timeout(CONTROL_TIMEOUT, f"{part} is in hold: `mobee status` shows why, `mobee estop --reset` ends an emergency stop"):
             try:
                 return super().measure(part)
@@ -69,18 +75,21 @@ class LivePlant(BusPlant):
                 raise UserError(f"{error}. `mobee launch reach` starts a system in which no agent owns it.", FAILED) from None
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Do the same as `BusPlant`, but raise an error after REACH_TIMEOUT."""
+        """Move a part to a target (n_part,) rad and return the outcome, as BusPlant does. Raises UserError after REACH_TIMEOUT (300 s)."""
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Do the same as `BusPlant`, but raise an error after REACH_TIMEOUT."""
+        """Reach for the presented target with a marker and return the outcome, as BusPlant does.
+
+        Raises UserError after REACH_TIMEOUT (300 s).
+        """
         self._asked, self._heard, self._begun = time.monotonic(), np.inf, np.inf
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().reach(part, marker, stay)
 
     def first_motion(self) -> float | None:
-        """Return the time from the last request to the first command that moves [s]; None if there was none."""
+        """Return the time [s] from the last request of a reach to the first command that moves the robot; None without such a command."""
         moved = first_moving_command(self._commands, self._begun, self._moves)
         return None if moved is None else self._heard - self._asked + moved - self._begun
 
@@ -112,7 +121,11 @@ class LivePlant(BusPlant):
 
 
 def first_moving_command(commands: list[tuple[float, Array]], begun: float, moves: float) -> float | None:
-    """Return when the first command since `begun` was sent that differs by more than `moves` from the last one before."""
+    """Return the time at which the first command was sent that begins to move the robot; None if there is none.
+
+    `commands`: (time sent [s], values (n_part,)), in order. `begun`: time [s] of the reach, by the same clock. `moves`: least difference
+    from the last command before `begun`, in the unit of the values.
+    """
     before = [ref for sent, ref in commands if sent < begun]
     moving = (sent for sent, ref in commands if sent >= begun and before and np.abs(ref - before[-1]).max() > moves)
     return next(moving, None)
@@ -120,9 +133,9 @@ def first_moving_command(commands: list[tuple[float, Array]], begun: float, move
 
 @contextmanager
 def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Setup]:
-    """Set up the robot of the system at `endpoint`; the part that reaches is taken, and released at the end.
+    """Set up the robot of the system at `endpoint`, for the block of a `with` statement. At its end the part that reaches is released.
 
-    `target`: the position (3,) m, or the name of an object.  Raises UserError if no system runs.
+    `choose`: chooses the hand. `target`: a position (3,) m in the root frame, or the name of an object. Raises UserError if no system runs.
     """
     with connected(endpoint) as session:
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the result of a reach."""
+"""The result of a reach, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ _COLUMNS = 80
 class Result:
     """The result of a reach.
 
-    `why`: how marker and part were chosen; "" if they were given.  `path`: the states before the reach; empty without a run.
-    `avoided`: transitions that were expected to fail, as pairs (state, goal).  `expected`: reward; None without a run.
-    `angle`: rad, between the marker's normal and the direction to the target at the end; None if it need not face the target.
-    `first_motion`: time from the request to the first command that moves [s]; None offline.
+    `part`, `marker`: what reached; `why`: how they were chosen, empty if the user gave them. `outcome`: outcome of the reach. `nearest`:
+    the position nearest to the target that the marker can reach. `reward`: reward of the reach; `expected`: the reward that the agent
+    expected, None without an agent. `first_motion`: time from the request to the first command that moves the robot [s]; None offline.
+    `angle`: angle [rad] between the marker's normal and the direction to the target at the end; None if the marker need not face the
+    target. `path`: states to which the agent moved before the reach; empty without an agent. `avoided`: transitions (state, goal) that were
+    expected to fail.
     """
 
     part: str
@@ -42,21 +44,21 @@ class Result:
 
     @property
     def error(self) -> float:
-        """Distance of the marker from the target's surface at the end [m]; 0 inside."""
+        """The distance of the marker from the target's surface at the end [m]; 0 if it is inside the target."""
         return max(float(np.linalg.norm(self.target.position - self.outcome.marker)) - self.target.radius, 0.0)
 
     @property
     def reached(self) -> bool:
-        """Whether the marker reached the target."""
+        """Whether the marker ended at most 2 cm from the target's surface, or inside the target."""
         return self.error <= REACHED_DISTANCE
 
     @property
     def beyond(self) -> float:
-        """Distance from the target's surface to the nearest position that the marker can reach [m]."""
+        """The distance from the target's surface to the nearest position that the marker can reach [m]; 0 if this is inside the target."""
         return max(self.nearest.distance - self.target.radius, 0.0)
 
     def as_json(self) -> dict[str, Any]:
-        """Return the result as plain JSON values."""
+        """Return the result as plain JSON data. Lengths are in m, angles in rad, times in s."""
         outcome = self.outcome
         return {
             "reached": self.reached,
@@ -80,7 +82,7 @@ class Result:
 
 
 def lines(result: Result) -> list[str]:
-    """Return the result as text, at most 80 columns wide."""
+    """Return the result as lines of text, at most 80 columns wide."""
     outcome, aim = result.outcome, result.target.aim
     verdict = "reached" if result.reached else "did not reach"
     chosen = [f"Reaching with {result.marker}, moved by part {result.part}: {result.why}."] if result.why else []

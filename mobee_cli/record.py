@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee record`: records every message of a running system, beside the recorder that the launcher starts."""
+"""`mobee record`: records the messages of a running system, in addition to the recorder that the launcher starts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Ctrl-C. Foxglove and Rerun open the files; `mobee replay` plays them again."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the folder, the robot and the limits."""
+    """Add the options of `mobee record` to the parser: folder, robot, limits and others."""
     parser.epilog = _NOTES
     add_endpoint(parser)
     parser.add_argument("--to", type=Path, default=Path("."), metavar="DIR", help="folder of the files (default: the working directory)")
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until Ctrl-C."""
+    """Run `mobee record`: record messages until Ctrl-C, and return the exit code."""
     from services.recorder.__main__ import record
     from services.recorder.config import Config
 

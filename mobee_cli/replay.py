@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee replay`: plays a run again: on its page, into its controller or model, or beside another run."""
+"""`mobee replay`: plays a run again on its page or into its controller or model, or compares it with another run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ compared tick by tick. Exit code of these two: 0 equal to the last bit,
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the run, and what to do with it."""
+    """Add the options of `mobee replay` to the parser: the run, and what to do with it."""
     parser.epilog = _NOTES
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run, or a recording")
     what = parser.add_mutually_exclusive_group()
@@ -47,7 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay the run as the options say."""
+    """Run `mobee replay`: show the run, play it into a service, or compare it with another run, as the options say.
+
+    Returns the exit code.
+    """
     place: Path = arguments.run
     if not place.exists():
         raise UserError(f"{place}: there is no such folder or recording; runs of `mobee launch` are in runs/", BAD_INPUT)

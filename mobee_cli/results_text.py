@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Formats the results of an experiment for a terminal: lines, and tables of results with the same names."""
+"""Formats the results of an experiment for a terminal: as lines, and as tables where several results have the same names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STEP = 2  # spaces that a level is farther in
 
 
 def results_text(results: Mapping[str, Any], width: int) -> str:
-    """Return results, of the types that JSON has, in lines of at most `width` characters as far as words allow it."""
+    """Return results (JSON data) as text for a terminal. Lines have at most `width` characters, unless a single word is longer."""
     return "\n".join(_entries(results, "", width))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options for the robot and the world of verbs that need no running system."""
+"""Options for the robot and the world, for verbs that need no running system."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from services.common.worlds import NO_WORLD, is_path, world_around
 
 
 def add_urdf_options(parser: argparse.ArgumentParser) -> None:
-    """Add options for the keywords of load_robot."""
+    """Add options for the keywords of `mobee.load_robot` to a parser: --field, --meshes, --corners, --srdf and --home."""
     parser.add_argument("--field", type=float, metavar="M", help="give every solid of a URDF a field that is larger by M [m]")
     parser.add_argument("--meshes", choices=("hull", "bounding"), help="read meshes of a URDF as convex hulls or as bounding primitives")
     parser.add_argument(
@@ -30,7 +30,7 @@ def add_urdf_options(parser: argparse.ArgumentParser) -> None:
 
 
 def urdf_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the keywords of load_robot from the options."""
+    """Return the keywords of `mobee.load_robot` that the arguments give, by name; None for each that is not given."""
     return {name: getattr(arguments, name) for name in ("field", "meshes", "corners", "srdf", "home")}
 
 
@@ -47,37 +47,41 @@ _RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
 
 
 def add_robot(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the option for the robot; `text` explains the default."""
+    """Add the option --robot, and options for URDF files, to a parser. `text`: explains the default in the help."""
     parser.add_argument("--robot", metavar="FILE", help=f"shipped robot, or path of a .xml or .urdf file ({text})")
     add_urdf_options(parser)
 
 
 def add_world(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the world."""
+    """Add the option --world to a parser."""
     text = f"shipped world, path of a .xml file, or {NO_WORLD} (default: the table for the shipped iCubs, {NO_WORLD} for other robots)"
     parser.add_argument("--world", metavar="FILE", help=text)
 
 
 def add_cameras(parser: argparse.ArgumentParser) -> None:
-    """Add the option for cameras on links."""
+    """Add the option --camera, for cameras on links, to a parser."""
     text = "a camera on a link or marker, as hand or hand=0,0,0.1,0,0,1: a place [m] and a direction of view in its frame; may be repeated"
     parser.add_argument("--camera", dest="cameras", action="append", default=[], metavar="LINK", help=text)
 
 
 def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
-    """Load the robot of the options, or the default; raises MobeeError."""
+    """Load the robot that the arguments name, or the default robot. Raises MobeeError if it cannot be read."""
     return load_robot(arguments.robot or default, **urdf_options(arguments))
 
 
 def world_given(arguments: argparse.Namespace, default: str = DEFAULT) -> World:
-    """Load the world of the options; raises MobeeError."""
+    """Load the world that the arguments name; without a name, the usual world of the robot.
+
+    `default`: robot if the arguments name none. Raises MobeeError.
+    """
     return world_around(arguments.world, arguments.robot or default)
 
 
 def robot_of_run(run: Path) -> str | None:
-    """Return the name or path of the robot in the settings of a run, None if the run has none; raises UserError.
+    """Return the name or path of the robot in the settings of a run; None if the run has no settings, or they name no robot.
 
-    `run`: the folder of a run of `mobee launch`, or a file in it.
+    `run`: folder of a run of `mobee launch`, or a file in it. Raises UserError if the settings cannot be read, or their robot file does not
+    exist.
     """
     file = (run if run.is_dir() else run.parent) / _RUN_SETTINGS
     try:
@@ -97,12 +101,18 @@ def robot_of_run(run: Path) -> str | None:
 
 
 def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot", "world")) -> list[str]:
-    """Return the given options of robot and world as on the command line: those of `names`, and all of a URDF."""
+    """Return the options for robot, world and URDF files that the user has given, as on the command line, such as "--robot icub".
+
+    `names`: which of robot and world to include.
+    """
     options = {name: getattr(arguments, name, None) for name in names} | urdf_options(arguments)
     return [f"--{name} {value}" for name, value in options.items() if value is not None]
 
 
 def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
-    """Raise UserError for the first given option, none of which the verb uses here."""
+    """Raise UserError for the first option for robot, world or URDF files that the user has given, because the verb cannot use it.
+
+    `why`: text of the error. `names`: which of robot and world to include.
+    """
     for option in given_options(arguments, names):
         raise UserError(f"{option}: {why}", BAD_INPUT)

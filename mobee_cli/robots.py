@@ -18,12 +18,15 @@ _README = "README.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `mobee robots` to the parser."""
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the robots with their parts and shapes, the worlds, and their sources and licences."""
+    """Run `mobee robots`: print the shipped robots with their parts and shapes, the worlds, and their sources and licences.
+
+    Returns the exit code.
+    """
     text = (ROBOTS / _README).read_text()
     listed = {
         "robots": {name: _robot(name, text) for name in shipped_robots()},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee router`: runs only the router, for systems whose services are started one by one, as in containers."""
+"""`mobee router`: runs only the router, for systems whose services are started one by one, such as in containers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from services.launcher.security import Refusals
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the address and the keys."""
+    """Add the options of `mobee router` to the parser: address, keys and others."""
     text = "address to listen at (default: %(default)s)"
     parser.add_argument("--listen", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ADDRESS", help=text)
     parser.add_argument(
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Route until SIGTERM, Ctrl-C or `mobee stop`."""
+    """Run `mobee router`: pass messages until SIGTERM, Ctrl-C or `mobee stop`, and return the exit code."""
     if arguments.keys is not None and not arguments.secure:
         raise UserError("--keys is for --secure: give both, or neither", BAD_INPUT)
     with contextlib.ExitStack() as opened:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee status`: shows services, gates of the parts, and agents."""
+"""`mobee status`: shows the services, the state of each part's safety gate, and the agents."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ NO_COMMAND = -1  # age of the command in force, in a State
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `mobee status` to the parser."""
     parser.epilog = "Exit code: 0 all services are ready, 1 a service is down or does not answer, \n3 no system is running."
     add_endpoint(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask all services and print their states."""
+    """Run `mobee status`: ask all services, print their states, and return the exit code (0: all are ready, 1: one is not)."""
     states: dict[str, Received] = {}
     with connected(arguments.endpoint) as session:
         listen(session, State.stream.keys(), lambda received: states.update({received.key: received}))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee stop`: ends the running system in order."""
+"""`mobee stop`: ends the running system in an orderly manner."""
 
 from __future__ import annotations
 
@@ -19,12 +19,15 @@ _START = 2.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `mobee stop` to the parser."""
     add_endpoint(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Ask the launcher to end everything; without a launcher, ask every service and then the router."""
+    """Run `mobee stop`: ask the launcher to end everything, wait for this, and return the exit code.
+
+    Without a launcher, ask every service and then the router.
+    """
     with connected(arguments.endpoint) as session:
         present = alive(session)
         names = ["launcher"] if "launcher" in present else sorted(set(present) - {"router"}) + ["router"]

@@ -23,7 +23,7 @@ HZ_WINDOW = 1.0  # s that each line of `hz` covers
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a parser for each action."""
+    """Add the options of `mobee topic` to the parser: one subcommand for each action (list, echo, hz, schema)."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(_ACTIONS))
     for name, (text, add, _) in _ACTIONS.items():
         action = actions.add_parser(name, description=text, help=text)
@@ -33,7 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the requested action, connected to the running system if it needs one."""
+    """Run the action of `mobee topic` that the arguments name, connected to the running system if the action needs it.
+
+    Returns the exit code.
+    """
     if arguments.action == "schema":
         return _schema(None, arguments)
     with connected(arguments.endpoint) as session:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee view`: shows a robot file in motion."""
+"""`mobee view`: shows the robot of a file in motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ for `rerun FILE`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the file and the options."""
+    """Add the options of `mobee view` to the parser: the file and others."""
     parser.epilog = _NOTES
     parser.add_argument("file", help="shipped robot, or path of a .xml or .urdf file")
     parser.add_argument("--world", metavar="FILE", help="shipped world, or path of a .xml file, to show around it")
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Load the robot and show it in motion."""
+    """Run `mobee view`: load the robot, show it in motion, and return the exit code."""
     save: Path | None = arguments.save
     require_recording(save)
     try:
@@ -48,7 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def require_recording(save: Path | None) -> None:
-    """Raise UserError if a recording cannot be written to this path."""
+    """Raise UserError if a recording cannot be written to the path `save`: its name must end in .rrd, and its folder must exist.
+
+    None is valid.
+    """
     if save is not None and save.suffix.lower() != ".rrd":
         raise UserError(f"--save {save}: recordings must have a name that ends in .rrd", BAD_INPUT)
     if save is not None and not save.resolve().parent.is_dir():
@@ -56,9 +59,10 @@ def require_recording(save: Path | None) -> None:
 
 
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None, solids: bool = False) -> int:
-    """Show the robot on a page until Ctrl-C, or save a recording; `stretches`: parts of the motion, None: through all ranges.
+    """Show the robot in motion on a page until Ctrl-C, or save the motion to a file; return the exit code.
 
-    `solids`: show the solids in place of the file's visuals.
+    `world`: objects around the robot. `save`: file to write; None: show a page. `stretches`: sections of the motion, as of
+    `services.monitor.viewer.view.Stretch`; None: every motor through its range. `solids`: show the solids instead of the visuals.
     """
     try:
         from services.monitor.viewer.view import view  # needs the viewer, which is an extra

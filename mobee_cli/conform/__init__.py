@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee conform`: plays the controller for a robot_sim, and reports what breaks the contract."""
+"""`mobee conform`: acts as the controller of a robot_sim, and reports which rules of the bus contract it breaks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Exit code: 0 all rules are kept, 1 a rule is broken, 2 bad input, 3 no robot."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add endpoint, robot and choice of checks."""
+    """Add the options of `mobee conform` to the parser: endpoint, robot and choice of the checks."""
     parser.epilog = _NOTES
     text = "address of the router (default: %(default)s)"
     parser.add_argument("endpoint", nargs="?", type=endpoint, default=DEFAULT_ENDPOINT, metavar="ENDPOINT", help=text)
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the checks and print the result of each."""
+    """Run `mobee conform`: run the checks, print their results, and return the exit code (0: all rules are kept, 1: one is broken)."""
     try:
         robot = robot_given(arguments)
         part = arguments.part or next(iter(robot.parts))
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def broken(check: Check, player: Player, part: str) -> str | None:
-    """Run a check; return the violation, or None."""
+    """Run a check on a part. Returns None if the rule is kept, else a description of the violation."""
     try:
         check.test(player, part)
     except Broken as found:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rules that every robot_sim must keep, each as a check (docs/hardware.md). A check raises Broken."""
+"""The rules of the bus contract that every robot_sim must keep, each with a check (docs/hardware.md).
+
+A check is a function of a player, which acts as the controller, and of the part that is tested. It raises Broken if the rule is not kept.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,11 @@ STOP_TIME = 0.5  # s within which a stop is obeyed
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A rule: its name, its requirement, and the function that tests it on a part."""
+    """One rule.
+
+    `name`: of the check. `rule`: the requirement, as text. `test`: function that tests it with a part of the robot; raises Broken. `moves`:
+    whether the test arms the part.
+    """
 
     name: str
     rule: str
@@ -44,7 +51,7 @@ class Check:
 
 
 def service(player: Player, part: str) -> None:
-    """Test the calls that every service answers."""
+    """Test the liveliness token of robot_sim, and the calls that every service answers (stat, config, pulse). Raises Broken."""
     if not player.service.alive.get("robot_sim"):
         raise Broken("there is no liveliness token alive/robot_sim/INSTANCE: declare it after all subscriptions and calls")
     if len(player.service.alive["robot_sim"]) > 1:
@@ -57,7 +64,7 @@ def service(player: Player, part: str) -> None:
 
 
 def parts(player: Player, part: str) -> None:
-    """Compare parts, motors and limits with the robot file."""
+    """Test that the parts, their motors and the hash of the robot are those of the robot file. Raises Broken."""
     robot = player.robot
     if set(player.tick.parts) != set(robot.parts):
         raise Broken(f"a tick has the parts {', '.join(player.tick.parts)}; the robot file has {', '.join(robot.parts)}")
@@ -70,7 +77,7 @@ def parts(player: Player, part: str) -> None:
 
 
 def streams(player: Player, part: str) -> None:
-    """Test that all streams arrive and are valid."""
+    """Test that the tick, the clock and the states of all parts arrive and are valid messages. Raises Broken."""
     player.until(lambda: bool(player.ticks and player.clocks and all(player.states.values())), ANSWER)
     if player.refused:
         raise Broken(f"{len(player.refused)} messages are not valid, such as {player.refused[-1]}")
@@ -81,7 +88,7 @@ def streams(player: Player, part: str) -> None:
 
 
 def ticks(player: Player, part: str) -> None:
-    """Test numbers, times and rate of the ticks."""
+    """Test the numbers, times and rate of the ticks that arrive in 1.5 s. Raises Broken."""
     first = len(player.ticks)
     player.wait(OBSERVED)
     seen = player.ticks[first:]
@@ -104,7 +111,7 @@ def ticks(player: Player, part: str) -> None:
 
 
 def positions(player: Player, part: str) -> None:
-    """Test that all positions are within the limits of the robot file."""
+    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees. Raises Broken."""
     low, high = player.robot.limits.T
     q = np.array(player.tick.q)
     beyond = np.maximum(q - high, low - q)
@@ -115,7 +122,7 @@ def positions(player: Player, part: str) -> None:
 
 
 def ownership(player: Player, part: str) -> None:
-    """Test take, arm and release, and who may call them."""
+    """Test the calls take, arm and release, and that only the owner of the part may use them. Raises Broken."""
     first = player.take(part)
     if player.take(part) <= first:
         raise Broken(f"take returns epoch {player.epochs[part]} after {first}: each epoch must be larger than all before")
@@ -131,7 +138,7 @@ def ownership(player: Player, part: str) -> None:
 
 
 def hold(player: Player, part: str) -> None:
-    """Test that a part that is not armed ignores commands."""
+    """Test that a part which is not armed does not move when it receives commands. Raises Broken."""
     player.take(part)
     start = player.q(part)
     player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
@@ -142,7 +149,7 @@ def hold(player: Player, part: str) -> None:
 
 
 def obeys(player: Player, part: str) -> None:
-    """Test that an armed part follows commands of velocity and of position."""
+    """Test that an armed part follows velocity commands and position commands. Raises Broken."""
     with player.armed(part):
         start, speed = player.q(part), _speed(player, part)
         player.keep(part, "velocity", lambda: speed, MOTION)
@@ -162,7 +169,7 @@ def obeys(player: Player, part: str) -> None:
 
 
 def refuses(player: Player, part: str) -> None:
-    """Test that invalid and stale commands change nothing."""
+    """Test that invalid commands and commands for an old tick do not come into force. Raises Broken."""
     n = len(player.robot.part(part))
     still, nan = np.zeros(n), np.full(n, math.nan)
     limits = player.robot.limits[player.robot.part(part).slice]
@@ -188,7 +195,7 @@ def refuses(player: Player, part: str) -> None:
 
 
 def watchdog(player: Player, part: str) -> None:
-    """Test that a part holds when its commands stop, and must be armed again."""
+    """Test that a part goes into hold when its commands stop, and then must be armed again before it moves. Raises Broken."""
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         if not player.until(lambda: player.status(part).gate == "hold", 1e-3 * TTL + STOP_TIME):
@@ -201,17 +208,17 @@ def watchdog(player: Player, part: str) -> None:
 
 
 def owner_gone(player: Player, part: str) -> None:
-    """Test that a part holds when the liveliness token of its owner disappears."""
+    """Test that a part goes into hold when the liveliness token of its owner disappears. Raises Broken."""
     _hold_without(player, part, "controller", owner=True)
 
 
 def model_gone(player: Player, part: str) -> None:
-    """Test that all parts hold when the model disappears."""
+    """Test that the part goes into hold when the liveliness token of the model disappears. Raises Broken."""
     _hold_without(player, part, "model", owner=False)
 
 
 def emergency_stop(player: Player, part: str) -> None:
-    """Test that an emergency stop stops all parts, stays, and is reset by a call only."""
+    """Test that an emergency stop stops all parts and stays in force until the call that resets it. Raises Broken."""
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         player.service.bus.publisher(EStop).put(set=True, source="conform", reason="test of the emergency stop")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays the controller for a robot_sim under test: records its messages, and sends commands, also ones that it must refuse."""
+"""Acts as the controller of a robot_sim under test: records its messages, and sends commands, including invalid ones."""
 
 from __future__ import annotations
 
@@ -32,11 +32,15 @@ OPERATOR = "mobee_conform"
 
 
 class Broken(Exception):
-    """A rule of the contract that the robot does not keep; the message gives the observation and the expectation."""
+    """Raised if the robot breaks a rule of the contract. The message says what was observed and what is expected."""
 
 
 class Player:
-    """The session, the messages received so far, and the drive epochs of this client."""
+    """Acts as the controller of a robot_sim under test, and records the messages that arrive.
+
+    `ticks`: with their monotonic times of arrival [s]. `clocks`, `stops`: messages. `states`: messages by part. `refused`: descriptions of
+    messages that are not valid. `epochs`: drive epoch in force, by part.
+    """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         self.service, self.robot = service, robot
@@ -72,11 +76,11 @@ class Player:
     # Time
 
     def wait(self, seconds: float) -> None:
-        """Let the time pass."""
+        """Wait for a time [s], and record the messages that arrive."""
         self.service.spin(time.monotonic() + seconds)
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
-        """Wait until the condition is true; returns False if it is not within that time."""
+        """Wait until the condition is true, and return True; return False if it is still false after `seconds`."""
         end = time.monotonic() + seconds
         while not condition():
             if time.monotonic() > end:
@@ -86,7 +90,7 @@ class Player:
 
     @property
     def tick(self) -> Tick:
-        """The newest tick."""
+        """The newest tick. Raises Broken if there is none."""
         if not self.ticks:
             raise Broken(f"nothing valid arrives on {Tick.stream.key()!r}{self._why()}")
         return self.ticks[-1][1]
@@ -99,37 +103,40 @@ class Player:
         return self.tick.parts[part]
 
     def q(self, part: str) -> Array:
-        """Return the positions of a part in the newest tick, rad."""
+        """Return the motor positions of a part in the newest tick, (n_part,) rad."""
         return np.array(self.tick.q)[self.robot.part(part).slice]
 
     # Calls
 
     def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
-        """Call the robot as its controller; raises rpc.CallFailed."""
+        """Call robot_sim as its controller, and return the reply. `fields`: of the request. Raises services.common.rpc.CallFailed."""
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
     def call_as_operator(self, key: str, request: type[Request], reply: type[_R]) -> _R:
-        """Call the robot as a person does, what a controller may not call; raises rpc.CallFailed."""
+        """Call robot_sim as an operator (a person), for calls that a controller may not make; return the reply.
+
+        Raises services.common.rpc.CallFailed.
+        """
         return rpc.call(self.service.bus.session, OPERATOR, key, request, reply, timeout=ANSWER)
 
     def stat(self) -> Stat:
-        """Return the status of robot_sim."""
+        """Return the status of robot_sim, as it answers the call `stat`."""
         return self.call(keys.service_rpc("robot_sim", "stat"), Empty, Stat)
 
     def take(self, part: str, instance: str = "") -> int:
-        """Take a part's drive; returns the epoch."""
+        """Take the drive of a part, and return the new epoch. `instance`: process that becomes the owner; empty: this one."""
         taken = self.call(keys.drive(part, "take"), Take, Taken, instance=instance or self.service.instance)
         self.epochs[part] = taken.epoch
         return taken.epoch
 
     def drive(self, part: str, verb: str, epoch: int | None = None) -> str:
-        """Arm, release or hold a part, with its epoch or another; returns the state of the gate."""
+        """Call arm, release or hold (`verb`) for a part, and return the new state of its gate. `epoch`: None: the epoch in force."""
         epoch = self.epochs[part] if epoch is None else epoch
         return self.call(keys.drive(part, verb), WithEpoch, Driven, epoch=epoch).gate
 
     @contextmanager
     def armed(self, part: str) -> Iterator[None]:
-        """Take and arm a part; release it at the end, in any state."""
+        """Take and arm a part for the block of a `with` statement, and release it at the end. Raises Broken if it is not armed."""
         self.take(part)
         gate = self._armed_when_known(part)
         if gate != "armed":
@@ -154,7 +161,10 @@ class Player:
     # Commands
 
     def send(self, part: str, mode: Mode, ref: Array, **changed: Any) -> int:
-        """Send one command to a part on `commands`; `changed`: fields that differ from those of a valid one; returns its seq."""
+        """Publish one command to a part, and return its sequence number.
+
+        `ref`: (n_part,), rad or rad/s by `mode`. `changed`: fields that differ from those of a valid command, by name.
+        """
         whole = np.zeros(len(self.robot.motors))
         whole[self.robot.part(part).slice] = ref
         self._seq += 1
@@ -178,7 +188,10 @@ class Player:
         return message.seq
 
     def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float) -> None:
-        """Answer every tick with a valid command for a part, for this time."""
+        """For `seconds` s, answer every tick with a valid command to a part.
+
+        `ref`: returns the position [rad] or velocity [rad/s] to command, (n_part,), by `mode`.
+        """
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             seen = self.tick.k

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The common part of `mobee play` and `mobee learn`: the setup of robot and agents, its files, and learning offline."""
+"""What `mobee play` and `mobee learn` have in common: the choice of robot and agents (setup), its files, and offline learning."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a setup: robot, scenario, transitions, and a README that explains them."""
+"""The files of a setup (a robot with its agents): robot, scenario, transitions, and a README that explains them."""
 
 from __future__ import annotations
 
@@ -21,23 +21,29 @@ README = "README.md"
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The files beside each other in a folder: NAME.xml, NAME.toml and NAME.sqlite."""
+    """The paths of a setup's files, which lie in one folder: NAME.xml, NAME.toml and NAME.sqlite.
+
+    `store`: path of NAME.sqlite, the file of the transitions.
+    """
 
     store: Path
 
     @property
     def robot(self) -> Path:
-        """The robot as it was derived, as zero-position XML; there is none for a shipped robot."""
+        """The path of the derived robot as zero-position XML. For a shipped robot this file does not exist."""
         return self.store.with_suffix(".xml")
 
     @property
     def scenario(self) -> Path:
-        """The scenario in which the agents continue live from the transitions in the store."""
+        """The path of the scenario in which the agents continue to learn live, beginning with the transitions in `store`."""
         return self.store.with_suffix(".toml")
 
 
 def write_files(setup: Setup, files: Files) -> None:
-    """Write robot and scenario; raises UserError if a file cannot be written, InvalidValue for a robot that a file cannot hold."""
+    """Write the robot (unless it is a shipped one) and the scenario.
+
+    Raises UserError if a file cannot be written, InvalidValue if the robot has properties that its file cannot express.
+    """
     try:
         files.store.parent.mkdir(parents=True, exist_ok=True)
         if not setup.shipped:
@@ -65,7 +71,7 @@ def _scenario(setup: Setup, files: Files) -> str:
 
 
 def write_readme(setup: Setup, files: Files) -> None:
-    """Write a README that says what each file is for and what to edit."""
+    """Write a README.md beside the files. It says what each file is for and what the user can edit."""
     robot, scenario, store = (path.name for path in (files.robot, files.scenario, files.store))
     own = f"- `{robot}`: the robot. Edit parts, limits, home, fields and pairs, then run `mobee check {robot}`.\n"
     derived = "\n".join(setup.lines)
@@ -87,7 +93,7 @@ What was derived:
 
 
 def remove_files(files: Files) -> None:
-    """Remove what `write_files` and `write_readme` have written, and their folder if nothing else is in it."""
+    """Remove the files that `write_files` and `write_readme` have written, and their folder if it is then empty."""
     for path in (files.robot, files.scenario, files.store.with_name(README)):
         path.unlink(missing_ok=True)
     with suppress(OSError):  # it is not empty
@@ -95,7 +101,10 @@ def remove_files(files: Files) -> None:
 
 
 def free_folder(runs: Path, name: str) -> Path:
-    """Return a folder in `runs` that does not exist yet."""
+    """Return the path of a folder in `runs` that does not exist yet: `name`, or `name` with a number.
+
+    Raises InvalidValue if there are already 999.
+    """
     for number in range(1, 1000):
         folder = runs / (name if number == 1 else f"{name}-{number}")
         if not folder.exists():

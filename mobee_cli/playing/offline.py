@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learns offline, many times faster than real time, and reports the progress at intervals."""
+"""Lets agents learn offline, many times faster than real time, and reports their progress at intervals."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ FIRST_REPORT = 5.0  # min of robot time; the next report follows after twice the
 
 @dataclass(slots=True, eq=False)
 class Learning:
-    """Agents that learn on one offline plant, and counts of their transitions."""
+    """Agents that learn on one offline plant.
+
+    `begun`: number of transitions in the file at the start. `seconds`: real time of learning so far [s].
+    """
 
     plant: OfflinePlant
     agents: tuple[CuriousAgent, ...]
@@ -37,21 +40,21 @@ class Learning:
 
     @property
     def touched(self) -> Counter[str]:
-        """Objects of the world, and how many actions ended in contact with each."""
+        """For each object of the world, by name, the number of actions that ended in contact with it."""
         return Counter(name for agent in self.agents for made in _made(agent) for name in made.touched)
 
     @property
     def transitions(self) -> int:
-        """Number of transitions made now."""
+        """The number of transitions made since the start of this process."""
         return sum(agent.transitions for agent in self.agents) - self.begun
 
     @property
     def kept(self) -> int:
-        """Number of transitions in the file."""
+        """The number of transitions in the file, including those of earlier processes."""
         return sum(len(_made(agent)) for agent in self.agents)
 
     def numbers(self) -> dict[str, Any]:
-        """Return the agents' actions and results, as plain values."""
+        """Return the numbers of transitions, times, contacts and results of each agent, as plain JSON data."""
         return {
             "transitions": self.transitions,
             "transitions_ever": self.transitions + self.begun,
@@ -62,12 +65,16 @@ class Learning:
         }
 
     def summary(self) -> str:
-        """Return the numbers of all agents in one line."""
+        """Return one line with the number of transitions, the robot's time and the speed."""
         speed = self.plant.time / self.seconds if self.seconds else 0.0
         return f"{self.transitions} transitions, {self.plant.time / 60.0:.0f} min of robot time, {speed:.0f} x real time"
 
     def report(self) -> str:
-        """Return the progress so far, in one line."""
+        """Return one line with the progress of learning.
+
+        It says how many state-actions were tried, how many of these have missed their goal at least once, and which object was touched
+        most.
+        """
         tried = sum(int((agent.model.tries > 0).sum()) for agent in self.agents)
         every = sum(agent.space.state_actions for agent in self.agents)
         surprised = sum(_surprises(agent) for agent in self.agents)
@@ -97,9 +104,10 @@ def _of_agent(agent: CuriousAgent) -> dict[str, Any]:
 
 @contextmanager
 def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
-    """Make the agents of a setup on an offline plant, with their transitions in a file; raises MobeeError.
+    """Create the agents of a setup on an offline plant, for the block of a `with` statement. Raises MobeeError if this is not possible.
 
-    `robot`: as the live system reads it, so that both have the same spaces to the last bit.
+    `robot`: the robot as the live system reads it from its file, so that both have exactly the same spaces. `store`: file of the
+    transitions. Transitions that it already contains are learned first.
     """
     world = world_around(setup.world, setup.shipped or store)
     dt = next((tick for tick in TICKS if tick < largest_step(robot, setup.law)), TICKS[-1])
@@ -115,9 +123,10 @@ def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
 
 
 def learn(learning: Learning, seconds: float | None, transitions: int | None, say: Callable[[str], None]) -> None:
-    """Learn for so many seconds of real time, or until so many transitions are on record in all.
+    """Let the agents learn for a real time (`seconds`), or until the file contains a total number of `transitions`.
 
-    A progress bar is shown on a terminal; `say` is called with each report.
+    None: no such limit; if both are given, learning ends at the first one. On a terminal a progress bar is shown; `say` is called with each
+    report.
     """
     start, following = time.monotonic(), FIRST_REPORT
     with Progress() as progress:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses the agents of a robot: the published agents of the iCub at its table, or agents derived from any robot."""
+"""Chooses the agents of a robot: the published agents for the iCub at its table; for any other robot, agents derived from its file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,12 @@ PUBLISHED = ("torso", "left_arm", "right_arm")  # the parts that learn in thesis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """A robot and its agents. `shipped`: the name under which the robot is loaded; "" where it is written to a file of its own."""
+    """A robot and its agents.
+
+    `name`: name for files and titles. `shipped`: name under which the robot is loaded; empty: it is written to a file of its own. `world`:
+    name or path of the world, or "none". `gains`: name of the gains. `agents`: settings of each agent, by part. `lines`: description for
+    the user. `cameras`: cameras on links, beside those of the robot. `eyes`: services that make and read pictures.
+    """
 
     name: str
     shipped: str
@@ -43,12 +48,12 @@ class Setup:
 
     @property
     def law(self) -> Gains:
-        """The gains of the control law."""
+        """The gains of the control law that `gains` names."""
         return Gains.named(self.gains)
 
 
 def add_setup_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the choice of the agents."""
+    """Add the options that choose the agents to a parser: --part, --explorer and --seed."""
     text = "motors that a part learns with, for example arm=joint1,joint2,joint4; may be repeated (default: derived)"
     parser.add_argument("--part", dest="parts", action="append", default=[], metavar="PART=M1,M2", help=text)
     parser.add_argument("--explorer", default="curious", metavar="NAME", help="how the agents choose actions (default: curious)")
@@ -56,7 +61,10 @@ def add_setup_options(parser: argparse.ArgumentParser) -> None:
 
 
 def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
-    """Return the setup of a robot, given as for `load_robot`, with the options of the command; raises MobeeError."""
+    """Return the setup for a robot, a name or path as for `mobee.load_robot`, and the options of the command.
+
+    Raises MobeeError if it cannot be made.
+    """
     options = {name: value for name, value in urdf_options(arguments).items() if value is not None}
     parts = _parts(arguments.parts)
     common = {"explorer": arguments.explorer, "seed": arguments.seed}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording again: on the page, into a service in lockstep, and beside another recording."""
+"""Plays a recording again on the page or into a service in lockstep, and compares it with another recording."""

@@ -23,9 +23,10 @@ _LEFT_OUT = ("Clock", "StepDone", "Turn", "Served", "State")  # of them, those t
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference of two messages with the same key and tick.
+    """The first difference between two messages with the same key and tick.
 
-    `field`: path of the field.  `first`, `second`: its value in each recording, or MISSING where the message or field is absent.
+    `field`: path of the field, or "message". `first`, `second`: its value in each recording; the text "missing" if that recording does not
+    contain the message or field.
     """
 
     tick: int
@@ -42,7 +43,10 @@ MISSING = "missing"
 
 
 def difference(tick: int, key: str, first: Any, second: Any, ignored: Collection[str] = ()) -> Difference | None:
-    """Return the first field in which two messages differ, to the last bit; None if there is none."""
+    """Compare two messages, to the last bit, and return the first field in which they differ; None if they are equal.
+
+    `tick`, `key`: stored in the result. `ignored`: names of fields that may differ.
+    """
     found = _differing(first, second, ignored, "")
     return None if found is None else Difference(tick, key, *found)
 
@@ -67,7 +71,10 @@ def _differing(first: Any, second: Any, ignored: Collection[str], place: str) ->
 
 
 def compare(tick: int, first: Sequence[Item], second: Sequence[Item], ignored: Collection[str]) -> Difference | None:
-    """Return the first difference of two lists of messages of one tick, key by key in the order of cause and effect."""
+    """Return the first difference between two lists of messages of one tick; None if there is none.
+
+    The messages are compared key by key, in the order in which the control loop publishes them. `ignored`: names of fields that may differ.
+    """
     sides = [_by_key(first), _by_key(second)]
     keys = sorted({*sides[0], *sides[1]}, key=lambda key: (_rank(next(side[key][0].type for side in sides if key in side)), key))
     for key in keys:
@@ -93,7 +100,11 @@ def _rank(kind: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """Result of a comparison of two recordings."""
+    """The result of the comparison of two recordings.
+
+    `ticks`, `messages`: numbers of equal ticks and messages. `difference`: the first difference; None: the recordings are equal as far as
+    both reach. `ends`: the recording that ends first ("first" or "second"); empty: both end at the same tick, or they differ.
+    """
 
     ticks: int
     messages: int
@@ -102,9 +113,10 @@ class Compared:
 
 
 def compare_runs(first: Recording, second: Recording) -> Compared:
-    """Compare the control streams of two runs from tick 1 on, until they differ; raises MobeeError if a run has no such tick.
+    """Compare the control messages of two runs from tick 1, up to the first difference or the end of one recording.
 
-    Tick 0 is repeated as often as the start takes.
+    Tick 0 is not compared, because it is repeated until all services have started. Raises MobeeError if a recording has no complete tick
+    after tick 0.
     """
     kinds = {cls.__name__ for cls in streams() if cls.stream.delivery in _REPEATABLE} - set(_LEFT_OUT)
     counted = messages = 0

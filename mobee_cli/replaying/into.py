@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays a recorded run in lockstep into its controller or model, and compares the new messages with the recorded ones, to the last bit.
 
-In every tick the service gets the recorded input.  Its recorded messages give the order of the calls: a call that it had answered before
-it answered the tick is made before the tick, any other call after it.  All messages from the recording have their recorded bytes.
-Epochs of goals are the only exception: a controller counts them from its start, so the recorded ones are translated.
+In every tick the service receives the recorded input. The recording also gives the order of the calls: a call that the service had answered
+before it answered the tick is made before the tick, any other call after it. All messages from the recording have their recorded bytes. The
+only exception are the epochs of goals: a controller counts them from its start, so the recorded epochs are translated.
 """
 
 from __future__ import annotations
@@ -32,7 +32,12 @@ _NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """The messages that a service reads and sends in a tick, by their types."""
+    """The messages that a service reads and sends in a tick, as names of message types.
+
+    `with_tick`: messages of the model, sent to the service after the tick, which it needs to answer the tick. `after`: messages of others,
+    sent before the next tick. `says`: messages of the service that are compared. `answers`: whether a message is the service's answer to a
+    tick.
+    """
 
     with_tick: tuple[str, ...]  # from the model, after the tick: it answers the tick when it has these
     after: tuple[str, ...]  # from others, before the next tick
@@ -52,7 +57,11 @@ ROLES: Mapping[str, Role] = {
 
 @dataclass(slots=True)
 class Result:
-    """The result of a replay."""
+    """The result of a replay into a service.
+
+    `who`: the service. `ticks`: number of compared ticks. `messages`: number of compared messages, `says`: the same by type. `calls`:
+    number of repeated calls. `seconds`: real time [s]. `difference`: the first difference; None: all messages are equal.
+    """
 
     who: str
     ticks: int = 0
@@ -64,7 +73,10 @@ class Result:
 
 
 def replay_into(stage: Stage, run: Iterable[TickOf], last: int) -> Result:
-    """Play the ticks of a run up to tick `last`; raises MobeeError if the run cannot be played, or the service does not answer."""
+    """Play the ticks of a run into the service on a stage, up to tick `last` or the first difference, and return the result.
+
+    Raises MobeeError if the run cannot be played, or the service does not answer.
+    """
     begin = time.monotonic()
     replay = _Replay(stage, ROLES[stage.who])
     for tick in run:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording to a separate monitor, which shows the run on its page, at the pace of the robot's time."""
+"""Plays a recording to a separate monitor, which shows the run on its page, at the speed of the robot's time."""
 
 from __future__ import annotations
 
@@ -29,10 +29,13 @@ _tick = msgspec.msgpack.Decoder(Tick)
 
 
 class Player:
-    """A recording, and the monitor that receives it."""
+    """Plays a recording to a monitor. `stage`: the separate bus on which this monitor runs."""
 
     def __init__(self, recording: Recording, port: int, folder: Path) -> None:
-        """`folder`: for the files of the monitor; raises MobeeError if the recording does not hold the settings of its run."""
+        """Prepare the monitor.
+
+        `port`: of its page. `folder`: for its files. Raises MobeeError if the recording does not contain the settings of its run.
+        """
         settings = recording.settings()
         if "robot_sim.toml" not in settings:
             raise MobeeError("the recording holds no robot_sim.toml, the settings of the robot: was it made by `mobee launch`?")
@@ -43,7 +46,10 @@ class Player:
         self._next_state = self._offset = self._last = 0  # ns of the robot's time
 
     def play(self, speed: float) -> None:
-        """Publish all messages, `speed` times as fast as the robot's time passed; pauses of the robot are left out."""
+        """Publish all messages of the recording.
+
+        `speed`: factor by which the replay is faster than the robot's time in the recording. Pauses of the robot are skipped.
+        """
         self.stage.serve(keys.world_rpc("list"), lambda key, request: (World, self._world))
         begin, first = time.monotonic(), -1
         for message in self._recording:

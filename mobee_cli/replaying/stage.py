@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bus of its own on which one service of a recording runs again, while the messages of all others are played from the recording."""
+"""A separate bus on which one service of a recording runs again. The messages of all other services are played from the recording."""
 
 from __future__ import annotations
 
@@ -30,14 +30,17 @@ PLAYER = "replay"
 
 
 class Stopped(MobeeError):
-    """Raised if the service ends, or does not answer."""
+    """Raised if the service on the stage ends, or does not answer in time."""
 
 
 class Stage:
-    """The bus, the service, and the service's messages."""
+    """A separate bus with one service on it. `who`: the service. `said`: queue of the messages that it publishes."""
 
     def __init__(self, who: str, settings: str, folder: Path) -> None:
-        """`who`: the service; `settings`: its settings file of the recorded run; `folder`: for that file and the log."""
+        """Prepare the stage.
+
+        `who`: name of the service. `settings`: content of its settings file in the recorded run. `folder`: for this file and the log.
+        """
         self.who, self._folder, self._settings = who, folder, settings
         self.said: Queue[Item] = Queue()  # messages of the service
         self._tokens: dict[tuple[str, str], Any] = {}
@@ -47,7 +50,10 @@ class Stage:
 
     @contextmanager
     def open(self, endpoint: str) -> Iterator[Self]:
-        """Open the bus."""
+        """Open the bus, with a router at `endpoint` or at a local socket, for the block of a `with` statement.
+
+        At its end the service is stopped.
+        """
         spare_threads()
         with local_endpoint() as local, open_router(local or endpoint, lease=PATIENCE) as session:
             self.session, self._endpoint = session, local or endpoint
@@ -61,7 +67,7 @@ class Stage:
                 self._end()
 
     def start(self) -> None:
-        """Start the service with its settings, and wait until it is ready; raises Stopped."""
+        """Start the service with its settings, and wait until it is ready. Raises Stopped if it ends, or is not ready within 60 s."""
         entry = entry_of(self.who, None)
         assert entry is not None
         file = self._folder / f"{self.who}.toml"
@@ -80,31 +86,34 @@ class Stage:
             time.sleep(0.02)
 
     def check(self) -> None:
-        """Raise Stopped if the service has ended."""
+        """Raise Stopped if the service has ended by itself."""
         if self._process is not None and self._process.poll() is not None:
             lines = self._log.read_text(errors="replace").strip().splitlines()
             raise Stopped(f"{self.who} ended with code {self._process.returncode}: {(lines or ['its log is empty'])[-1]}")
 
     def next(self, seconds: float) -> Item | None:
-        """Return the next message of the service; None if there is none in time."""
+        """Return the next message of the service; None if no message arrives within `seconds`."""
         try:
             return self.said.get(timeout=seconds)
         except Empty:
             return None
 
     def send(self, key: str, encoding: str, payload: bytes) -> None:
-        """Publish a message."""
+        """Publish a message with this key, encoding and content on the separate bus."""
         self._publisher.put(key, encoding, payload)
 
     def token(self, who: str, instance: str, up: bool) -> None:
-        """Declare or drop a liveliness token."""
+        """Declare (`up`) or remove the liveliness token of a process. `who`: name of the service; `instance`: id of the process."""
         if up and (who, instance) not in self._tokens:
             self._tokens[who, instance] = self.session.liveliness().declare_token(keys.alive(who, instance))
         elif not up and (who, instance) in self._tokens:
             self._tokens.pop((who, instance)).undeclare()
 
     def serve(self, key: str, answer: Callable[[str, dict[str, Any]], tuple[type[msgspec.Struct], bytes] | None]) -> None:
-        """Answer the calls of the service on a key expression with replies of the recording."""
+        """Answer calls of the service.
+
+        `key`: key expression of the calls. `answer(key, request)` returns the type and the bytes of the reply, or None: no answer.
+        """
 
         def reply(at: str, request: bytes) -> tuple[str, bytes] | None:
             found = answer(at, msgspec.msgpack.decode(request))
@@ -113,7 +122,10 @@ class Stage:
         self._kept.append(answer_raw(self.session, key, reply))
 
     def call(self, key: str, kind: str, request: bytes) -> tuple[str, bytes]:
-        """Make a recorded call again and return encoding and bytes of the answer; raises Stopped if there is none."""
+        """Make a recorded call to the service, and return the encoding and the bytes of the answer.
+
+        `key`: of the call. `kind`: name of the request's type. `request`: its bytes. Raises Stopped if there is no answer within 10 s.
+        """
         answer = call_raw(self.session, key, f"application/msgpack;icub/{kind}/{VERSION}", request, PATIENCE)
         if answer is None:
             self.check()

@@ -31,23 +31,26 @@ _header = msgspec.msgpack.Decoder(_Header)
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A recorded message, or a liveliness token (`type` empty)."""
+    """A recorded message, or a recorded change of a liveliness token (then `type` is empty).
+
+    `src`: name of the sender; empty: not known.
+    """
 
     message: Raw
     src: str
 
     @property
     def key(self) -> str:
-        """Its key on the bus."""
+        """The key of the message on the bus."""
         return self.message.key
 
     @property
     def type(self) -> str:
-        """The name of the message's type."""
+        """The name of the message's type, such as "Motion"; empty for a liveliness token."""
         return self.message.type
 
     def content(self) -> dict[str, Any]:
-        """Return the message as dicts, lists and values; raises MobeeError if it cannot be decoded."""
+        """Return the fields of the message, by name. Raises MobeeError if the message cannot be decoded."""
         try:
             decode = msgspec.msgpack.decode if self.type else msgspec.json.decode
             return dict(decode(self.message.payload))
@@ -57,21 +60,21 @@ class Item:
 
 @dataclass(slots=True)
 class TickOf:
-    """All messages of one tick, in the order in which the recorder received them."""
+    """All recorded messages of tick `k`, in the order in which the recorder received them."""
 
     k: int
     items: list[Item] = field(default_factory=list)
 
     def of(self, kind: str, src: str = "") -> list[Item]:
-        """Return the messages of a type, and of a sender if one is named."""
+        """Return the messages of the type `kind`. `src`: only those of this sender; empty: of every sender."""
         return [item for item in self.items if item.type == kind and src in ("", item.src)]
 
 
 def ticks(recording: Recording) -> Iterator[TickOf]:
-    """Yield the ticks of the first run of a recording; raises MobeeError if it has none.
+    """Yield the ticks of the first run of a recording, in order. Raises MobeeError if the recording contains no tick.
 
-    A message without a tick of that run, such as a token or the stop of a client, belongs to the newest tick before it.  The last tick is
-    left out, because the end of the recording may have cut it.
+    A message that has no tick of this run, such as a liveliness token or an emergency stop of a client, is added to the newest tick before
+    it. The last tick is left out, because it may be incomplete.
     """
     run, newest, waiting = "", 0, {0: TickOf(0)}
     last = -1  # tick that was yielded
@@ -109,7 +112,7 @@ def _header_of(message: Raw) -> _Header:
 
 
 def served_of(message: Raw) -> Served | None:
-    """Return the answered call in a message of this type; None if it cannot be decoded: then no service sent it."""
+    """Decode a message of type Served, which describes a call and its reply; None if it cannot be decoded (no service has sent it)."""
     try:
         return msgspec.msgpack.decode(message.payload, type=Served)
     except UNDECODABLE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee roadmap`: roadmaps of whole-body poses: build, tasks, show, query, play."""
+"""`mobee roadmap`: roadmaps of whole-body poses, with the actions build, tasks, show, query and play."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ACTIONS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a parser for each action."""
+    """Add the options of `mobee roadmap` to the parser: one subcommand for each action."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(ACTIONS))
     for name, text in ACTIONS.items():
         module = importlib.import_module(f"mobee_cli.roadmap.{name}")
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the requested action of the command."""
+    """Run the action of `mobee roadmap` that the arguments name, and return the exit code."""
     try:
         code: int = importlib.import_module(f"mobee_cli.roadmap.{arguments.action}").run(arguments)
     except MobeeError as error:

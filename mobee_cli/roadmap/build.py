@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds a roadmap: poses that satisfy a task's costs, spread over its task space and joined by edges."""
+"""`mobee roadmap build`: builds a roadmap, a graph of poses that satisfy a task's costs and are spread over its task space."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ The shipped tasks need the icub."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the task, the method, and the file."""
+    """Add the options of `mobee roadmap build` to the parser: task, method, file and others."""
     parser.add_argument("task", metavar="TASK|FILE.py", help="a shipped task, see `mobee roadmap tasks`, or your own file")
     add_robot(parser, "for a task file; default: icub")
     add_world(parser)
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Build or resume, and print a description of the roadmap."""
+    """Run `mobee roadmap build`: build the roadmap or resume an unfinished one, print its description, and return the exit code."""
     from mobee_cli.roadmap.map_file import as_json, summary
     from mobee_cli.roadmap.tasks import task_named
 

@@ -44,7 +44,10 @@ TRIES = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Running:
-    """The running system: its robot, the world of its model, the gains of its controller."""
+    """The running system.
+
+    `robot`: its robot. `world`: objects of its model. `gains`: of its controller. `service`: this program's connection to the bus.
+    """
 
     robot: Robot
     world: World
@@ -53,7 +56,10 @@ class Running:
 
 
 def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
-    """Move the robot of the running system along a path from where it is, and print the result."""
+    """Move the robot of the running system from its present pose along a path of the roadmap to the goal in `arguments`.
+
+    Prints the result and returns the exit code.
+    """
     if arguments.start is not None:
         raise UserError("--from is only valid offline: with --live the path begins where the robot is", BAD_INPUT)
     with running_system(arguments.endpoint) as running:
@@ -95,9 +101,10 @@ def _played(plant: BusFollower, running: Running, found: dict[str, Any], speed: 
 
 
 def in_running_world(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
-    """Return the map in the world of the running system; raises UserError if its robot or its obstacles differ from those of the map.
+    """Return the roadmap with the world of the running system in place of its own.
 
-    Targets may be elsewhere: vision moves them, and the path is checked where they are now.
+    Raises UserError if the robots differ, or if the obstacles differ and `other_world` is False. Targets may be at other places, because
+    vision moves them; the path is checked for contacts at their present places.
     """
     made, now = robot_digest(trm.model.robot), robot_digest(running.robot)
     if made != now:
@@ -118,7 +125,10 @@ def _obstacles(world: World) -> str:
 
 @contextmanager
 def running_system(endpoint: str) -> Iterator[Running]:
-    """Connect to the system at `endpoint`; raises UserError if there is none."""
+    """Connect to the system at `endpoint` for the block of a `with` statement.
+
+    Raises UserError if its controller or model does not answer.
+    """
     with connected(endpoint) as session:
         try:
             settings = json.loads(rpc.call(session, WHO, keys.service_rpc("controller", "config"), Empty, Config, tries=TRIES).config)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options for roadmap files and places in them, and descriptions of roadmaps, 80 columns wide."""
+"""Options for roadmap files and for places (goal, start) in roadmaps, and descriptions of roadmaps, 80 columns wide."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ The path begins at home, or at --from: task coordinates, or all motors in rad.""
 
 
 def add_map(parser: argparse.ArgumentParser) -> None:
-    """Add the map, its robot and its world."""
+    """Add the options for a roadmap file, its robot and its world to a parser."""
     parser.add_argument("map", type=Path, metavar="MAP", help="roadmap file, written by `mobee roadmap build`")
     add_robot(parser, "default: the robot of the map, if it is a shipped one")
     text = f"use this world: a shipped one, a .xml file, or {NO_WORLD} (default: the world of the map)"
@@ -34,15 +34,15 @@ def add_map(parser: argparse.ArgumentParser) -> None:
 
 
 def add_places(parser: argparse.ArgumentParser) -> None:
-    """Add goal and start."""
+    """Add the options --to (goal) and --from (start) to a parser."""
     parser.add_argument("--to", nargs="+", type=float, required=True, metavar="Y", help="goal: task coordinates")
     parser.add_argument("--from", nargs="+", type=float, dest="start", metavar="Y", help="start (default: home)")
 
 
 def map_given(arguments: argparse.Namespace) -> Roadmap:
-    """Load the map, in its own world or in the one of the option.
+    """Load the roadmap that the arguments name, with its own world or the one of the option --world.
 
-    Raises MobeeError; UserError for options of a robot without --robot.
+    Raises MobeeError if it cannot be loaded, UserError if options of a URDF robot are given without --robot.
     """
     if arguments.robot is None:
         require_none(arguments, "only valid with --robot FILE", names=())
@@ -53,7 +53,11 @@ def map_given(arguments: argparse.Namespace) -> Roadmap:
 
 
 def start_of(trm: Roadmap, given: list[float] | None) -> Array:
-    """Return the posture (n,) rad where the path begins."""
+    """Return the posture (n,) rad in which a path begins.
+
+    `given`: None: the robot's home; task coordinates: the posture of the vertex for this place; n angles [rad]: this posture. Raises
+    UserError if the numbers are not valid.
+    """
     robot = trm.model.robot
     if given is None:
         return robot.home.copy()
@@ -77,12 +81,12 @@ def start_of(trm: Roadmap, given: list[float] | None) -> Array:
 
 
 def wrapped(text: str, indent: str = "") -> list[str]:
-    """Return a text as lines of at most COLUMNS characters."""
+    """Break a text into lines of at most 80 characters, with `indent` before the first line and two more spaces before the others."""
     return textwrap.wrap(text, COLUMNS, initial_indent=indent, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
 
 
 def summary(trm: Roadmap, path: Path) -> list[str]:
-    """Describe a roadmap: size, robot and world, settings, coordinates."""
+    """Return lines of text that describe a roadmap: its size, robot and world, settings and task coordinates. `path`: of its file."""
     settings = trm.settings
     parts = np.bincount(trm.graph.components) if len(trm.q) else np.empty(0, dtype=int)
     unfinished = "" if settings.get("finished", True) else ", unfinished: the same build command resumes it"
@@ -113,7 +117,7 @@ def summary(trm: Roadmap, path: Path) -> list[str]:
 
 
 def edge_summary(trm: Roadmap) -> list[str]:
-    """Describe how far motors turn along the edges."""
+    """Return lines of text that describe how far motors turn along the edges; empty if there are no edges."""
     if not len(trm.edges):
         return []
     turns = np.abs(trm.q[trm.edges[:, 0]] - trm.q[trm.edges[:, 1]]).max(axis=1)
@@ -122,7 +126,7 @@ def edge_summary(trm: Roadmap) -> list[str]:
 
 
 def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
-    """Return a description of a roadmap as plain JSON values."""
+    """Return a description of a roadmap as plain JSON data. `path`: of its file."""
     return {
         "map": str(path),
         "poses": len(trm.q),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moves the robot along a path of a roadmap under the control law, offline or live."""
+"""`mobee roadmap play`: moves the robot along a path of a roadmap under the control law, offline or live."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TOLERANCE = 10.0  # mm: a marker that ends farther from its goal has not arrived
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the map, goal and start, and the options of the motion."""
+    """Add the options of `mobee roadmap play` to the parser: roadmap, goal, start and options of the motion."""
     add_map(parser)
     add_places(parser)
     parser.add_argument(
@@ -62,7 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Find the path, move along it, and print the result."""
+    """Run `mobee roadmap play`: find the path, move the robot along it, and print the result.
+
+    Returns the exit code (0: arrived, 1: not arrived).
+    """
     if not 0.0 < arguments.speed <= 1.0:
         raise UserError(f"--speed {arguments.speed:g}: must be above 0 and at most 1", BAD_INPUT)
     if arguments.live and arguments.world is not None:
@@ -80,7 +83,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arguments: argparse.Namespace) -> int:
-    """Print the result, draw the motion if requested, and return the exit code."""
+    """Print the result of a motion, draw the motion if the arguments request it, and return the exit code.
+
+    `path`: as returned by `mobee_cli.roadmap.query.find_path`.
+    """
     found = result_of(trm, path, played, arguments.tolerance) | held_off(trm, path, played, gains)
     if arguments.picture is not None:
         found["picture"] = str(_filmstrip(trm, played, arguments.picture))
@@ -89,13 +95,17 @@ def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arg
 
 
 def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
-    """Raise UserError if the path has contacts."""
+    """Raise UserError if the path (as returned by `mobee_cli.roadmap.query.find_path`) has contacts, unless `anyway` is True."""
     if not path["free"] and not anyway:
         raise UserError(f"the path has contacts: {path['why']} --anyway moves along the shortest path nevertheless", FAILED)
 
 
 def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: float) -> dict[str, Any]:
-    """Return the result of a motion as plain JSON values; `tolerance`: mm."""
+    """Return the result of a motion as plain JSON data; lengths in m, angles in rad, times in s.
+
+    `path`: as returned by `mobee_cli.roadmap.query.find_path`. `tolerance`: largest remaining error of the marker [mm] at which the robot
+    has arrived.
+    """
     pose = trm.model.evaluate(np.array([played.q[-1], path["poses"][-1]]))
     markers = {name: float(np.linalg.norm(np.diff(pose.position(name), axis=0))) for name in trm.model.robot.markers}
     error = markers[marker_of(trm)]
@@ -118,7 +128,10 @@ def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: flo
 
 
 def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -> dict[str, Any]:
-    """Return the motor that ended farthest from its goal, and the force that kept it away; None if no force did."""
+    """Return which motor ended farthest from its goal, and which force kept it away, as {"farthest": motor, "held_by": name of the force}.
+
+    "held_by" is None if no constraint force on this motor exceeds 0.5 rad/s^2. `path`: as returned by `mobee_cli.roadmap.query.find_path`.
+    """
     off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
     motor = int(off.argmax())
     forces = constraint_forces(trm.model.evaluate(played.q[-1]), gains)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Publishes how far the running robot is on a path of a roadmap."""
+"""Publishes the progress of the running robot along a path of a roadmap."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PERIOD = 200_000_000  # ns of the robot's clock between two messages
 
 
 class Progress:
-    """The path, and how much of it is over; the monitor shows them."""
+    """Publishes a path and how much of it is completed, so that the monitor can show both."""
 
     def __init__(self, service: Service, trm: Roadmap) -> None:
         self._trm, self._clock = trm, service.bus
@@ -29,7 +29,7 @@ class Progress:
         self._share, self._missing, self._next = 0.0, 0.0, 0
 
     def begin(self, place: Array, wanted: Reference) -> None:
-        """Publish the path of a planned motion to a place (m,) in the coordinates of the roadmap."""
+        """Publish that a motion begins. `place`: its goal in the coordinates of the roadmap, (m,). `wanted`: the planned motion."""
         marker = marker_of(self._trm)
         rows = np.linspace(0, len(wanted.q) - 1, min(len(wanted.q), PLACES)).astype(int)
         path = self._trm.model.evaluate(wanted.q[rows]).position(marker)
@@ -43,7 +43,10 @@ class Progress:
         self._put("moving")
 
     def note(self, share: float, q: Array) -> None:
-        """Publish how much of the motion is over, and where the robot is, q (n,) rad, at most every PERIOD."""
+        """Publish the progress of the motion, at most five times per second of robot time.
+
+        `share`: completed part, 0 to 1. `q`: measured pose (n,) rad.
+        """
         self._share = share
         if self._clock.t < self._next and share < 1.0:
             return
@@ -53,12 +56,12 @@ class Progress:
         self._put("moving")
 
     def rest(self, q: Array) -> None:
-        """The robot rests at q (n,) rad."""
+        """Publish that the path is completed and the robot rests in the pose `q` (n,) rad."""
         self.note(1.0, q)
         self._phase = "over"
 
     def end(self) -> None:
-        """Publish that the motion is over, or was interrupted."""
+        """Publish that the motion is over; if `rest` was not called, that it was interrupted."""
         if self._fixed:
             self._put(self._phase)
 

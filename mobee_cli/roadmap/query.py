@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds a path through a roadmap to a place."""
+"""`mobee roadmap query`: finds a path through a roadmap to a place."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ MAX_LISTED = 12  # poses that are printed one by one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the map, goal and start."""
+    """Add the options of `mobee roadmap query` to the parser: roadmap, goal and start."""
     add_map(parser)
     add_places(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Find the path and print it."""
+    """Run `mobee roadmap query`: find the path, print it, and return the exit code (0: the path has no contacts, 1: it has)."""
     trm = map_given(arguments)
     found = find_path(trm, start_of(trm, arguments.start), arguments.to)
     print(
@@ -44,9 +44,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
-    """Return the shortest path without contacts as plain JSON values; if there is none, the shortest path, and why.
+    """Return the shortest path without contacts as plain JSON data.
 
-    Motors that the map does not move stay where they are, if they are near their positions in the map.  Raises UserError without any path.
+    If there is none, return the shortest path with contacts, and the reason. `start`: posture (n,) rad. `goal`: task coordinates. Motors
+    that the roadmap does not move stay where they are, if they are less than 0.25 rad from their positions in the roadmap. In the result
+    "free" is False if the path has contacts, and "why" gives the reason. Raises UserError if the roadmap has no path at all.
     """
     shortest = _shortest(trm, start, goal)
     stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN
@@ -88,7 +90,7 @@ def _shortest(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
 
 
 def path_text(trm: Roadmap, found: dict[str, Any]) -> list[str]:
-    """Return the path as text, at most 80 columns wide."""
+    """Return a path, as returned by `find_path`, as lines of text, at most 80 columns wide."""
     vertices, place = found["vertices"], np.array(found["place"])
     count = len(vertices)
     lines = wrapped(

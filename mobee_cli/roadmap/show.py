@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Describes a roadmap, and draws the positions of a marker in all its poses."""
+"""`mobee roadmap show`: describes a roadmap, and draws the positions of a marker in all its poses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ pose: blue where the first coordinate is smallest, orange where it is largest.""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the map and the options of the picture."""
+    """Add the options of `mobee roadmap show` to the parser: the roadmap and options of the picture."""
     add_map(parser)
     parser.add_argument("--picture", type=Path, metavar="FILE.png", help="file of the picture (default: MAP.png)")
     parser.add_argument("--marker", metavar="NAME", help="marker to draw (default: that of the task, else the one that moves farthest)")
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the description, and draw the picture."""
+    """Run `mobee roadmap show`: print the description, draw the picture or show the motion, and return the exit code."""
     trm = map_given(arguments)
     if arguments.view or arguments.save is not None:
         return _show_tour(trm, arguments.save)
@@ -76,7 +76,10 @@ def _draw(trm: Roadmap, marker: str, path: Path) -> Path:
 
 
 def marker_of(trm: Roadmap) -> str:
-    """Return the marker that the task names, or the one that moves farthest between the poses."""
+    """Return the marker that the task's coordinates name, or else the one that moves farthest between the poses.
+
+    Raises UserError if the robot has no markers.
+    """
     robot = trm.model.robot
     if not robot.markers:
         raise UserError(f"robot {robot.name!r} has no markers to show", BAD_INPUT)
@@ -91,7 +94,10 @@ TOUR_PLACES = 8
 
 
 def tour(trm: Roadmap, places: int = TOUR_PLACES) -> list[Stretch]:
-    """Return paths between places far apart in the largest part of the map, one after the other, from its middle."""
+    """Return a tour through the roadmap, as sections of a motion: paths between places that are far apart, one after the other.
+
+    The tour stays in the largest connected part of the roadmap, and begins at its middle. `places`: number of places.
+    """
     from services.monitor.viewer.view import RATE, Stretch  # imports rerun
 
     inside = np.flatnonzero(trm.graph.components == 0)

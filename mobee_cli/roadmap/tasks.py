@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists the shipped tasks; loads the task of a roadmap, shipped or from a Python file."""
+"""`mobee roadmap tasks`: lists the shipped tasks. Also loads the task of a roadmap, shipped or from a Python file."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ NOTES = "`mobee roadmap build TASK` builds the roadmap of a task. All need the i
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add no options."""
+    """Add no options: `mobee roadmap tasks` has none of its own."""
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """List the tasks."""
+    """Run `mobee roadmap tasks`: list the shipped tasks, and return the exit code."""
     found = [(name, make()) for name, make in EXAMPLES.items()]
     if arguments.json:
         rows = [
@@ -67,11 +67,11 @@ MAKER = "example"  # name of the function that a task file defines
 
 
 def task_named(name: str, options: Sequence[str], model: Callable[[], Model]) -> Example:
-    """Return a shipped task, or the task that a file defines.
+    """Return a shipped task, or the task that a Python file defines.
 
     Args:
-        name: of a shipped task, or the path of a .py file.
-        options: the options of robot and world on the command line.
+        name: name of a shipped task, or path of a .py file.
+        options: options for robot and world as given on the command line; a shipped task allows none.
         model: makes the model of these options.
 
     Raises:
